@@ -1,0 +1,58 @@
+//! TOML text to a typed value, with errors that name the field.
+
+use std::fmt;
+
+use serde::de::DeserializeOwned;
+
+/// A configuration that cannot be used: which field, what was found, what is allowed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ConfigurationError {
+    field: String,
+    message: String,
+}
+
+impl ConfigurationError {
+    /// An error about `field` (a dotted path such as `barrier[0].deadline`; empty for the whole file).
+    pub fn new(field: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { field: field.into(), message: message.into() }
+    }
+
+    /// The dotted path of the field, empty where the error concerns the file as a whole.
+    pub fn field(&self) -> &str {
+        &self.field
+    }
+
+    /// What is wrong with it, with the value found and the range allowed.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+}
+
+impl fmt::Display for ConfigurationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.field.is_empty() {
+            f.write_str(&self.message)
+        } else {
+            write!(f, "{}: {}", self.field, self.message)
+        }
+    }
+}
+
+impl std::error::Error for ConfigurationError {}
+
+/// Reads a value from TOML text. Types used here deny unknown fields, so that a misspelt key is
+/// an error and not a silent default.
+///
+/// # Errors
+///
+/// Text that is not TOML (with line and column), an unknown or missing key, a value of the wrong
+/// type: each with the path of the field.
+pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, ConfigurationError> {
+    let de = toml::Deserializer::parse(text)
+        .map_err(|e| ConfigurationError::new("", e.to_string().trim_end().to_owned()))?;
+    serde_path_to_error::deserialize(de).map_err(|e| {
+        let path = e.path().to_string();
+        let path = if path == "." { String::new() } else { path };
+        ConfigurationError::new(path, e.inner().to_string().trim_end().to_owned())
+    })
+}

@@ -1,0 +1,3 @@
+//! The `punctual` command line.
+#![deny(unsafe_code)]
+fn main() {}
