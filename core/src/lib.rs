@@ -1,2 +1,77 @@
-//! Placeholder.
+//! Fixed-time safety filters for control-affine plants.
+//!
+//! Given a plant `ẋ = f(x) + g(x) u` and a barrier `h`, the crate turns "be in {x : h(x) ≥ 0} within
+//! T seconds, and stay there" into one affine row on `u`, and solves
+//! `min ½‖u − u_ref‖²` under such rows and input bounds.
+//!
+//! ```
+//! use punctual_core::barriers::DistanceDisc;
+//! use punctual_core::filter::{BarrierSettings, SafetyFilter};
+//! use punctual_core::plants::PointMass;
+//!
+//! // Reach the disc of radius 2 m around (45, 45) within 10 s.
+//! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
+//! let mut filter = SafetyFilter::builder(4, 2)
+//!     .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
+//!     .build()?;
+//! let mut u = [0.0; 2];
+//! let report = filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u)?;
+//! assert!(report.status.is_satisfied());
+//! assert!(u[0] > 0.0 && u[1] > 0.0);
+//! # Ok::<(), punctual_core::Error>(())
+//! ```
+//!
+//! # Notation
+//!
+//! | symbol | name in code | unit | shape |
+//! |---|---|---|---|
+//! | x | `x`, state | per component | `NX` |
+//! | u, u_ref | `u`, `u_ref` | per component | `NU` ≤ [`MAX_INPUTS`] |
+//! | f | [`ControlAffine::drift`](dynamics::ControlAffine::drift) | unit of x / s | `NX` |
+//! | g | [`ControlAffine::input_map`](dynamics::ControlAffine::input_map) | unit of x / (s · unit of u) | `NX` × `NU` |
+//! | h | [`Barrier::value`](barrier::Barrier::value) | the barrier's own, `[h]` | scalar |
+//! | n | `relative_degree` | 1 | 1 ..= [`MAX_RELATIVE_DEGREE`] |
+//! | L_f^k h | `drift[k]` | `[h]`/s^k | k = 0 ..= n |
+//! | L_g L_f^(n-1) h | `row` | `[h]`/(s^n · unit of u) | `NU` |
+//! | T | `deadline` | s | scalar > 0 |
+//! | a | `rate` | 1/s | scalar |
+//! | μ | `margin` | `[h]` | scalar ≥ 0 |
+//! | e = h − μ − r | `error` | `[h]` | scalar |
+//! | r | `profile` | `[h]` | scalar |
+//! | τ = t − t₀ | `elapsed` | s | scalar ≥ 0 |
+//!
+//! # Layers
+//!
+//! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
+//! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`filter`];
+//! [`plants`], [`barriers`] and [`simulation`] are reference material beside it.
+//!
+//! # References
+//!
+//! Janani S K and S. Kolathaya, *Fixed time convergence guarantees for Higher Order Control Barrier
+//! Functions*, arXiv:2507.13888 ("the paper" throughout). The comparison lemma for any order, the
+//! reference profile and the stay constraint go beyond it; their derivations open the modules of
+//! [`convergence`].
 #![forbid(unsafe_code)]
+
+pub mod barrier;
+pub mod barriers;
+pub mod convergence;
+pub mod dynamics;
+mod error;
+pub mod filter;
+pub mod jet;
+pub mod lie;
+pub mod plants;
+pub mod qp;
+pub mod scalar;
+pub mod simulation;
+
+pub use error::{Error, ErrorKind};
+pub use nalgebra;
+
+/// Largest relative degree n supported: the order of the highest derivative of h that is taken.
+pub const MAX_RELATIVE_DEGREE: usize = 8;
+
+/// Largest number of inputs, dim u.
+pub const MAX_INPUTS: usize = 12;

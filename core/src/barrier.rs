@@ -1,0 +1,32 @@
+//! Barriers: the function h whose non-negative set is the safe set.
+
+use nalgebra::SVector;
+
+use crate::scalar::Scalar;
+
+/// A barrier `h(t, x)`; the safe set is `C(t) = {x : h(t, x) ≥ 0}`.
+///
+/// ```
+/// use nalgebra::SVector;
+/// use punctual_core::barrier::Barrier;
+/// use punctual_core::nalgebra;
+/// use punctual_core::scalar::Scalar;
+///
+/// /// Speed limit: h = v_max − v for a state (position, velocity).
+/// struct SpeedLimit(f64);
+///
+/// impl Barrier<2> for SpeedLimit {
+///     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+///         -x[1] + self.0
+///     }
+/// }
+/// ```
+///
+/// # Requirements
+///
+/// h is smooth along trajectories, and its set is what is meant: the *shape* of h away from its zero
+/// level decides how much input the filter needs (see [`crate::barriers`]).
+pub trait Barrier<const NX: usize> {
+    /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S;
+}

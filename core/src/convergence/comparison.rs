@@ -1,0 +1,80 @@
+//! The comparison lemma, any order.
+//!
+//! For a constant real rate a and e ∈ Cⁿ put p(τ) = e^{aτ} e(τ). Then p⁽ⁿ⁾ = e^{aτ} (D + a)ⁿ e with
+//! D = d/dt, and Taylor's formula with integral remainder gives: if (D + a)ⁿ e ≥ 0 on [0, τ], then
+//!
+//! ```text
+//! e(τ) ≥ e^{−aτ} P(τ),  P(τ) = Σ_{k<n} c_k τᵏ,
+//! c_k = (1/k!) Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0),                               (L)
+//! ```
+//!
+//! with equality if the constraint is active throughout.
+//!
+//! # References
+//!
+//! The paper, theorem 1, for n = 2; the general order is this project's.
+
+use crate::MAX_RELATIVE_DEGREE;
+
+/// One number per derivative order below n, `[e]`/s^k; zeros from n on.
+pub type Stack = [f64; MAX_RELATIVE_DEGREE];
+
+/// The binomial coefficient C(n, k), exact for the small n used here.
+pub fn binomial(n: usize, k: usize) -> f64 {
+    (0..k.min(n - k)).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64)
+}
+
+/// k! as a float.
+pub fn factorial(k: usize) -> f64 {
+    (1..=k).map(|i| i as f64).product()
+}
+
+/// The part of (D + a)ⁿ e below the highest derivative: Σ_{j<n} C(n, j) a^{n−j} e⁽ʲ⁾, where
+/// `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾ and its length is n.
+pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
+    let n = e.len();
+    e.iter().enumerate().fold(0.0, |sum, (j, &ej)| (sum + binomial(n, j) * ej) * rate)
+}
+
+/// The coefficients c_0 … c_{n−1} of P in (L); `e` holds e⁽⁰⁾(0) … e⁽ⁿ⁻¹⁾(0).
+pub fn coefficients(rate: f64, e: &[f64]) -> Stack {
+    let mut c = [0.0; MAX_RELATIVE_DEGREE];
+    for k in 0..e.len() {
+        let sum = (0..=k).fold(0.0, |sum, j| sum * rate + binomial(k, j) * e[j]);
+        c[k] = sum / factorial(k);
+    }
+    c
+}
+
+/// The lower bound e^{−aτ} P(τ) of (L) at `elapsed` = τ ≥ 0.
+pub fn lower_bound(rate: f64, e: &[f64], elapsed: f64) -> f64 {
+    let c = coefficients(rate, e);
+    let p = c[..e.len()].iter().rev().fold(0.0, |sum, &ck| sum * elapsed + ck);
+    (-rate * elapsed).exp() * p
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binomials_and_operator() {
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|k| binomial(5, k)), [1.0, 5.0, 10.0, 10.0, 5.0, 1.0]);
+        // (D + 2)³ e without its highest term: 3·2 e⁽²⁾ + 3·4 e⁽¹⁾ + 8 e at (1, 10, 100).
+        assert_eq!(lower_terms(2.0, &[1.0, 10.0, 100.0]), 600.0 + 120.0 + 8.0);
+    }
+
+    #[test]
+    fn bound_is_the_solution_of_the_active_constraint() {
+        // e = (1 + 2τ − τ²) e^{−aτ} satisfies (D + a)³ e = 0, so (L) is an equality.
+        let a = 0.7;
+        let e = [1.0, 2.0 - a, -2.0 - 4.0 * a + a * a];
+        let c = coefficients(a, &e);
+        for (found, wanted) in c.iter().zip([1.0, 2.0, -1.0]) {
+            assert!((found - wanted).abs() < 1e-15, "{c:?}");
+        }
+        let tau: f64 = 1.7;
+        let exact = (1.0 + 2.0 * tau - tau * tau) * (-a * tau).exp();
+        assert!((lower_bound(a, &e, tau) - exact).abs() < 1e-15);
+    }
+}

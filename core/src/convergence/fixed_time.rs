@@ -1,0 +1,208 @@
+//! One barrier's promise over time: anchor, approach, arrival, stay.
+
+use super::comparison::{Stack, lower_bound, lower_terms};
+use super::hermite::HermiteProfile;
+use super::{repeated_root, stay};
+use crate::MAX_RELATIVE_DEGREE;
+use crate::error::{Error, ErrorKind, non_negative, positive};
+
+/// How the deadline is met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root`]. Relative degree 2.
+    RepeatedRoot,
+    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`] r and the configured rate.
+    #[default]
+    ReferenceProfile,
+}
+
+/// Settings of one barrier's promise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedTimeSettings {
+    /// T in s from the anchor, finite, > 0.
+    pub deadline: f64,
+    /// How the deadline is met. Default: [`Method::ReferenceProfile`].
+    pub method: Method,
+    /// a in 1/s, finite, > 0: how fast an error against the profile decays.
+    pub rate: f64,
+    /// a of the stay constraint in 1/s, finite, > 0.
+    pub stay_rate: f64,
+    /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside.
+    pub margin: f64,
+}
+
+impl FixedTimeSettings {
+    /// The product of rate and deadline that [`Self::within`] chooses.
+    pub const DEFAULT_RATE_TIMES_DEADLINE: f64 = 20.0;
+
+    /// The defaults for a deadline of `deadline` seconds: reference profile, both rates
+    /// 20/T, no margin.
+    pub fn within(deadline: f64) -> Self {
+        let rate = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
+        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0 }
+    }
+
+    fn validated(self, n: usize) -> Result<Self, Error> {
+        if n == 0 || n > MAX_RELATIVE_DEGREE {
+            let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
+            return Err(Error::new(ErrorKind::RelativeDegree, "relative_degree", message));
+        }
+        if self.method == Method::RepeatedRoot && n != 2 {
+            let message = format!(
+                "the repeated root is implemented for relative degree 2, this barrier has {n}; use the reference profile"
+            );
+            return Err(Error::new(ErrorKind::Unsupported, "method", message));
+        }
+        positive("deadline", self.deadline)?;
+        positive("rate", self.rate)?;
+        positive("stay_rate", self.stay_rate)?;
+        non_negative("margin", self.margin)?;
+        Ok(self)
+    }
+}
+
+/// Where a barrier stands with its promise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Phase {
+    /// Not anchored yet: no valid sample has been seen.
+    #[default]
+    Waiting = 0,
+    /// On the way, before the deadline.
+    Approach = 1,
+    /// The deadline passed outside the safe set; the approach goes on.
+    Late = 2,
+    /// Inside, under the stay constraint.
+    Stay = 3,
+    /// Outside again after having been inside; the stay constraint pulls back, without a deadline.
+    Left = 4,
+}
+
+/// What is remembered between samples: plain data, all that a snapshot needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FixedTimeState {
+    /// Where the barrier stands.
+    pub phase: Phase,
+    /// Time of the anchor, t₀ in s.
+    pub anchor_time: f64,
+    /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
+    pub anchor: Stack,
+    /// The rate of the approach in 1/s, chosen at the anchor.
+    pub rate: f64,
+    /// Time in s of the first sample with h ≥ 0 since the anchor.
+    pub arrival: Option<f64>,
+    /// Whether the conditions of the theorem behind the present phase have held since it began.
+    pub guaranteed: bool,
+}
+
+/// What the constraint asks for at one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demand {
+    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ.
+    pub floor: f64,
+    /// The lower bound on h that the constraint promises now, `[h]`.
+    pub profile: f64,
+    /// Time to the deadline in s, 0 from the deadline on.
+    pub time_left: f64,
+}
+
+/// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedTime {
+    n: usize,
+    settings: FixedTimeSettings,
+}
+
+impl FixedTime {
+    /// A promise for relative degree `n`.
+    ///
+    /// # Errors
+    ///
+    /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
+    /// repeated root with n ≠ 2.
+    pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
+        Ok(Self { n, settings: settings.validated(n)? })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &FixedTimeSettings {
+        &self.settings
+    }
+
+    /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
+    /// returns what the constraint asks for there.
+    ///
+    /// The first call anchors. Arrival is the first sample with h ≥ 0; the stay constraint takes over
+    /// at the first sample at which h ≥ μ *and* it is invariant from there ([`stay::is_invariant`]).
+    pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+        let FixedTimeSettings { deadline, stay_rate, margin, .. } = self.settings;
+        let mut e = [0.0; MAX_RELATIVE_DEGREE];
+        e[..self.n].copy_from_slice(&h[..self.n]);
+        e[0] -= margin;
+        let e = &e[..self.n];
+
+        if state.phase == Phase::Waiting {
+            *state = self.anchored(t, e);
+        }
+        let elapsed = (t - state.anchor_time).max(0.0);
+        if h[0] >= 0.0 && state.arrival.is_none() {
+            state.arrival = Some(t);
+        }
+        match state.phase {
+            Phase::Stay if h[0] >= 0.0 => {}
+            _ if stay::is_invariant(stay_rate, e) => {
+                state.phase = Phase::Stay;
+                state.guaranteed = true;
+            }
+            Phase::Stay | Phase::Left => {
+                state.phase = Phase::Left;
+                state.guaranteed = false;
+            }
+            _ if elapsed >= deadline && h[0] < 0.0 => {
+                state.phase = Phase::Late;
+                state.guaranteed = false;
+            }
+            _ => {}
+        }
+
+        let (floor, profile) = match state.phase {
+            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, e), 0.0),
+            _ => self.approach(state, elapsed, e),
+        };
+        Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
+    }
+
+    /// The state at the anchor: the approach with its rate.
+    fn anchored(&self, t: f64, e: &[f64]) -> FixedTimeState {
+        let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
+        anchor[..self.n].copy_from_slice(e);
+        let rate = match self.settings.method {
+            Method::ReferenceProfile => Some(self.settings.rate),
+            Method::RepeatedRoot => repeated_root::rate([e[0], e[1]], self.settings.deadline),
+        };
+        FixedTimeState {
+            phase: Phase::Approach,
+            anchor_time: t,
+            anchor,
+            rate: rate.unwrap_or(self.settings.stay_rate),
+            arrival: None,
+            guaranteed: rate.is_some(),
+        }
+    }
+
+    /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
+    fn approach(&self, state: &FixedTimeState, elapsed: f64, e: &[f64]) -> (f64, f64) {
+        let anchor = &state.anchor[..self.n];
+        match self.settings.method {
+            Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
+            Method::ReferenceProfile => {
+                let r = HermiteProfile::new(anchor, self.settings.deadline).evaluate(elapsed);
+                let mut error = [0.0; MAX_RELATIVE_DEGREE];
+                for k in 0..self.n {
+                    error[k] = e[k] - r[k];
+                }
+                (r[self.n] - lower_terms(state.rate, &error[..self.n]), r[0])
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The reference profile: a polynomial that leaves the anchor with the given derivatives and lands
+//! flat on zero at the deadline.
+//!
+//! With s = τ/T and y_j = e⁽ʲ⁾(0) Tʲ/j!, the two-point Hermite interpolant of degree 2n − 1 is
+//!
+//! ```text
+//! r(τ) = (1 − s)ⁿ q(s),  q(s) = Σ_{k<n} q_k sᵏ,
+//! q_k = Σ_{j≤k} y_j C(n − 1 + k − j, k − j)      for τ < T,   r = 0 from T on.      (H)
+//! ```
+//!
+//! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n, and r minimises ∫ (r⁽ⁿ⁾)². Enforcing
+//! (D + a)ⁿ (e − r) ≥ 0 with any a > 0 starts from a zero error, so by the comparison lemma e ≥ r for
+//! ever: e(T) ≥ 0 and e ≥ 0 after it, for every n, every T > 0 and all initial data, with no root to find.
+//! The factored form keeps its relative accuracy near s = 1, where the monomial form cancels.
+
+use super::comparison::{Stack, binomial, factorial};
+use crate::MAX_RELATIVE_DEGREE;
+
+/// The profile (H) for one anchor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HermiteProfile {
+    n: usize,
+    deadline: f64,
+    q: Stack,
+}
+
+impl HermiteProfile {
+    /// The profile from the derivatives `e` (length n, 1 to [`MAX_RELATIVE_DEGREE`], `[e]`/s^j) to zero
+    /// at `deadline` > 0 seconds.
+    pub fn new(e: &[f64], deadline: f64) -> Self {
+        let n = e.len();
+        let mut q = [0.0; MAX_RELATIVE_DEGREE];
+        for (k, qk) in q[..n].iter_mut().enumerate() {
+            *qk = (0..=k)
+                .map(|j| e[j] * deadline.powi(j as i32) / factorial(j) * binomial(n - 1 + k - j, k - j))
+                .sum();
+        }
+        Self { n, deadline, q }
+    }
+
+    /// r and its first n derivatives at `elapsed` = τ ≥ 0, `[e]`/s^k; entries above n are 0.
+    pub fn evaluate(&self, elapsed: f64) -> [f64; MAX_RELATIVE_DEGREE + 1] {
+        let n = self.n;
+        let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
+        if elapsed >= self.deadline {
+            return r;
+        }
+        let s = elapsed / self.deadline;
+        // Derivatives with respect to s of the two factors, then Leibniz' rule.
+        let mut ends = [0.0; MAX_RELATIVE_DEGREE + 1];
+        let mut q = [0.0; MAX_RELATIVE_DEGREE + 1];
+        for k in 0..=n {
+            let falling = factorial(n) / factorial(n - k);
+            ends[k] = if k % 2 == 0 { falling } else { -falling } * (1.0 - s).powi((n - k) as i32);
+            q[k] = (k..n).rev().fold(0.0, |sum, i| sum * s + self.q[i] * factorial(i) / factorial(i - k));
+        }
+        for (k, rk) in r[..=n].iter_mut().enumerate() {
+            let sum: f64 = (0..=k).map(|i| binomial(k, i) * ends[i] * q[k - i]).sum();
+            *rk = sum / self.deadline.powi(k as i32);
+        }
+        r
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degree_two_is_the_known_cubic() {
+        // r = h₀ (1 − 3s² + 2s³) + h₁ T (s − 2s² + s³) for h₀ = −5, h₁ = 3, T = 2.
+        let (h0, h1, t) = (-5.0, 3.0, 2.0);
+        let profile = HermiteProfile::new(&[h0, h1], t);
+        for tau in [0.0, 0.3, 1.1, 1.9999] {
+            let s: f64 = tau / t;
+            let exact = [
+                h0 * (1.0 - 3.0 * s.powi(2) + 2.0 * s.powi(3)) + h1 * t * (s - 2.0 * s.powi(2) + s.powi(3)),
+                (h0 * (-6.0 * s + 6.0 * s.powi(2)) + h1 * t * (1.0 - 4.0 * s + 3.0 * s.powi(2))) / t,
+                (h0 * (-6.0 + 12.0 * s) + h1 * t * (-4.0 + 6.0 * s)) / (t * t),
+            ];
+            let found = profile.evaluate(tau);
+            for k in 0..3 {
+                // A dozen operations on numbers of order 10.
+                assert!(
+                    (found[k] - exact[k]).abs() < 1e-13,
+                    "tau {tau}, order {k}: {} {}",
+                    found[k],
+                    exact[k]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn meets_both_ends_for_every_order() {
+        let data = [-7.0, 2.0, -1.5, 0.4, 3.0, -2.0, 0.1, 5.0];
+        for n in 1..=MAX_RELATIVE_DEGREE {
+            let t = 1.7;
+            let profile = HermiteProfile::new(&data[..n], t);
+            let start = profile.evaluate(0.0);
+            // The derivative of order k at the end is O((1 − s)^{n−k}) times a factor below 1e6.
+            let end = profile.evaluate(t * (1.0 - 1e-9));
+            // Every derivative is a sum of terms up to the size of the largest one.
+            let size = start.iter().fold(1.0, |m: f64, r| m.max(r.abs()));
+            for k in 0..n {
+                assert!((start[k] - data[k]).abs() < 1e-15 * size, "n {n} k {k}: {start:?}");
+                assert!(end[k].abs() < 1e-2, "n {n} k {k}: {end:?}");
+            }
+            assert_eq!(profile.evaluate(t), [0.0; MAX_RELATIVE_DEGREE + 1]);
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! The fixed-time constraint: from the derivatives of h at an anchor to a floor under h⁽ⁿ⁾.
+//!
+//! Nothing here knows a model. [`FixedTime`] receives h and its first n − 1 derivatives as plain
+//! numbers and answers with the least h⁽ⁿ⁾ that keeps the promise; the filter turns that into a row
+//! on u. The mathematics is one lemma ([`comparison`]) with a choice of error e and rate a:
+//!
+//! | method | e | a | promise | when |
+//! |---|---|---|---|---|
+//! | [`repeated_root`], the paper's | h − μ | root of (R), negative from rest | h ≥ μ at T | an admissible root exists |
+//! | [`hermite`], the default | h − μ − r | any a > 0 | h ≥ μ from T on | always |
+//! | [`stay`] | h − μ | any a > 0 | h ≥ μ for ever | all c_k(a) ≥ 0 |
+//!
+//! The promises hold for the continuous-time constraint. An input that is held between samples
+//! breaks the constraint by up to its change over one period, which the margin μ has to absorb.
+
+pub mod comparison;
+mod fixed_time;
+pub mod hermite;
+pub mod repeated_root;
+pub mod stay;
+
+pub use fixed_time::{Demand, FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase};

@@ -1,0 +1,113 @@
+//! Control-affine dynamics `ẋ = f(x) + g(x) u`, written once and generic over the scalar.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::error::{Error, length};
+use crate::scalar::Scalar;
+
+/// A plant `ẋ = f(x) + g(x) u` with `NX` states and `NU` inputs.
+///
+/// ```
+/// use nalgebra::{SMatrix, SVector, matrix, vector};
+/// use punctual_core::dynamics::ControlAffine;
+/// use punctual_core::nalgebra;
+/// use punctual_core::scalar::Scalar;
+///
+/// /// A cart with quadratic drag: x = (position in m, velocity in m/s), u = acceleration in m/s².
+/// struct Cart {
+///     drag: f64, // 1/m
+/// }
+///
+/// impl ControlAffine<2, 1> for Cart {
+///     fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+///         vector![x[1], -x[1].squared() * self.drag]
+///     }
+///     fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+///         matrix![S::zero(); S::one()]
+///     }
+/// }
+/// ```
+///
+/// # Requirements
+///
+/// f and g are smooth where the filter is used; derivatives up to the relative degree are taken by
+/// running these functions on Taylor series.
+pub trait ControlAffine<const NX: usize, const NU: usize> {
+    /// f(x): the rate of change of the state at u = 0, per second.
+    fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX>;
+
+    /// g(x): how each input changes the rate of the state.
+    fn input_map<S: Scalar>(&self, x: &SVector<S, NX>) -> SMatrix<S, NX, NU>;
+
+    /// f(x) + g(x) u.
+    fn derivative<S: Scalar>(&self, x: &SVector<S, NX>, u: &SVector<S, NU>) -> SVector<S, NX> {
+        let mut dx = self.drift(x);
+        let g = self.input_map(x);
+        for j in 0..NU {
+            for i in 0..NX {
+                dx[i] += g[(i, j)] * u[j];
+            }
+        }
+        dx
+    }
+}
+
+/// A plant chosen at run time: [`ControlAffine`] behind slices, in plain numbers.
+pub trait DynPlant: Send + Sync {
+    /// Number of states.
+    fn state_dim(&self) -> usize;
+
+    /// Number of inputs.
+    fn input_dim(&self) -> usize;
+
+    /// Advances `x` by `dt` seconds under the held input `u`, in one step of the classical
+    /// Runge-Kutta method.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error>;
+}
+
+/// A [`ControlAffine`] plant as a [`DynPlant`].
+#[derive(Clone, Debug)]
+pub struct Erased<P, const NX: usize, const NU: usize>(pub P);
+
+impl<P, const NX: usize, const NU: usize> DynPlant for Erased<P, NX, NU>
+where
+    P: ControlAffine<NX, NU> + Send + Sync,
+{
+    fn state_dim(&self) -> usize {
+        NX
+    }
+
+    fn input_dim(&self) -> usize {
+        NU
+    }
+
+    fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error> {
+        length("x", x.len(), NX)?;
+        length("u", u.len(), NU)?;
+        let next = rk4_step(&self.0, &SVector::from_column_slice(x), &SVector::from_column_slice(u), dt);
+        x.copy_from_slice(next.as_slice());
+        Ok(())
+    }
+}
+
+/// The state `dt` seconds after `x` under the held input `u`, by one step of the classical
+/// fourth-order Runge-Kutta method.
+pub fn rk4_step<P, const NX: usize, const NU: usize>(
+    plant: &P,
+    x: &SVector<f64, NX>,
+    u: &SVector<f64, NU>,
+    dt: f64,
+) -> SVector<f64, NX>
+where
+    P: ControlAffine<NX, NU>,
+{
+    let k1 = plant.derivative(x, u);
+    let k2 = plant.derivative(&(x + k1 * (dt / 2.0)), u);
+    let k3 = plant.derivative(&(x + k2 * (dt / 2.0)), u);
+    let k4 = plant.derivative(&(x + k3 * dt), u);
+    x + (k1 + (k2 + k3) * 2.0 + k4) * (dt / 6.0)
+}

@@ -1,0 +1,97 @@
+//! Misuse: the one error type of the crate. Numerical outcomes are statuses, not errors.
+
+use std::fmt;
+
+/// What kind of misuse an [`Error`] reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A number outside its allowed range, or not finite.
+    Range,
+    /// A slice of the wrong length.
+    Dimension,
+    /// The input enters another derivative of the barrier than the one needed, or none.
+    RelativeDegree,
+    /// A combination that is not implemented.
+    Unsupported,
+}
+
+/// Misuse of the library: which field, what was given, what is allowed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Error {
+    kind: ErrorKind,
+    field: String,
+    message: String,
+}
+
+impl Error {
+    pub(crate) fn new(kind: ErrorKind, field: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { kind, field: field.into(), message: message.into() }
+    }
+
+    /// The kind of misuse.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// The field or argument concerned, e.g. `deadline` or `u_max[1]`.
+    pub fn field(&self) -> &str {
+        &self.field
+    }
+
+    /// The value found and the range allowed, without the field's name.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// The same error, its field prefixed with `path` and a dot.
+    #[must_use]
+    pub fn within(mut self, path: &str) -> Self {
+        self.field = format!("{path}.{}", self.field);
+        self
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.field, self.message)
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// `Ok(value)` if `value` is finite and > 0.
+pub(crate) fn positive(field: &str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::new(ErrorKind::Range, field, format!("is {value}, must be finite and > 0")))
+    }
+}
+
+/// `Ok(value)` if `value` is finite and ≥ 0.
+pub(crate) fn non_negative(field: &str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(Error::new(ErrorKind::Range, field, format!("is {value}, must be finite and >= 0")))
+    }
+}
+
+/// `Ok(value)` if `value` is finite.
+pub(crate) fn finite(field: &str, value: f64) -> Result<f64, Error> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(Error::new(ErrorKind::Range, field, format!("is {value}, must be finite")))
+    }
+}
+
+/// `Ok(())` if `found` equals `wanted`.
+pub(crate) fn length(field: &str, found: usize, wanted: usize) -> Result<(), Error> {
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(Error::new(ErrorKind::Dimension, field, format!("has {found} components, must have {wanted}")))
+    }
+}

@@ -1,0 +1,139 @@
+//! Building a filter: every number is checked here, so that a step cannot fail on one.
+
+use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Workspace};
+use crate::MAX_INPUTS;
+use crate::barrier::Barrier;
+use crate::convergence::{FixedTime, FixedTimeState};
+use crate::dynamics::ControlAffine;
+use crate::error::{Error, ErrorKind, length, positive};
+use crate::lie::{self, DerivativeSource, Derivatives};
+use crate::qp::{Bounds, Row};
+
+/// Collects barriers and bounds for a [`SafetyFilter`].
+pub struct FilterBuilder {
+    state_dim: usize,
+    input_dim: usize,
+    channels: Vec<Channel>,
+    bounds: Bounds,
+    correction_limit: f64,
+}
+
+impl FilterBuilder {
+    /// ‖u − u_ref‖ that a single sample may need before its row counts as degenerate, in units of u.
+    pub const DEFAULT_CORRECTION_LIMIT: f64 = 1e6;
+
+    pub(super) fn new(state_dim: usize, input_dim: usize) -> Self {
+        Self {
+            state_dim,
+            input_dim,
+            channels: Vec::new(),
+            bounds: Bounds::NONE,
+            correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
+        }
+    }
+
+    /// Adds a barrier of relative degree 2 along `plant`; `name` is for messages and reports.
+    ///
+    /// # Errors
+    ///
+    /// A plant whose dimensions are not the filter's; settings outside their ranges.
+    pub fn barrier<P, B, const NX: usize, const NU: usize>(
+        self,
+        name: &str,
+        plant: P,
+        barrier: B,
+        settings: BarrierSettings,
+    ) -> Result<Self, Error>
+    where
+        P: ControlAffine<NX, NU> + Send + 'static,
+        B: Barrier<NX> + Send + 'static,
+    {
+        self.source(name, lie::along(plant, barrier, 2)?, settings)
+    }
+
+    /// Adds a barrier of any relative degree, from whatever supplies its derivatives (such as
+    /// [`lie::along`]).
+    ///
+    /// # Errors
+    ///
+    /// Dimensions that are not the filter's; settings outside their ranges.
+    pub fn source(
+        mut self,
+        name: &str,
+        source: Box<dyn DerivativeSource>,
+        settings: BarrierSettings,
+    ) -> Result<Self, Error> {
+        length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
+        length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
+        let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
+        self.channels.push(Channel { name: name.to_owned(), source, promise });
+        Ok(self)
+    }
+
+    /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity where there is none.
+    /// Default: none.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length, not-a-number, a lower bound above its upper bound, a lower bound
+    /// of +infinity or an upper bound of −infinity.
+    pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
+        length("u_min", min.len(), self.input_dim)?;
+        length("u_max", max.len(), self.input_dim)?;
+        for (i, (&low, &high)) in min.iter().zip(max).enumerate() {
+            let range = |field: &str, message: String| {
+                Err(Error::new(ErrorKind::Range, format!("{field}[{}]", i + 1), message))
+            };
+            if low.is_nan() || low == f64::INFINITY {
+                return range("u_min", format!("is {low}, must be a number or -infinity"));
+            }
+            if high.is_nan() || high == f64::NEG_INFINITY {
+                return range("u_max", format!("is {high}, must be a number or +infinity"));
+            }
+            if low > high {
+                return range("u_min", format!("is {low}, must be <= u_max[{}] = {high}", i + 1));
+            }
+            self.bounds.min[i] = low;
+            self.bounds.max[i] = high;
+        }
+        Ok(self)
+    }
+
+    /// The ‖u − u_ref‖ beyond which a row counts as degenerate; finite, > 0, in units of u. Default:
+    /// [`Self::DEFAULT_CORRECTION_LIMIT`].
+    ///
+    /// # Errors
+    ///
+    /// A limit that is not finite or ≤ 0.
+    pub fn correction_limit(mut self, limit: f64) -> Result<Self, Error> {
+        self.correction_limit = positive("correction_limit", limit)?;
+        Ok(self)
+    }
+
+    /// The filter, not yet anchored.
+    ///
+    /// # Errors
+    ///
+    /// No barrier; no state or input, or more than [`MAX_INPUTS`] inputs.
+    pub fn build(self) -> Result<SafetyFilter, Error> {
+        let Self { state_dim, input_dim, channels, bounds, correction_limit } = self;
+        let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
+        if channels.is_empty() {
+            return dimension("barriers", "is empty, must have at least 1".to_owned());
+        }
+        if state_dim == 0 {
+            return dimension("x", "has 0 components, must have at least 1".to_owned());
+        }
+        if input_dim == 0 || input_dim > MAX_INPUTS {
+            return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
+        }
+        let state = FilterState { barriers: vec![FixedTimeState::default(); channels.len()] };
+        let workspace = Workspace {
+            derivatives: Derivatives::ZERO,
+            rows: vec![Row::ZERO; channels.len()],
+            next: state.clone(),
+            report: Report::new(channels.len()),
+        };
+        Ok(SafetyFilter { state_dim, input_dim, channels, bounds, correction_limit, state, workspace })
+    }
+}

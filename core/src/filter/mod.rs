@@ -1,0 +1,234 @@
+//! The safety filter: from time, state and reference input to a safe input and a report.
+//!
+//! [`SafetyFilter::step`] reads in the order of the mathematics: evaluate the derivatives of every
+//! barrier, move its phase, build its row, solve the quadratic programme, report. What is remembered
+//! between samples is [`FilterState`], plain data; everything else can be rebuilt without changing a
+//! bit of the result.
+
+mod builder;
+mod report;
+
+pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase};
+pub use builder::FilterBuilder;
+pub use report::{BarrierReport, Report, Status};
+
+use crate::convergence::{FixedTime, FixedTimeState};
+use crate::error::{Error, length};
+use crate::lie::{DerivativeSource, Derivatives};
+use crate::qp::{self, Bounds, Outcome, Row};
+
+/// What a filter remembers between samples: one promise per barrier.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FilterState {
+    /// In the order of the barriers.
+    pub barriers: Vec<FixedTimeState>,
+}
+
+/// One barrier of a filter.
+struct Channel {
+    name: String,
+    source: Box<dyn DerivativeSource>,
+    promise: FixedTime,
+}
+
+/// Scratch memory of a step; carries nothing from one step to the next.
+struct Workspace {
+    derivatives: Derivatives,
+    rows: Vec<Row>,
+    next: FilterState,
+    report: Report,
+}
+
+/// Turns barriers with deadlines into a filter on the input: `min ½‖u − u_ref‖²` under one row per
+/// barrier and the input bounds.
+///
+/// # Requirements
+///
+/// The plant is control-affine and every barrier has the relative degree it was declared with;
+/// inputs are held between samples, and the margin covers what that costs. A barrier's guarantee
+/// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::guaranteed`] says whether
+/// its theorem's conditions have held so far.
+///
+/// # References
+///
+/// The paper, section III; the module [`crate::convergence`].
+pub struct SafetyFilter {
+    state_dim: usize,
+    input_dim: usize,
+    channels: Vec<Channel>,
+    bounds: Bounds,
+    correction_limit: f64,
+    state: FilterState,
+    workspace: Workspace,
+}
+
+impl SafetyFilter {
+    /// Starts a filter for a plant with `state_dim` states and `input_dim` inputs.
+    pub fn builder(state_dim: usize, input_dim: usize) -> FilterBuilder {
+        FilterBuilder::new(state_dim, input_dim)
+    }
+
+    /// Computes the safe input at time `t` and remembers the sample. The first call with valid inputs
+    /// anchors every barrier: its deadline counts from that `t`.
+    ///
+    /// - `t`: time in s; later calls pass later times (an earlier one counts as the anchor's).
+    /// - `x`: the state, in the plant's order and units.
+    /// - `u_ref`: the input wanted by whoever is in control.
+    /// - `u`: receives the safe input: always finite and within the bounds.
+    ///
+    /// Does not allocate with one barrier. Numerical outcomes (infeasible, degenerate, not-a-number
+    /// inputs) are the report's [`Status`], never an error.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// let mut filter = SafetyFilter::builder(4, 2)
+    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .build()?;
+    /// let mut u = [0.0; 2];
+    /// let error = filter.step(0.0, &[0.0; 3], &[0.0; 2], &mut u).unwrap_err();
+    /// assert_eq!(error.to_string(), "x: has 3 components, must have 4");
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
+        self.sample(t, x, u_ref, u)?;
+        self.state.clone_from(&self.workspace.next);
+        Ok(&self.workspace.report)
+    }
+
+    /// What [`Self::step`] would return, without remembering the sample.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::step`].
+    pub fn peek(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
+        self.sample(t, x, u_ref, u)?;
+        Ok(&self.workspace.report)
+    }
+
+    fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
+        length("x", x.len(), self.state_dim)?;
+        length("u_ref", u_ref.len(), self.input_dim)?;
+        length("u", u.len(), self.input_dim)?;
+        let Workspace { derivatives, rows, next, report } = &mut self.workspace;
+        next.clone_from(&self.state);
+        report.reset(t);
+        if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
+            report.status = Status::InvalidInput;
+            for (b, promise) in report.barriers.iter_mut().zip(&next.barriers) {
+                b.remember(promise);
+            }
+            safe_input(&self.bounds, u);
+            return Ok(());
+        }
+
+        for (i, channel) in self.channels.iter().enumerate() {
+            // Evaluate: h and its derivatives along the plant.
+            channel.source.evaluate(t, x, derivatives);
+            let n = channel.source.relative_degree();
+            let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+            report_b.h = derivatives.drift[0];
+            let problem = defect(derivatives);
+            if let Some(status) = problem {
+                report.status = status;
+                report_b.remember(promise);
+                continue;
+            }
+            // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
+            let demand = channel.promise.advance(promise, t, &derivatives.drift[..n]);
+            // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
+            rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
+            report_b.row = rows[i];
+            report_b.profile = demand.profile;
+            report_b.time_left = demand.time_left;
+            report_b.remember(promise);
+            if !rows[i].floor.is_finite() {
+                report.status = Status::Singular;
+            }
+        }
+        if report.status != Status::Unchanged {
+            safe_input(&self.bounds, u);
+            next.clone_from(&self.state);
+            return Ok(());
+        }
+
+        // Solve, and report what came of it.
+        let solution = qp::solve(rows, &self.bounds, u_ref, self.correction_limit, u);
+        report.solver = solution.solver;
+        report.iterations = solution.iterations;
+        report.status = match solution.outcome {
+            Outcome::Optimal if u == u_ref => Status::Unchanged,
+            Outcome::Optimal => Status::Filtered,
+            Outcome::Infeasible => Status::Infeasible,
+            Outcome::Degenerate => Status::Degenerate,
+            Outcome::Failed => Status::SolverFailed,
+        };
+        for (i, row) in rows.iter().enumerate() {
+            let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+            report_b.slack = row.slack(u);
+            if !report.status.is_satisfied() && !row.holds(u) {
+                promise.guaranteed = false;
+                report_b.guaranteed = false;
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets the anchors: the next sample with valid inputs starts every deadline anew.
+    pub fn rearm(&mut self) {
+        self.state.barriers.fill(FixedTimeState::default());
+    }
+
+    /// What the filter remembers.
+    pub fn state(&self) -> &FilterState {
+        &self.state
+    }
+
+    /// Puts back what [`Self::state`] returned: the filter goes on exactly as it would have then.
+    ///
+    /// # Errors
+    ///
+    /// A state with another number of barriers.
+    pub fn restore(&mut self, state: &FilterState) -> Result<(), Error> {
+        length("barriers", state.barriers.len(), self.channels.len())?;
+        self.state.clone_from(state);
+        Ok(())
+    }
+
+    /// The report of the last [`Self::step`] or [`Self::peek`].
+    pub fn report(&self) -> &Report {
+        &self.workspace.report
+    }
+
+    /// The names of the barriers, in the order of the report.
+    pub fn barrier_names(&self) -> impl Iterator<Item = &str> {
+        self.channels.iter().map(|c| c.name.as_str())
+    }
+
+    /// The relative degree of each barrier, in the order of the report.
+    pub fn relative_degrees(&self) -> impl Iterator<Item = usize> + '_ {
+        self.channels.iter().map(|c| c.source.relative_degree())
+    }
+}
+
+/// An input that is finite and within bounds when nothing is known: the admissible point nearest 0.
+fn safe_input(bounds: &Bounds, u: &mut [f64]) {
+    for (i, ui) in u.iter_mut().enumerate() {
+        *ui = bounds.clamp(i, 0.0);
+    }
+}
+
+/// Why derivatives cannot carry a constraint, if they cannot.
+fn defect(derivatives: &Derivatives) -> Option<Status> {
+    /// An input that enters below the declared degree by more than this part of the row (or of 1)
+    /// is real; round-off of cancelling terms stays far below.
+    const ROUND_OFF: f64 = 1e-9;
+    if !derivatives.is_finite() {
+        return Some(Status::Singular);
+    }
+    let size = derivatives.row.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
+    (derivatives.lower_sensitivity > ROUND_OFF * size).then_some(Status::WrongRelativeDegree)
+}

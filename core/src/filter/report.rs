@@ -1,0 +1,130 @@
+//! What a step says about itself.
+
+use crate::convergence::{FixedTimeState, Phase};
+use crate::qp::{Row, Solver};
+
+/// How a step ended, and so what the returned input means. The numbers are stable: they leave the
+/// library as the FMU's `status`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Status {
+    /// u_ref satisfies every constraint; the input is u_ref, bit for bit.
+    #[default]
+    Unchanged = 0,
+    /// The input is the point nearest to u_ref that satisfies every constraint.
+    Filtered = 1,
+    /// The constraints cannot be met within the input bounds: the bounded input of least violation.
+    Infeasible = 2,
+    /// A constraint's row is so small that no reasonable input meets it (the barrier cannot be
+    /// influenced at this instant): the bounded input of least violation, or u_ref without bounds.
+    Degenerate = 3,
+    /// Time, state or reference input is not a number or infinite: the admissible input nearest 0.
+    /// Nothing is remembered.
+    InvalidInput = 4,
+    /// The model's derivatives are not finite at this state: the admissible input nearest 0.
+    Singular = 5,
+    /// An input enters a derivative of the barrier below its declared relative degree, so that the
+    /// constraint would be wrong: the admissible input nearest 0.
+    WrongRelativeDegree = 6,
+    /// The solver for several rows did not converge: u_ref within its bounds.
+    SolverFailed = 7,
+}
+
+impl Status {
+    /// Every status, in the order of its number.
+    pub const ALL: [Self; 8] = [
+        Self::Unchanged,
+        Self::Filtered,
+        Self::Infeasible,
+        Self::Degenerate,
+        Self::InvalidInput,
+        Self::Singular,
+        Self::WrongRelativeDegree,
+        Self::SolverFailed,
+    ];
+
+    /// Whether the returned input satisfies every constraint.
+    pub fn is_satisfied(self) -> bool {
+        matches!(self, Self::Unchanged | Self::Filtered)
+    }
+}
+
+/// One barrier's part of a [`Report`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BarrierReport {
+    /// h now, in its own unit; not a number where the state is not.
+    pub h: f64,
+    /// Where the barrier stands with its promise.
+    pub phase: Phase,
+    /// The lower bound on h that the constraint promises at this time, in the unit of h.
+    pub profile: f64,
+    /// Time to the deadline in s, 0 from the deadline on.
+    pub time_left: f64,
+    /// Whether h ≥ 0 has been reached since the anchor.
+    pub arrived: bool,
+    /// Time in s of the first sample with h ≥ 0 since the anchor.
+    pub arrival_time: Option<f64>,
+    /// Whether the conditions of the theorem behind the present phase have held since it began.
+    pub guaranteed: bool,
+    /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ.
+    pub row: Row,
+    /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
+    pub slack: f64,
+}
+
+impl BarrierReport {
+    pub(super) const BLANK: Self = Self {
+        h: f64::NAN,
+        phase: Phase::Waiting,
+        profile: 0.0,
+        time_left: 0.0,
+        arrived: false,
+        arrival_time: None,
+        guaranteed: false,
+        row: Row::ZERO,
+        slack: 0.0,
+    };
+
+    /// Fills in what the promise remembers.
+    pub(super) fn remember(&mut self, promise: &FixedTimeState) {
+        self.phase = promise.phase;
+        self.arrival_time = promise.arrival;
+        self.arrived = promise.arrival.is_some();
+        self.guaranteed = promise.guaranteed;
+    }
+}
+
+/// What a step did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Time of the sample in s.
+    pub time: f64,
+    /// How the step ended.
+    pub status: Status,
+    /// Which method solved the quadratic programme.
+    pub solver: Solver,
+    /// Iterations of the interior-point method, else 0.
+    pub iterations: u32,
+    /// One entry per barrier, in the order they were added.
+    pub barriers: Vec<BarrierReport>,
+}
+
+impl Report {
+    pub(super) fn new(barriers: usize) -> Self {
+        Self {
+            time: f64::NAN,
+            status: Status::Unchanged,
+            solver: Solver::Unchanged,
+            iterations: 0,
+            barriers: vec![BarrierReport::BLANK; barriers],
+        }
+    }
+
+    pub(super) fn reset(&mut self, t: f64) {
+        self.time = t;
+        self.status = Status::Unchanged;
+        self.solver = Solver::Unchanged;
+        self.iterations = 0;
+        self.barriers.fill(BarrierReport::BLANK);
+    }
+}

@@ -1,0 +1,194 @@
+//! Lie derivatives of a barrier along a plant, of any order, by Taylor jets.
+//!
+//! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one
+//! after the other from `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series
+//! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. The components of u are dual numbers, value 0 and derivative 1
+//! along their own direction, so that at relative degree n
+//!
+//! ```text
+//! h⁽ᵏ⁾ = L_fᵏ h                               k = 0 … n, the value part       (1)
+//! ∂h⁽ⁿ⁾/∂u = L_g L_f^(n−1) h                  the gradient part at k = n      (2)
+//! ∂h⁽ᵏ⁾/∂u = 0                                k < n                           (3)
+//! ```
+//!
+//! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off; (3) is checked at
+//! every evaluation, since an input that enters earlier invalidates every constraint built for n.
+
+use std::array::from_fn;
+use std::marker::PhantomData;
+
+use nalgebra::SVector;
+
+use crate::barrier::Barrier;
+use crate::dynamics::ControlAffine;
+use crate::error::{Error, ErrorKind};
+use crate::jet::{Dual, Taylor};
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+
+/// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
+/// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
+#[inline]
+pub fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
+    barrier: &B,
+    t: f64,
+    x: &SVector<f64, NX>,
+) -> Taylor<Dual<NU>, K>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    let u = SVector::<Taylor<Dual<NU>, K>, NU>::from_fn(|i, _| Taylor::constant(Dual::variable(0.0, i)));
+    let mut series = SVector::<Taylor<Dual<NU>, K>, NX>::from_fn(|i, _| Taylor::from(x[i]));
+    for k in 0..K - 1 {
+        let dx = plant.derivative(&series, &u);
+        for i in 0..NX {
+            series[i].coefficients[k + 1] = dx[i].coefficients[k] * (1.0 / (k + 1) as f64);
+        }
+    }
+    barrier.value(Taylor::time(t), &series)
+}
+
+/// Derivatives of one barrier at one instant, as plain numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Derivatives {
+    /// `drift[k]` = L_f^k h for k = 0 ..= n, in `[h]`/s^k; zeros above n.
+    pub drift: [f64; MAX_RELATIVE_DEGREE + 1],
+    /// L_g L_f^(n−1) h, in `[h]`/(s^n · unit of u); zeros above the number of inputs.
+    pub row: [f64; MAX_INPUTS],
+    /// Σ |∂h⁽ᵏ⁾/∂u_i| over k < n and all inputs: 0 where the declared relative degree is right.
+    pub lower_sensitivity: f64,
+}
+
+impl Derivatives {
+    /// All zero.
+    pub const ZERO: Self =
+        Self { drift: [0.0; MAX_RELATIVE_DEGREE + 1], row: [0.0; MAX_INPUTS], lower_sensitivity: 0.0 };
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.drift.iter().chain(&self.row).all(|v| v.is_finite()) && self.lower_sensitivity.is_finite()
+    }
+}
+
+/// Anything that supplies the derivatives of one barrier: [`Along`] here, or a user's own code.
+pub trait DerivativeSource: Send {
+    /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
+    fn relative_degree(&self) -> usize;
+
+    /// Number of states.
+    fn state_dim(&self) -> usize;
+
+    /// Number of inputs.
+    fn input_dim(&self) -> usize;
+
+    /// Writes the derivatives at time `t` (s) and state `x` (of [`Self::state_dim`] components).
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives);
+}
+
+/// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken.
+struct Along<P, B, const NX: usize, const NU: usize, const K: usize> {
+    plant: P,
+    barrier: B,
+    dims: PhantomData<([(); NX], [(); NU])>,
+}
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize> DerivativeSource for Along<P, B, NX, NU, K>
+where
+    P: ControlAffine<NX, NU> + Send,
+    B: Barrier<NX> + Send,
+{
+    fn relative_degree(&self) -> usize {
+        K - 1
+    }
+
+    fn state_dim(&self) -> usize {
+        NX
+    }
+
+    fn input_dim(&self) -> usize {
+        NU
+    }
+
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
+        let x = SVector::from_column_slice(x);
+        let series: Taylor<Dual<NU>, K> = barrier_series(&self.plant, &self.barrier, t, &x);
+        *out = Derivatives::ZERO;
+        for k in 0..K {
+            let derivative = series.derivative(k);
+            out.drift[k] = derivative.value;
+            if k == K - 1 {
+                out.row[..NU].copy_from_slice(&derivative.gradient);
+            } else {
+                // A sum and not a maximum: `f64::max` would drop a NaN.
+                out.lower_sensitivity += derivative.gradient.iter().map(|d| d.abs()).sum::<f64>();
+            }
+        }
+    }
+}
+
+/// The derivatives of `barrier` along `plant` at relative degree `n`.
+///
+/// # Errors
+///
+/// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`]; `NU` above [`MAX_INPUTS`] or zero.
+pub fn along<P, B, const NX: usize, const NU: usize>(
+    plant: P,
+    barrier: B,
+    n: usize,
+) -> Result<Box<dyn DerivativeSource>, Error>
+where
+    P: ControlAffine<NX, NU> + Send + 'static,
+    B: Barrier<NX> + Send + 'static,
+{
+    if NU == 0 || NU > MAX_INPUTS {
+        return Err(Error::new(
+            ErrorKind::Dimension,
+            "u",
+            format!("has {NU} components, must have 1 to {MAX_INPUTS}"),
+        ));
+    }
+    macro_rules! by_degree {
+        ($($k:literal)*) => {
+            match n + 1 {
+                $($k => Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _),)*
+                _ => Err(Error::new(
+                    ErrorKind::RelativeDegree,
+                    "relative_degree",
+                    format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}"),
+                )),
+            }
+        };
+    }
+    by_degree!(2 3 4 5 6 7 8 9)
+}
+
+/// The relative degree found on sample states: the order of the first derivative of h that an
+/// input enters at any of them, or `None` if none does up to [`MAX_RELATIVE_DEGREE`].
+///
+/// An input counts where the derivative's gradient exceeds 1e-12 of the largest gradient of any
+/// order: far above round-off, far below a real effect. States at which the model is not finite are
+/// passed over.
+pub fn relative_degree<P, B, const NX: usize, const NU: usize>(
+    plant: &P,
+    barrier: &B,
+    t: f64,
+    samples: &[SVector<f64, NX>],
+) -> Option<usize>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    const K: usize = MAX_RELATIVE_DEGREE + 1;
+    const SIGNIFICANT: f64 = 1e-12;
+    samples
+        .iter()
+        .filter_map(|x| {
+            let series: Taylor<Dual<NU>, K> = barrier_series(plant, barrier, t, x);
+            let size: [f64; K] =
+                from_fn(|k| series.derivative(k).gradient.iter().fold(0.0, |m: f64, d| m.max(d.abs())));
+            let largest = size.iter().copied().fold(0.0, f64::max);
+            size.iter().position(|&s| s > SIGNIFICANT * largest)
+        })
+        .min()
+}

@@ -1,0 +1,122 @@
+//! The operations a model may use, so that a plant or barrier is written once and evaluated on
+//! numbers ([`f64`]), on first derivatives ([`Dual`](crate::jet::Dual)) and on Taylor series
+//! ([`Taylor`](crate::jet::Taylor)).
+
+use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+
+use num_traits::{One, Zero};
+
+/// A number that plants and barriers compute with.
+///
+/// Arithmetic mixes with `f64` on the right (`x * 2.0`); a constant on the left is
+/// `S::from(2.0) * x`. Functions follow their `f64` namesakes where those are smooth; outside the
+/// domain (`sqrt` of a negative number) and at singular points (`sqrt` at 0) a result or one of its
+/// derivatives is not finite, which the filter reports as a status.
+pub trait Scalar:
+    nalgebra::Scalar
+    + Copy
+    + Zero
+    + One
+    + From<f64>
+    + Neg<Output = Self>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<f64, Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<f64, Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+    + DivAssign
+{
+    /// The plain value, without derivatives.
+    fn value(self) -> f64;
+    /// Square root.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// e to the power of `self`.
+    #[must_use]
+    fn exp(self) -> Self;
+    /// Natural logarithm.
+    #[must_use]
+    fn ln(self) -> Self;
+    /// Sine and cosine; the angle is in radians.
+    #[must_use]
+    fn sin_cos(self) -> (Self, Self);
+    /// Arc tangent, in radians.
+    #[must_use]
+    fn atan(self) -> Self;
+    /// `self` to a real power; smooth for `self` > 0.
+    #[must_use]
+    fn powf(self, exponent: f64) -> Self;
+
+    /// Sine of an angle in radians.
+    #[must_use]
+    fn sin(self) -> Self {
+        self.sin_cos().0
+    }
+
+    /// Cosine of an angle in radians.
+    #[must_use]
+    fn cos(self) -> Self {
+        self.sin_cos().1
+    }
+
+    /// Tangent of an angle in radians.
+    #[must_use]
+    fn tan(self) -> Self {
+        let (sin, cos) = self.sin_cos();
+        sin / cos
+    }
+
+    /// `self · self`.
+    #[must_use]
+    fn squared(self) -> Self {
+        self * self
+    }
+
+    /// `self` to an integer power, by repeated multiplication: exact at 0 and for negative `self`.
+    #[must_use]
+    fn powi(self, exponent: i32) -> Self {
+        let mut result = Self::one();
+        let mut base = self;
+        let mut left = exponent.unsigned_abs();
+        while left > 0 {
+            if left & 1 == 1 {
+                result *= base;
+            }
+            left >>= 1;
+            if left > 0 {
+                base = base * base;
+            }
+        }
+        if exponent < 0 { Self::one() / result } else { result }
+    }
+}
+
+impl Scalar for f64 {
+    fn value(self) -> f64 {
+        self
+    }
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    fn ln(self) -> Self {
+        f64::ln(self)
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        f64::sin_cos(self)
+    }
+    fn atan(self) -> Self {
+        f64::atan(self)
+    }
+    fn powf(self, exponent: f64) -> Self {
+        f64::powf(self, exponent)
+    }
+}
