@@ -1,2 +1,91 @@
-//! Placeholder.
+//! FMI 2.0 co-simulation model descriptions from typed variables, and reproducible `.fmu` archives.
+//!
+//! This crate owns the file `modelDescription.xml` and the zip container around it. It knows nothing
+//! of what the slave computes, reads no file and no environment variable, parses no XML and prints nothing.
+//!
+//! A [`ModelDescription`] is plain data with public fields. [`ModelDescription::to_xml`] checks it
+//! against the rules of FMI 2.0.x that an XML schema cannot express, then writes it. With the feature
+//! `archive` (on by default) `Archive` collects the files of an FMU and writes them so that the same
+//! entries always give the same bytes.
+//!
+//! | module | owns |
+//! |---|---|
+//! | `variable` | variables, and the table of legal causality, variability and initial |
+//! | `unit` | units in terms of SI base units |
+//! | `description` | the whole description, its types, log categories and experiment |
+//! | `names` | what a text, a C identifier and a structured name may contain |
+//! | `calendar`, `number` | valid dates; doubles that read back exactly |
+//! | `structure` | outputs, initial unknowns and their dependencies as variable indices |
+//! | `validate` | every other rule |
+//! | `xml` | the elements and their order |
+//! | `archive` | the zip file |
+//!
+//! # Example
+//!
+//! ```
+//! use punctual_modeldescription::{
+//!     Causality, CoSimulation, ModelDescription, Variability, Variable, VariableKind,
+//! };
+//!
+//! let gain = Variable {
+//!     name: "gain".into(),
+//!     value_reference: 0,
+//!     description: "Factor from input to output".into(),
+//!     causality: Causality::Parameter,
+//!     variability: Variability::Fixed,
+//!     initial: None,
+//!     kind: VariableKind::Real {
+//!         start: Some(2.0),
+//!         min: Some(0.0),
+//!         max: Some(10.0),
+//!         nominal: None,
+//!         quantity: None,
+//!         unit: None,
+//!     },
+//!     dependencies: None,
+//!     initial_dependencies: None,
+//! };
+//! let mut description = ModelDescription {
+//!     model_name: "Amplifier".into(),
+//!     guid: "{8c4e810f-3df3-4a00-8276-176fa3c9f013}".into(),
+//!     co_simulation: CoSimulation { model_identifier: "amplifier".into(), ..Default::default() },
+//!     variables: vec![gain],
+//!     ..Default::default()
+//! };
+//! assert!(description.to_xml()?.contains(r#"<Real min="0.0" max="10.0" start="2.0"/>"#));
+//!
+//! description.guid.clear();
+//! let error = description.to_xml().unwrap_err();
+//! assert_eq!(error.to_string(), r#"guid is ""; allowed: a non-empty text"#);
+//! # Ok::<(), punctual_modeldescription::Error>(())
+//! ```
+//!
+//! # References
+//!
+//! Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4: section 2.2
+//! (description schema), 2.2.7 (variables), 2.2.8 (model structure), 2.2.9 (names), 2.3 (archive),
+//! 4.3.1 (co-simulation capabilities).
 #![forbid(unsafe_code)]
+
+#[cfg(feature = "archive")]
+mod archive;
+mod calendar;
+mod description;
+mod error;
+mod names;
+mod number;
+mod structure;
+mod unit;
+mod validate;
+mod variable;
+mod xml;
+
+#[cfg(feature = "archive")]
+pub use archive::{Archive, Timestamp};
+pub use description::{
+    CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory, ModelDescription,
+    NamingConvention,
+};
+pub use error::Error;
+pub use unit::{BaseUnit, Unit};
+pub use variable::{BaseType, Causality, Initial, InitialRule, Variability, Variable, VariableKind};
