@@ -1,3 +1,23 @@
 //! The safety filter and the reference plants as one FMI 2.0 co-simulation library.
+//!
+//! Every FMU that Punctual makes is this library with another `resources/configuration.toml`: a
+//! filter or a plant. The layers, each using only those above it:
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`configuration`] | the TOML file and the table of numeric parameters |
+//! | [`product`] | variables, value references, model description and GUID of a configuration |
+//! | [`block`] | what is computed: a filter or a plant between value arrays |
+//! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
+//! | `abi` | the 34 exported functions: guard, convert, delegate. The only unsafe code |
 #![deny(unsafe_code)]
+
+#[cfg(not(panic = "unwind"))]
+compile_error!("the FMU guards every exported function against panics, which needs panic = \"unwind\"");
+
+#[expect(unsafe_code, reason = "the C interface")]
+mod abi;
+pub mod block;
 pub mod configuration;
+pub mod instance;
+pub mod product;

@@ -1,5 +1,129 @@
 //! Configurations: what a filter or plant FMU is made from. The only module that knows TOML.
+//!
+//! A configuration is read, completed with its defaults ("canonical": every value stated) and then
+//! travels inside the FMU as `resources/configuration.toml`. Numbers in it are also the FMU's
+//! parameters: [`Parameter`] is the one table of their names, units, ranges and meaning.
 
+mod filter;
+mod parameter;
+mod plant;
 mod read;
 
+pub use filter::{BarrierSection, FilterConfiguration, MethodName, ShapeName, UNBOUNDED};
+pub use parameter::{Parameter, Range, updated};
+pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};
 pub use read::{ConfigurationError, read_toml};
+
+use serde::{Deserialize, Serialize};
+
+/// The name of the canonical configuration inside an FMU's `resources/`.
+pub const RESOURCE: &str = "configuration.toml";
+
+/// What one FMU is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Configuration {
+    /// A safety filter.
+    Filter(FilterConfiguration),
+    /// A reference plant.
+    Plant(PlantConfiguration),
+}
+
+/// Which of the two a file describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Filter,
+    Plant,
+}
+
+impl Configuration {
+    /// Reads a configuration from TOML text, completes it with the defaults and checks it.
+    ///
+    /// # Errors
+    ///
+    /// Text that is not TOML; an unknown key; a missing key; a value of the wrong type or outside its
+    /// range: each with the field's path, the value and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, ConfigurationError> {
+        // Reading in two steps keeps the path of a field in the message, which an enum would lose.
+        #[derive(Deserialize)]
+        struct Head {
+            kind: Kind,
+        }
+        Ok(match read_toml::<Head>(text)?.kind {
+            Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed()?),
+            Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed()?),
+        })
+    }
+
+    /// The configuration as TOML with every value stated. Parsing it gives the same configuration, and
+    /// the text is the same on every machine.
+    ///
+    /// # Errors
+    ///
+    /// None in practice: the types always have a TOML form.
+    pub fn canonical(&self) -> Result<String, ConfigurationError> {
+        match self {
+            Self::Filter(c) => read::write_toml(c),
+            Self::Plant(c) => read::write_toml(c),
+        }
+    }
+
+    /// The FMU's name, a C identifier: model name, model identifier and library name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Filter(c) => &c.name,
+            Self::Plant(c) => &c.name,
+        }
+    }
+
+    /// What is meant to be run by default.
+    pub fn experiment(&self) -> &ExperimentSection {
+        match self {
+            Self::Filter(c) => &c.experiment,
+            Self::Plant(c) => &c.experiment,
+        }
+    }
+}
+
+/// `[experiment]`: the run that the FMU is meant for; importers take it as their default.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExperimentSection {
+    /// Start in s, finite. Default 0.
+    pub start_time: f64,
+    /// Stop in s, finite, > start. Default 10.
+    pub stop_time: f64,
+    /// Communication step in s, finite, > 0. Default 0.001.
+    pub step_size: f64,
+}
+
+impl Default for ExperimentSection {
+    fn default() -> Self {
+        Self { start_time: 0.0, stop_time: 10.0, step_size: 0.001 }
+    }
+}
+
+impl ExperimentSection {
+    fn check(&self) -> Result<(), ConfigurationError> {
+        Range::FINITE.check("experiment.start_time", self.start_time)?;
+        Range::FINITE.check("experiment.stop_time", self.stop_time)?;
+        Range::POSITIVE.check("experiment.step_size", self.step_size)?;
+        if self.stop_time <= self.start_time {
+            let message = format!("is {}, must be > start_time = {}", self.stop_time, self.start_time);
+            return Err(ConfigurationError::new("experiment.stop_time", message));
+        }
+        Ok(())
+    }
+}
+
+/// A name that can stand in variable names and file names: a C identifier of at most 64 characters.
+fn check_identifier(field: &str, name: &str) -> Result<(), ConfigurationError> {
+    let mut chars = name.chars();
+    let head = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
+    if head && chars.all(|c| c.is_ascii_alphanumeric() || c == '_') && name.len() <= 64 {
+        return Ok(());
+    }
+    let message =
+        format!("is {name:?}, must be letters, digits and underscores, not starting with a digit (1 to 64)");
+    Err(ConfigurationError::new(field, message))
+}

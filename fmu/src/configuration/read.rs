@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A configuration that cannot be used: which field, what was found, what is allowed.
@@ -55,4 +56,9 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, ConfigurationErro
         let path = if path == "." { String::new() } else { path };
         ConfigurationError::new(path, e.inner().to_string().trim_end().to_owned())
     })
+}
+
+/// A value as TOML text.
+pub(super) fn write_toml<T: Serialize>(value: &T) -> Result<String, ConfigurationError> {
+    toml::to_string(value).map_err(|e| ConfigurationError::new("", e.to_string()))
 }

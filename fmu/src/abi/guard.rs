@@ -1,0 +1,136 @@
+//! The one boundary between C and Rust: NULL checks, panics, slices.
+
+use std::any::Any;
+use std::ffi::{CStr, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, Once, PoisonError};
+
+use super::logger::Logger;
+use super::types::{Component, Status, StringPointer};
+use crate::instance::{Failure, Instance};
+
+/// What a component pointer points to.
+pub(super) struct Handle {
+    pub(super) instance: Instance,
+    pub(super) logger: Logger,
+    /// A panic came out of this instance: its values cannot be trusted any more.
+    pub(super) poisoned: bool,
+}
+
+/// Message and place of the last panic, kept by the hook for the log.
+static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps panics off the simulator's stderr; the guard logs them. The hook belongs to this library's
+/// own copy of the standard library.
+pub(super) fn install_panic_hook() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        std::panic::set_hook(Box::new(|info| {
+            *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = info.to_string();
+        }));
+    });
+}
+
+/// Runs `body`; a panic becomes its description.
+pub(super) fn catch<R>(body: impl FnOnce() -> R) -> Result<R, String> {
+    catch_unwind(AssertUnwindSafe(body)).map_err(|payload: Box<dyn Any + Send>| {
+        // Dropping a payload can panic in turn; forgetting it cannot.
+        std::mem::forget(payload);
+        let text = LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner).replace('\n', " ");
+        format!("internal error, please report it: {text}")
+    })
+}
+
+/// The body of an export: finds the instance, runs `body`, logs a failure under `name`.
+///
+/// # Safety
+///
+/// `component` is NULL or was returned by `fmi2Instantiate` and not freed since, and no other call
+/// for it is under way.
+pub(super) unsafe fn guarded(
+    component: Component,
+    name: &str,
+    body: impl FnOnce(&mut Handle) -> Result<Status, Failure>,
+) -> Status {
+    // SAFETY: the caller's contract; a NULL pointer gives None.
+    let Some(handle) = (unsafe { component.cast::<Handle>().as_mut() }) else { return Status::Error };
+    if handle.poisoned {
+        handle.logger.error(&format!("{name}: the instance failed before and can only be freed"));
+        return Status::Error;
+    }
+    match catch(|| body(handle)) {
+        Ok(Ok(status)) => status,
+        Ok(Err(failure)) => {
+            handle.logger.error(&format!("{name}: {failure}"));
+            Status::Error
+        }
+        Err(panic) => {
+            handle.poisoned = true;
+            handle.logger.error(&format!("{name}: {panic}"));
+            Status::Error
+        }
+    }
+}
+
+/// `len` elements at `pointer`; nothing is read where `len` is 0.
+///
+/// # Safety
+///
+/// `pointer` is NULL or points to `len` readable elements for as long as the result is used.
+///
+/// # Errors
+///
+/// NULL with `len` > 0, or a length that no array can have.
+pub(super) unsafe fn slice<'a, T>(name: &str, pointer: *const T, len: usize) -> Result<&'a [T], Failure> {
+    if len == 0 {
+        return Ok(&[]);
+    }
+    check_array(name, pointer.cast(), len, size_of::<T>())?;
+    // SAFETY: not NULL, of possible size, and the caller's contract.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, len) })
+}
+
+/// [`slice`] for writing.
+///
+/// # Safety
+///
+/// As for [`slice`], writable and not aliased.
+///
+/// # Errors
+///
+/// As for [`slice`].
+pub(super) unsafe fn slice_mut<'a, T>(
+    name: &str,
+    pointer: *mut T,
+    len: usize,
+) -> Result<&'a mut [T], Failure> {
+    if len == 0 {
+        return Ok(&mut []);
+    }
+    check_array(name, pointer.cast(), len, size_of::<T>())?;
+    // SAFETY: not NULL, of possible size, and the caller's contract.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, len) })
+}
+
+fn check_array(name: &str, pointer: *const c_void, len: usize, size: usize) -> Result<(), Failure> {
+    if pointer.is_null() {
+        return Err(format!("{name} is NULL with {len} elements"));
+    }
+    if len > isize::MAX as usize / size {
+        return Err(format!("{name} cannot have {len} elements"));
+    }
+    Ok(())
+}
+
+/// The text at `pointer`, bytes that are not UTF-8 replaced; `None` for NULL.
+///
+/// # Safety
+///
+/// `pointer` is NULL or points to a NUL-terminated string.
+pub(super) unsafe fn text(pointer: StringPointer) -> Option<String> {
+    if pointer.is_null() {
+        return None;
+    }
+    // SAFETY: not NULL, and the caller's contract.
+    Some(unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned())
+}

@@ -1,0 +1,401 @@
+//! The 34 functions of FMI 2.0 co-simulation. Each only guards, converts and delegates to
+//! [`Instance`](crate::instance::Instance).
+//!
+//! # Safety
+//!
+//! What every function expects of its caller, besides what it says itself: a component is NULL or came
+//! from `fmi2Instantiate` and was not freed; calls for one component do not overlap; an array is NULL
+//! or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong
+//! counts of zero are met with a status, never with a crash.
+
+mod guard;
+mod logger;
+mod resources;
+mod types;
+mod unsupported;
+
+use std::ffi::{CString, c_int};
+use std::ptr;
+
+use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
+use logger::Logger;
+use types::{
+    Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
+    StringPointer, TERMINATED, ValueReference,
+};
+
+use crate::instance::{Call, Instance, Mode};
+
+/// `"default"`: the types of `fmi2TypesPlatform.h`.
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetTypesPlatform() -> StringPointer {
+    c"default".as_ptr()
+}
+
+/// `"2.0"`.
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetVersion() -> StringPointer {
+    c"2.0".as_ptr()
+}
+
+/// A new instance, or NULL with a log message.
+///
+/// # Safety
+///
+/// See the module; `callbacks` is NULL or points to a structure that is read during this call only.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2Instantiate(
+    instance_name: StringPointer,
+    fmu_type: c_int,
+    guid: StringPointer,
+    resource_location: StringPointer,
+    callbacks: *const CallbackFunctions,
+    _visible: Boolean,
+    logging_on: Boolean,
+) -> Component {
+    install_panic_hook();
+    // SAFETY: the caller's contract for strings.
+    let name = unsafe { text(instance_name) };
+    // SAFETY: the caller's contract for the callbacks; a NULL pointer gives None.
+    let callbacks = unsafe { callbacks.as_ref() };
+    let c_name = CString::new(name.unwrap_or_default()).unwrap_or_default();
+    let logger = Logger::new(callbacks, c_name, logging_on != 0);
+    // SAFETY: the caller's contract for strings.
+    let guid = unsafe { text(guid) };
+    // SAFETY: the caller's contract for strings.
+    let location = unsafe { text(resource_location) };
+    let built = catch(|| {
+        if fmu_type != CO_SIMULATION {
+            return Err(format!("fmuType is {fmu_type}, must be 1 (fmi2CoSimulation)"));
+        }
+        let guid = guid.ok_or("fmuGUID is NULL")?;
+        let location = location.ok_or("fmuResourceLocation is NULL")?;
+        Instance::new(resources::configuration(&location)?, &guid)
+    });
+    match built.and_then(|result| result) {
+        Ok(instance) => {
+            logger.event("instantiated");
+            Box::into_raw(Box::new(Handle { instance, logger, poisoned: false })).cast()
+        }
+        Err(failure) => {
+            logger.error(&format!("fmi2Instantiate: {failure}"));
+            ptr::null_mut()
+        }
+    }
+}
+
+/// Frees an instance, in any mode; NULL is fine.
+///
+/// # Safety
+///
+/// See the module; the component is not used afterwards.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2FreeInstance(component: Component) {
+    if !component.is_null() {
+        // SAFETY: not NULL, so it came from `Box::into_raw` in `fmi2Instantiate`, and is freed once.
+        let handle = unsafe { Box::from_raw(component.cast::<Handle>()) };
+        // A panic while dropping must not reach the importer; what it would leave behind is leaked.
+        let _ = catch(|| drop(handle));
+    }
+}
+
+/// Switches log categories on or off; none named means all.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetDebugLogging(
+    component: Component,
+    logging_on: Boolean,
+    count: usize,
+    categories: *const StringPointer,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for arrays.
+        let pointers = unsafe { slice("categories", categories, count) }?;
+        let mut names = Vec::with_capacity(count);
+        for &pointer in pointers {
+            // SAFETY: the caller's contract for strings.
+            names.push(unsafe { text(pointer) }.ok_or("a category is NULL")?);
+        }
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        handle.logger.set_debug_logging(logging_on != 0, &names).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SetDebugLogging", body) }
+}
+
+/// Takes the start time.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetupExperiment(
+    component: Component,
+    _tolerance_defined: Boolean,
+    _tolerance: f64,
+    start_time: f64,
+    stop_time_defined: Boolean,
+    stop_time: f64,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        let stop_time = (stop_time_defined != 0).then_some(stop_time);
+        handle.instance.setup_experiment(start_time, stop_time).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SetupExperiment", body) }
+}
+
+/// Exports that take nothing but the component.
+macro_rules! plain {
+    ($($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
+        $(#[$doc])*
+        ///
+        /// # Safety
+        ///
+        /// See the module.
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(component: Component) -> Status {
+            let body: fn(&mut Handle) -> Result<(), String> = $body;
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($name), |handle| body(handle).map(|()| Status::Ok)) }
+        }
+    )*};
+}
+
+plain! {
+    /// Goes to initialization mode.
+    fmi2EnterInitializationMode => |handle| handle.instance.enter_initialization_mode();
+    /// Takes the parameters over and goes to step mode.
+    fmi2ExitInitializationMode => |handle| {
+        handle.instance.exit_initialization_mode()?;
+        handle.logger.event("initialized");
+        Ok(())
+    };
+    /// Ends the run.
+    fmi2Terminate => |handle| handle.instance.terminate();
+    /// Back to the instantiated state.
+    fmi2Reset => |handle| {
+        handle.instance.reset();
+        handle.logger.event("reset");
+        Ok(())
+    };
+}
+
+/// Exports that read or write an array of values of one type.
+macro_rules! values {
+    ($($(#[$doc:meta])* $name:ident($pointer:ty, $slice:ident) => $method:ident;)*) => {$(
+        $(#[$doc])*
+        ///
+        /// # Safety
+        ///
+        /// See the module.
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(
+            component: Component,
+            references: *const ValueReference,
+            count: usize,
+            values: $pointer,
+        ) -> Status {
+            let body = |handle: &mut Handle| {
+                // SAFETY: the caller's contract for arrays.
+                let references = unsafe { slice("vr", references, count) }?;
+                // SAFETY: the caller's contract for arrays.
+                let values = unsafe { $slice("value", values, count) }?;
+                handle.instance.$method(references, values).map(|()| Status::Ok)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($name), body) }
+        }
+    )*};
+}
+
+values! {
+    /// Reads reals.
+    fmi2GetReal(*mut f64, slice_mut) => get_real;
+    /// Reads integers and enumerations.
+    fmi2GetInteger(*mut c_int, slice_mut) => get_integer;
+    /// Reads booleans.
+    fmi2GetBoolean(*mut Boolean, slice_mut) => get_boolean;
+    /// Writes reals.
+    fmi2SetReal(*const f64, slice) => set_real;
+    /// Writes integers.
+    fmi2SetInteger(*const c_int, slice) => set_integer;
+    /// Writes booleans.
+    fmi2SetBoolean(*const Boolean, slice) => set_boolean;
+}
+
+/// Reads strings; there are none, so only zero of them can be read.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetString(
+    component: Component,
+    references: *const ValueReference,
+    count: usize,
+    _values: *mut StringPointer,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for arrays.
+        let references = unsafe { slice("vr", references, count) }?;
+        handle.instance.check_strings(Call::Get, references).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2GetString", body) }
+}
+
+/// Writes strings; there are none, so only zero of them can be written.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetString(
+    component: Component,
+    references: *const ValueReference,
+    count: usize,
+    _values: *const StringPointer,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for arrays.
+        let references = unsafe { slice("vr", references, count) }?;
+        handle.instance.check_strings(Call::Set, references).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SetString", body) }
+}
+
+/// Makes a communication step. The last argument is ignored: importers pass true while rolling back.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2DoStep(
+    component: Component,
+    current_communication_point: f64,
+    communication_step_size: f64,
+    _no_set_fmu_state_prior_to_current_point: Boolean,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        let (t, h) = (current_communication_point, communication_step_size);
+        handle.instance.do_step(t, h).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2DoStep", body) }
+}
+
+/// The end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
+///
+/// # Safety
+///
+/// See the module; `value` is NULL or writable.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: StatusKind, value: *mut f64) -> Status {
+    let body = |handle: &mut Handle| {
+        handle.instance.check(Call::GetStatus)?;
+        if kind != LAST_SUCCESSFUL_TIME {
+            return Ok(Status::Discard);
+        }
+        // SAFETY: the caller's contract for `value`.
+        let value = unsafe { slice_mut("value", value, 1) }?;
+        value[0] = handle.instance.time();
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2GetRealStatus", body) }
+}
+
+/// Whether the run has ended (`fmi2Terminated`); other kinds are discarded.
+///
+/// # Safety
+///
+/// See the module; `value` is NULL or writable.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetBooleanStatus(
+    component: Component,
+    kind: StatusKind,
+    value: *mut Boolean,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        handle.instance.check(Call::GetStatus)?;
+        if kind != TERMINATED {
+            return Ok(Status::Discard);
+        }
+        // SAFETY: the caller's contract for `value`.
+        let value = unsafe { slice_mut("value", value, 1) }?;
+        value[0] = Boolean::from(handle.instance.mode() == Mode::TERMINATED);
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2GetBooleanStatus", body) }
+}
+
+/// Nothing is asynchronous here, so there is no such status: discarded.
+macro_rules! no_status {
+    ($($name:ident($pointer:ty);)*) => {$(
+        /// A status of asynchronous steps, of which there are none: discarded.
+        ///
+        /// # Safety
+        ///
+        /// See the module.
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(component: Component, _kind: StatusKind, _value: $pointer) -> Status {
+            let body = |handle: &mut Handle| handle.instance.check(Call::GetStatus).map(|()| Status::Discard);
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($name), body) }
+        }
+    )*};
+}
+
+no_status! {
+    fmi2GetStatus(*mut c_int);
+    fmi2GetIntegerStatus(*mut c_int);
+    fmi2GetStringStatus(*mut StringPointer);
+}
+
+/// Time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    component: Component,
+    _references: *const ValueReference,
+    count: usize,
+    _orders: *const c_int,
+    _values: *mut f64,
+) -> Status {
+    // SAFETY: the caller's contract for components.
+    unsafe {
+        guarded(component, "fmi2GetRealOutputDerivatives", |_| {
+            unsupported::none("maxOutputDerivativeOrder is 0", count)
+        })
+    }
+}
+
+/// Time derivatives of inputs: `canInterpolateInputs` is false, so only zero of them can be set.
+///
+/// # Safety
+///
+/// See the module.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetRealInputDerivatives(
+    component: Component,
+    _references: *const ValueReference,
+    count: usize,
+    _orders: *const c_int,
+    _values: *const f64,
+) -> Status {
+    // SAFETY: the caller's contract for components.
+    unsafe {
+        guarded(component, "fmi2SetRealInputDerivatives", |_| {
+            unsupported::none("canInterpolateInputs is false", count)
+        })
+    }
+}

@@ -1,0 +1,75 @@
+//! From `fmuResourceLocation` to the configuration.
+
+use std::path::PathBuf;
+
+use percent_encoding::percent_decode_str;
+
+use crate::configuration::{Configuration, RESOURCE};
+
+/// Reads the configuration below `location`, a `file:` URI (one to four slashes, with or without a
+/// trailing one, percent-encoded or raw) or a plain path.
+pub(super) fn configuration(location: &str) -> Result<Configuration, String> {
+    let folder = folder(location)?;
+    let path = folder.join(RESOURCE);
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| format!("cannot read {} (fmuResourceLocation {location:?}): {e}", path.display()))?;
+    Configuration::parse(&text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn folder(location: &str) -> Result<PathBuf, String> {
+    let decode = |text: &str| {
+        percent_decode_str(text)
+            .decode_utf8()
+            .map(|text| text.into_owned())
+            .map_err(|_| format!("fmuResourceLocation {location:?} is not UTF-8 after percent-decoding"))
+    };
+    let Some(rest) = location.strip_prefix("file:") else {
+        if location.contains("://") {
+            return Err(format!("fmuResourceLocation is {location:?}, must be a file URI"));
+        }
+        return Ok(PathBuf::from(location));
+    };
+    // file:/p, file:///p and file:////p mean the same; file://localhost/p too.
+    let rest = rest.strip_prefix("//localhost/").map_or(rest, |path| path);
+    let path = rest.trim_start_matches('/');
+    // A drive letter needs no leading slash.
+    let drive = path.as_bytes().get(1) == Some(&b':');
+    let path = if drive { path.to_owned() } else { format!("/{path}") };
+    // A blank path, or a raw path that happens to contain a percent sign, is taken as it stands
+    // where the decoded one does not exist.
+    let decoded = PathBuf::from(decode(&path)?);
+    if !decoded.exists() && std::path::Path::new(&path).exists() {
+        Ok(PathBuf::from(path))
+    } else {
+        Ok(decoded)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_spelling_of_a_folder() {
+        for (location, wanted) in [
+            ("file:///tmp/a/resources", "/tmp/a/resources"),
+            ("file:///tmp/a/resources/", "/tmp/a/resources/"),
+            ("file:////tmp/a", "/tmp/a"),
+            ("file:/tmp/a", "/tmp/a"),
+            ("file://localhost/tmp/a", "/tmp/a"),
+            ("file:///tmp/a%20b/%C3%BC", "/tmp/a b/\u{fc}"),
+            ("file:///tmp/a b/\u{fc}", "/tmp/a b/\u{fc}"),
+            ("file:///C:/a/resources", "C:/a/resources"),
+            ("/tmp/plain", "/tmp/plain"),
+        ] {
+            assert_eq!(folder(location), Ok(PathBuf::from(wanted)), "{location}");
+        }
+    }
+
+    #[test]
+    fn other_schemes_and_bad_text_are_refused() {
+        assert!(folder("http://host/resources").unwrap_err().contains("must be a file URI"));
+        assert!(folder("file:///%ff").unwrap_err().contains("not UTF-8"));
+        assert!(configuration("file:///nonexistent").unwrap_err().contains("cannot read /nonexistent"));
+    }
+}

@@ -1,0 +1,64 @@
+//! What an FMU computes, between arrays of values: a filter or a plant. No FMI, no pointers.
+
+mod filter;
+mod plant;
+
+use crate::configuration::{Configuration, ConfigurationError};
+use crate::product::Product;
+use filter::FilterBlock;
+use plant::PlantBlock;
+
+/// The values of all variables, each at the index of its value reference in the array of its type
+/// (the other two entries stay unused).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Values {
+    /// Reals, in their units.
+    pub reals: Vec<f64>,
+    /// Integers and enumerations.
+    pub integers: Vec<i32>,
+    /// Booleans.
+    pub booleans: Vec<bool>,
+}
+
+impl Values {
+    /// Zeros and `false` for `len` variables.
+    pub fn zeros(len: usize) -> Self {
+        Self { reals: vec![0.0; len], integers: vec![0; len], booleans: vec![false; len] }
+    }
+}
+
+/// The computation behind an instance.
+pub trait Block: Send {
+    /// Takes over the parameters in `values` and returns to the state before the first step. May
+    /// allocate; the other functions may not.
+    ///
+    /// # Errors
+    ///
+    /// A parameter outside its range or parameters that contradict each other; nothing has changed.
+    fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError>;
+
+    /// Writes the outputs that belong to the inputs at time `t` (s), remembering nothing.
+    fn output(&mut self, t: f64, values: &mut Values);
+
+    /// Makes the step from `t` to `t + h` (s; h ≥ 0, both finite) and writes the outputs after it.
+    ///
+    /// # Errors
+    ///
+    /// A step that cannot be made; nothing has changed.
+    fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String>;
+
+    /// Whether outputs depend on inputs without a step between.
+    fn direct_feedthrough(&self) -> bool;
+}
+
+/// The block of a product, configured with its start values.
+///
+/// # Errors
+///
+/// A configuration that cannot be built.
+pub fn build(product: &Product) -> Result<Box<dyn Block>, ConfigurationError> {
+    Ok(match &product.configuration {
+        Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product.layout)?),
+        Configuration::Plant(c) => Box::new(PlantBlock::new(c.clone(), product.layout)?),
+    })
+}

@@ -1,0 +1,80 @@
+//! A plant: holds its state and integrates it under held inputs.
+
+use punctual_core::dynamics::DynPlant;
+
+use super::{Block, Values};
+use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, updated};
+use crate::product::Layout;
+
+/// Most Runge-Kutta steps in one communication step: more is a mistake in the step sizes, and would
+/// look like a hang.
+const MOST_SUBSTEPS: f64 = 1e8;
+
+/// Part of an inner step by which a communication step may be longer than a multiple of it: round-off
+/// in the importer's time, not a reason for another inner step.
+const STEP_ROUND_OFF: f64 = 1e-6;
+
+pub(super) struct PlantBlock {
+    configuration: PlantConfiguration,
+    parameters: Vec<Parameter<PlantConfiguration>>,
+    layout: Layout,
+    plant: Box<dyn DynPlant>,
+    x: Vec<f64>,
+    /// Scratch: the state after the step under way.
+    next: Vec<f64>,
+}
+
+impl PlantBlock {
+    pub(super) fn new(configuration: PlantConfiguration, layout: Layout) -> Result<Self, ConfigurationError> {
+        let (parameters, plant) = (configuration.parameters(), configuration.build()?);
+        let x = vec![0.0; layout.states];
+        Ok(Self { next: x.clone(), x, configuration, parameters, layout, plant })
+    }
+}
+
+impl Block for PlantBlock {
+    fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError> {
+        let numbers = &values.reals[self.layout.parameters..self.layout.end];
+        let configuration = updated(&self.configuration, &self.parameters, numbers)?;
+        self.plant = configuration.build()?;
+        self.configuration = configuration;
+        // The first parameters are the initial state.
+        self.x.copy_from_slice(&numbers[..self.layout.states]);
+        Ok(())
+    }
+
+    fn output(&mut self, _t: f64, values: &mut Values) {
+        values.reals[self.layout.outputs..][..self.layout.states].copy_from_slice(&self.x);
+    }
+
+    fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
+        let u = &values.reals[..self.layout.inputs];
+        if let Some(i) = u.iter().position(|v| !v.is_finite()) {
+            let name = self.configuration.plant.model.inputs()[i].name;
+            return Err(format!("u.{name} is {}, must be finite for a step from t = {t}", u[i]));
+        }
+        let wanted = h / self.configuration.integration.inner_step;
+        let substeps = (wanted * (1.0 - STEP_ROUND_OFF)).ceil();
+        if substeps > MOST_SUBSTEPS {
+            return Err(format!(
+                "the step of {h} s needs {substeps} inner steps of {} s, must be at most {MOST_SUBSTEPS}",
+                self.configuration.integration.inner_step
+            ));
+        }
+        self.next.copy_from_slice(&self.x);
+        for _ in 0..substeps as u64 {
+            self.plant.rk4_step(&mut self.next, u, h / substeps).map_err(|e| e.to_string())?;
+        }
+        if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
+            let name = self.configuration.plant.model.states()[i].name;
+            return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s", self.next[i]));
+        }
+        std::mem::swap(&mut self.x, &mut self.next);
+        self.output(t + h, values);
+        Ok(())
+    }
+
+    fn direct_feedthrough(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,319 @@
+//! `kind = "filter"`: a safety filter for one of the plants.
+
+use std::collections::BTreeMap;
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter};
+use punctual_core::plants::{PointMass, Unicycle};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, check_identifier,
+};
+
+/// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
+pub const UNBOUNDED: f64 = 1e30;
+
+/// The shape of a barrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeName {
+    /// [`DistanceDisc`]: interior of a disc, smooth and distance-shaped. The one to use.
+    #[default]
+    Disc,
+    /// [`QuadraticDisc`]: interior of a disc in the paper's form R² − d².
+    QuadraticDisc,
+}
+
+/// How the deadline is met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodName {
+    /// [`Method::ReferenceProfile`].
+    #[default]
+    ReferenceProfile,
+    /// [`Method::RepeatedRoot`], the paper's.
+    RepeatedRoot,
+}
+
+/// `[[barrier]]`: a safe set and the deadline for reaching it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BarrierSection {
+    /// Its name, a C identifier, unique; prefix of its variables.
+    pub name: String,
+    /// The shape. Default `disc`.
+    #[serde(default)]
+    pub shape: ShapeName,
+    /// Centre in m.
+    pub centre: [f64; 2],
+    /// Radius in m, > 0.
+    pub radius: f64,
+    /// `disc` only: ε in m, > 0. Default: the radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smoothing: Option<f64>,
+    /// Deadline T in s after the first step, > 0.
+    pub deadline: f64,
+    /// How it is met. Default `reference_profile`.
+    #[serde(default)]
+    pub method: MethodName,
+    /// Rate a of the profile method in 1/s, > 0. Default 20 / deadline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+    /// Rate of the stay constraint in 1/s, > 0. Default: `rate`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stay_rate: Option<f64>,
+    /// Margin μ in the unit of h, ≥ 0. Default 0.
+    #[serde(default)]
+    pub margin: f64,
+}
+
+impl BarrierSection {
+    fn complete(&mut self, path: &str) -> Result<(), ConfigurationError> {
+        check_identifier(&format!("{path}.name"), &self.name)?;
+        match self.shape {
+            ShapeName::Disc => {
+                self.smoothing.get_or_insert(self.radius);
+            }
+            ShapeName::QuadraticDisc if self.smoothing.is_some() => {
+                let message = "belongs to the shape disc; quadratic_disc has none";
+                return Err(ConfigurationError::new(format!("{path}.smoothing"), message));
+            }
+            ShapeName::QuadraticDisc => {}
+        }
+        let rate = *self.rate.get_or_insert(BarrierSettings::within(self.deadline).rate);
+        self.stay_rate.get_or_insert(rate);
+        Ok(())
+    }
+
+    /// The unit of h and that of its second derivative.
+    pub fn units(&self) -> (&'static str, &'static str) {
+        match self.shape {
+            ShapeName::Disc => ("m", "m/s2"),
+            ShapeName::QuadraticDisc => ("m2", "m2/s2"),
+        }
+    }
+
+    fn parameters(&self, index: usize) -> Vec<Parameter<FilterConfiguration>> {
+        let unit = self.units().0;
+        let row = |field: &str, unit, range, description: &str, access: fn(&mut Self) -> &mut f64| {
+            // Configuration files count barriers from 0, as the error messages of serde do; the
+            // components of a vector are counted from 1, as in FMI.
+            let names = (format!("{}.{field}", self.name), format!("barrier[{index}].{field}"));
+            Parameter::new(names, unit, range, description, move |c: &mut FilterConfiguration| {
+                access(&mut c.barrier[index])
+            })
+        };
+        let mut rows = vec![
+            row("deadline", "s", Range::POSITIVE, "time from the first step to be inside", |b| {
+                &mut b.deadline
+            }),
+            row("rate", "1/s", Range::POSITIVE, "decay rate of an error against the profile", |b| {
+                b.rate.get_or_insert(0.0)
+            }),
+            row("stay_rate", "1/s", Range::POSITIVE, "rate of the constraint that keeps it inside", |b| {
+                b.stay_rate.get_or_insert(0.0)
+            }),
+            row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| &mut b.margin),
+            row("centre[1]", "m", Range::FINITE, "centre along x", |b| &mut b.centre[0]),
+            row("centre[2]", "m", Range::FINITE, "centre along y", |b| &mut b.centre[1]),
+            row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius),
+        ];
+        if self.shape == ShapeName::Disc {
+            rows.push(row(
+                "smoothing",
+                "m",
+                Range::POSITIVE,
+                "rounding of the distance at the centre",
+                |b| b.smoothing.get_or_insert(0.0),
+            ));
+        }
+        rows
+    }
+
+    fn settings(&self) -> BarrierSettings {
+        BarrierSettings {
+            deadline: self.deadline,
+            method: match self.method {
+                MethodName::ReferenceProfile => Method::ReferenceProfile,
+                MethodName::RepeatedRoot => Method::RepeatedRoot,
+            },
+            rate: self.rate.unwrap_or(f64::NAN),
+            stay_rate: self.stay_rate.unwrap_or(f64::NAN),
+            margin: self.margin,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum FilterKind {
+    Filter,
+}
+
+/// A filter FMU.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilterConfiguration {
+    pub(super) kind: FilterKind,
+    /// The FMU's name, a C identifier. Default `filter`.
+    #[serde(default)]
+    pub name: String,
+    /// Whether outputs follow inputs without a step between them. Default true; with false, outputs
+    /// are computed in steps only, for the same result in every master.
+    #[serde(default = "yes")]
+    pub direct_feedthrough: bool,
+    /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
+    /// reported as degenerate. Default 1e6.
+    #[serde(default = "correction_limit")]
+    pub correction_limit: f64,
+    /// The plant that the filter is for.
+    pub plant: PlantSection,
+    /// The safe sets, at least one.
+    pub barrier: Vec<BarrierSection>,
+    /// Input bounds by name, `[min, max]` in the unit of the input. Default: none (±1e30).
+    #[serde(default)]
+    pub bounds: BTreeMap<String, [f64; 2]>,
+    /// The run it is meant for.
+    #[serde(default)]
+    pub experiment: ExperimentSection,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn correction_limit() -> f64 {
+    FilterBuilder::DEFAULT_CORRECTION_LIMIT
+}
+
+impl FilterConfiguration {
+    pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
+        if self.name.is_empty() {
+            self.name = "filter".to_owned();
+        }
+        check_identifier("name", &self.name)?;
+        self.plant.complete()?;
+        if self.barrier.is_empty() {
+            return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
+        }
+        for i in 0..self.barrier.len() {
+            self.barrier[i].complete(&format!("barrier[{i}]"))?;
+            let name = self.barrier[i].name.clone();
+            // A barrier's variables must not fall among the filter's own.
+            let reserved = ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r"].contains(&&*name);
+            if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
+                let message = format!("is {name:?}, which is already the name of something else");
+                return Err(ConfigurationError::new(format!("barrier[{i}].name"), message));
+            }
+        }
+        let inputs = self.plant.model.inputs();
+        if let Some(unknown) = self.bounds.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = inputs.iter().map(|s| s.name).collect();
+            let message = format!("unknown input, must be one of {}", names.join(", "));
+            return Err(ConfigurationError::new(format!("bounds.{unknown}"), message));
+        }
+        for input in inputs {
+            let [min, max] = self.bounds.entry(input.name.to_owned()).or_insert([-UNBOUNDED, UNBOUNDED]);
+            // Not `f64::max`: not-a-number has to reach the check below.
+            if *min < -UNBOUNDED {
+                *min = -UNBOUNDED;
+            }
+            if *max > UNBOUNDED {
+                *max = UNBOUNDED;
+            }
+        }
+        self.experiment.check()?;
+        for parameter in self.parameters() {
+            parameter.check(&mut self)?;
+        }
+        // Whatever the ranges of single numbers cannot say.
+        self.build()?;
+        Ok(self)
+    }
+
+    /// The numbers that are parameters of the FMU.
+    pub fn parameters(&self) -> Vec<Parameter<Self>> {
+        let range = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED), above_min: false };
+        let mut rows = Vec::new();
+        for (side, prefix, word) in [(0, "u_min", "smallest"), (1, "u_max", "largest")] {
+            for input in self.plant.model.inputs() {
+                let names = (format!("{prefix}.{}", input.name), format!("bounds.{}", input.name));
+                let description = format!("{word} {} (no bound: {UNBOUNDED:e} in size)", input.description);
+                rows.push(Parameter::new(names, input.unit, range, description, move |c: &mut Self| {
+                    &mut c.bounds.entry(input.name.to_owned()).or_default()[side]
+                }));
+            }
+        }
+        for (i, barrier) in self.barrier.iter().enumerate() {
+            rows.extend(barrier.parameters(i));
+        }
+        rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
+        rows
+    }
+
+    /// The filter, not yet anchored.
+    ///
+    /// # Errors
+    ///
+    /// A number outside its range, or a lower input bound above its upper bound.
+    pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
+        let inputs = self.plant.model.inputs();
+        let mut builder = SafetyFilter::builder(self.plant.model.states().len(), inputs.len());
+        for (i, section) in self.barrier.iter().enumerate() {
+            let path = format!("barrier[{i}]");
+            let core = |e: punctual_core::Error| {
+                ConfigurationError::new(format!("{path}.{}", e.field()), e.message())
+            };
+            builder = match section.shape {
+                ShapeName::Disc => {
+                    let smoothing = section.smoothing.unwrap_or(f64::NAN);
+                    let disc = DistanceDisc::new(section.centre, section.radius, smoothing).map_err(core)?;
+                    self.add(builder, i, disc)?
+                }
+                ShapeName::QuadraticDisc => {
+                    let disc = QuadraticDisc::new(section.centre, section.radius).map_err(core)?;
+                    self.add(builder, i, disc)?
+                }
+            };
+        }
+        let (mut min, mut max) = (Vec::new(), Vec::new());
+        for input in inputs {
+            let [low, high] = self.bounds.get(input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
+            if low > high {
+                let message = format!("is [{low}, {high}], must be [min, max] with min <= max");
+                return Err(ConfigurationError::new(format!("bounds.{}", input.name), message));
+            }
+            min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });
+            max.push(if high >= UNBOUNDED { f64::INFINITY } else { high });
+        }
+        builder
+            .bounds(&min, &max)
+            .and_then(|b| b.correction_limit(self.correction_limit))
+            .and_then(FilterBuilder::build)
+            .map_err(|e| ConfigurationError::new(e.field(), e.message()))
+    }
+
+    fn add<B>(
+        &self,
+        builder: FilterBuilder,
+        index: usize,
+        barrier: B,
+    ) -> Result<FilterBuilder, ConfigurationError>
+    where
+        B: Barrier<4> + Send + 'static,
+    {
+        let section = &self.barrier[index];
+        let (name, settings) = (&section.name, section.settings());
+        match self.plant.model {
+            ModelName::PointMass => builder.barrier(name, PointMass, barrier, settings),
+            ModelName::Unicycle => builder.barrier(name, Unicycle, barrier, settings),
+            ModelName::Bicycle => builder.barrier(name, self.plant.bicycle()?, barrier, settings),
+        }
+        .map_err(|e| {
+            let field = e.field().split_once('.').map_or(e.field(), |(_, field)| field);
+            ConfigurationError::new(format!("barrier[{index}].{field}"), e.message())
+        })
+    }
+}

@@ -1,0 +1,117 @@
+//! Numbers of a configuration that are also parameters of the FMU: one row each.
+
+use super::ConfigurationError;
+
+/// The values a number may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Smallest value, if there is one.
+    pub min: Option<f64>,
+    /// Largest value, if there is one.
+    pub max: Option<f64>,
+    /// Whether `min` itself is excluded.
+    pub above_min: bool,
+}
+
+impl Range {
+    /// Any finite number.
+    pub const FINITE: Self = Self { min: None, max: None, above_min: false };
+    /// Finite and > 0.
+    pub const POSITIVE: Self = Self { min: Some(0.0), max: None, above_min: true };
+    /// Finite and ≥ 0.
+    pub const NON_NEGATIVE: Self = Self { min: Some(0.0), max: None, above_min: false };
+
+    /// Whether `value` is finite and within the range.
+    pub fn contains(&self, value: f64) -> bool {
+        let low = self.min.is_none_or(|min| value > min || (!self.above_min && value == min));
+        value.is_finite() && low && self.max.is_none_or(|max| value <= max)
+    }
+
+    /// The range in words, e.g. "finite and > 0".
+    pub fn describe(&self) -> String {
+        let mut words = "finite".to_owned();
+        if let Some(min) = self.min {
+            words += &format!(" and {} {min}", if self.above_min { ">" } else { ">=" });
+        }
+        if let Some(max) = self.max {
+            words += &format!(" and <= {max}");
+        }
+        words
+    }
+
+    /// Checks `value`, naming `field`.
+    ///
+    /// # Errors
+    ///
+    /// A value that is not finite or outside the range.
+    pub fn check(&self, field: &str, value: f64) -> Result<(), ConfigurationError> {
+        if self.contains(value) {
+            return Ok(());
+        }
+        Err(ConfigurationError::new(field, format!("is {value}, must be {}", self.describe())))
+    }
+}
+
+/// How a parameter's number is reached in a completed configuration of type `C`.
+type Access<C> = Box<dyn Fn(&mut C) -> &mut f64 + Send>;
+
+/// One number of a configuration: its name as an FMU variable, its path in the file, unit, range and
+/// meaning. Validation, the model description and the FMU's accessors all read this row.
+pub struct Parameter<C> {
+    /// The variable's name, e.g. `goal.deadline`.
+    pub name: String,
+    /// The path in the configuration file, e.g. `barrier[0].deadline`.
+    pub path: String,
+    /// The unit.
+    pub unit: &'static str,
+    /// The allowed range.
+    pub range: Range,
+    /// Meaning, for a human.
+    pub description: String,
+    access: Access<C>,
+}
+
+impl<C> Parameter<C> {
+    pub(super) fn new(
+        (name, path): (String, String),
+        unit: &'static str,
+        range: Range,
+        description: impl Into<String>,
+        access: impl Fn(&mut C) -> &mut f64 + Send + 'static,
+    ) -> Self {
+        Self { name, path, unit, range, description: description.into(), access: Box::new(access) }
+    }
+
+    /// The value in `configuration`.
+    pub fn get(&self, configuration: &mut C) -> f64 {
+        *(self.access)(configuration)
+    }
+
+    /// Writes the value into `configuration`, unchecked.
+    pub fn set(&self, configuration: &mut C, value: f64) {
+        *(self.access)(configuration) = value;
+    }
+
+    /// Checks the value in `configuration`.
+    pub(super) fn check(&self, configuration: &mut C) -> Result<(), ConfigurationError> {
+        self.range.check(&self.path, self.get(configuration))
+    }
+}
+
+/// `configuration` with the numbers of `rows` replaced by `values`, in order.
+///
+/// # Errors
+///
+/// A value outside the range of its row.
+pub fn updated<C: Clone>(
+    configuration: &C,
+    rows: &[Parameter<C>],
+    values: &[f64],
+) -> Result<C, ConfigurationError> {
+    let mut configuration = configuration.clone();
+    for (row, &value) in rows.iter().zip(values) {
+        row.range.check(&row.name, value)?;
+        row.set(&mut configuration, value);
+    }
+    Ok(configuration)
+}

@@ -1,0 +1,445 @@
+//! The FMI 2.0 co-simulation state machine in safe Rust: modes, time, values, lazy outputs.
+//!
+//! Everything here takes references and returns `Result`; the C interface is only guard and conversion.
+//! A failed call leaves the instance as it was.
+//!
+//! **Sample time.** An output read after inputs were set belongs to those inputs at the communication
+//! point at which they were set: it is computed when read, and only looked at. A step computes the
+//! sample at its start and remembers it; after the step, outputs stay that sample (a filter) or show
+//! the new state (a plant) until inputs change.
+
+use punctual_modeldescription::{BaseType, Causality, Variable, VariableKind};
+
+use crate::block::{self, Block, Values};
+use crate::configuration::{Configuration, ConfigurationError};
+use crate::product::Product;
+
+/// Times that differ by less than this part of their size (or of 1 s) are the same communication
+/// point: importers accumulate time by addition, count it in nanoseconds or multiply it out.
+const SAME_TIME: f64 = 1e-9;
+
+/// The modes of an instance, as flags.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mode(u8);
+
+impl Mode {
+    /// After `fmi2Instantiate` or `fmi2Reset`.
+    pub const INSTANTIATED: Self = Self(1);
+    /// Between `fmi2EnterInitializationMode` and `fmi2ExitInitializationMode`.
+    pub const INITIALIZATION: Self = Self(2);
+    /// Between communication points.
+    pub const STEP: Self = Self(4);
+    /// After `fmi2Terminate`.
+    pub const TERMINATED: Self = Self(8);
+    /// All of them.
+    pub const ANY: Self = Self(15);
+
+    const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether `self` is among `modes`.
+    pub fn is_in(self, modes: Self) -> bool {
+        self.0 & modes.0 != 0
+    }
+
+    /// The mode in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::INSTANTIATED => "instantiated",
+            Self::INITIALIZATION => "initialization mode",
+            Self::STEP => "step mode",
+            Self::TERMINATED => "terminated",
+            _ => "several modes",
+        }
+    }
+}
+
+/// The calls whose legality depends on the mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each is the FMI function of its name")]
+pub enum Call {
+    SetDebugLogging,
+    SetupExperiment,
+    EnterInitializationMode,
+    ExitInitializationMode,
+    Terminate,
+    Reset,
+    Get,
+    Set,
+    DoStep,
+    CancelStep,
+    GetStatus,
+    Unsupported,
+}
+
+/// Call, its name in messages, and the modes in which it is legal (FMI 2.0.4, section 4.2.4, figure
+/// 11). Wider than the standard where importers are: values may be read in every mode.
+pub const LEGAL: [(Call, &str, Mode); 12] = [
+    (Call::SetDebugLogging, "fmi2SetDebugLogging", Mode::ANY),
+    (Call::SetupExperiment, "fmi2SetupExperiment", Mode::INSTANTIATED),
+    (Call::EnterInitializationMode, "fmi2EnterInitializationMode", Mode::INSTANTIATED),
+    (Call::ExitInitializationMode, "fmi2ExitInitializationMode", Mode::INITIALIZATION),
+    (Call::Terminate, "fmi2Terminate", Mode::STEP),
+    (Call::Reset, "fmi2Reset", Mode::ANY),
+    (Call::Get, "fmi2Get", Mode::ANY),
+    (Call::Set, "fmi2Set", Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
+    (Call::DoStep, "fmi2DoStep", Mode::STEP),
+    (Call::CancelStep, "fmi2CancelStep", Mode::STEP),
+    (Call::GetStatus, "fmi2GetStatus", Mode::ANY),
+    (Call::Unsupported, "a function that the capability flags exclude", Mode::ANY),
+];
+
+/// Why a call failed, for the log: what was given and what is allowed.
+pub type Failure = String;
+
+/// One instance of an FMU.
+pub struct Instance {
+    product: Product,
+    block: Box<dyn Block>,
+    mode: Mode,
+    /// The present communication point in s.
+    time: f64,
+    values: Values,
+    /// Whether the outputs in `values` belong to the inputs in `values`.
+    fresh: bool,
+    /// Whether `block` has the parameters in `values`.
+    configured: bool,
+}
+
+impl Instance {
+    /// An instance of `configuration`, which must be the one that `guid` was made for.
+    ///
+    /// # Errors
+    ///
+    /// A GUID that is not the configuration's.
+    pub fn new(configuration: Configuration, guid: &str) -> Result<Self, Failure> {
+        let product = Product::new(configuration).map_err(|e| e.to_string())?;
+        if guid != product.guid {
+            return Err(format!(
+                "the GUID is {guid:?}, must be {:?} (library version {}): the model description and \
+                 resources/{} do not belong together",
+                product.guid,
+                env!("CARGO_PKG_VERSION"),
+                crate::configuration::RESOURCE
+            ));
+        }
+        let block = block::build(&product).map_err(|e| e.to_string())?;
+        let values = Values::zeros(product.variables.len());
+        let mut instance = Self {
+            product,
+            block,
+            mode: Mode::INSTANTIATED,
+            time: 0.0,
+            values,
+            fresh: false,
+            configured: false,
+        };
+        instance.start_values();
+        Ok(instance)
+    }
+
+    /// The present mode.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// The present communication point in s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Configuration, variables and GUID.
+    pub fn product(&self) -> &Product {
+        &self.product
+    }
+
+    /// Whether `call` is legal now.
+    ///
+    /// # Errors
+    ///
+    /// A call that [`LEGAL`] excludes in this mode.
+    pub fn check(&self, call: Call) -> Result<(), Failure> {
+        let (_, name, modes) = LEGAL[call as usize];
+        if self.mode.is_in(modes) {
+            return Ok(());
+        }
+        let allowed: Vec<_> = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED]
+            .into_iter()
+            .filter(|m| m.is_in(modes))
+            .map(Mode::name)
+            .collect();
+        Err(format!("{name} is not allowed in mode {}, only in {}", self.mode.name(), allowed.join(", ")))
+    }
+
+    /// Takes the start time; tolerance and stop time are not needed.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; a time that is not finite; a stop time before the start time.
+    pub fn setup_experiment(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Failure> {
+        self.check(Call::SetupExperiment)?;
+        if !start_time.is_finite() {
+            return Err(format!("startTime is {start_time}, must be finite"));
+        }
+        if let Some(stop) = stop_time.filter(|stop| stop.is_nan() || *stop < start_time) {
+            return Err(format!("stopTime is {stop}, must be >= startTime = {start_time}"));
+        }
+        self.time = start_time;
+        Ok(())
+    }
+
+    /// Goes to initialization mode.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode.
+    pub fn enter_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.check(Call::EnterInitializationMode)?;
+        self.mode = Mode::INITIALIZATION;
+        self.fresh = false;
+        Ok(())
+    }
+
+    /// Takes the parameters over and goes to step mode.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; parameters that contradict each other (such as `u_min.a` above `u_max.a`).
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
+        self.check(Call::ExitInitializationMode)?;
+        self.configure().map_err(|e| e.to_string())?;
+        self.mode = Mode::STEP;
+        self.block.output(self.time, &mut self.values);
+        self.fresh = true;
+        Ok(())
+    }
+
+    /// Ends the run; values can still be read.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode.
+    pub fn terminate(&mut self) -> Result<(), Failure> {
+        self.check(Call::Terminate)?;
+        self.mode = Mode::TERMINATED;
+        Ok(())
+    }
+
+    /// Back to where `fmi2Instantiate` left the instance, start values included.
+    pub fn reset(&mut self) {
+        self.mode = Mode::INSTANTIATED;
+        self.time = 0.0;
+        self.fresh = false;
+        self.configured = false;
+        let len = self.product.variables.len();
+        self.values = Values::zeros(len);
+        self.start_values();
+    }
+
+    /// Makes the communication step from `t` by `h` seconds.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; a time that is not finite or lies before the present communication point; a
+    /// step that is not finite or negative; what the block itself refuses.
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.check(Call::DoStep)?;
+        let same = SAME_TIME * t.abs().max(1.0);
+        if !t.is_finite() || t < self.time - same {
+            return Err(format!(
+                "currentCommunicationPoint is {t}, must be finite and not before the present one, {}",
+                self.time
+            ));
+        }
+        if !(h.is_finite() && h >= 0.0) {
+            return Err(format!("communicationStepSize is {h} at t = {t}, must be finite and >= 0"));
+        }
+        let start = if t <= self.time + same { self.time } else { t };
+        self.block.step(start, h, &mut self.values)?;
+        self.time = t + h;
+        self.fresh = true;
+        Ok(())
+    }
+
+    /// Reads reals, in the units of the variables.
+    ///
+    /// # Errors
+    ///
+    /// A value reference that is not one of a real.
+    pub fn get_real(&mut self, references: &[u32], out: &mut [f64]) -> Result<(), Failure> {
+        self.get(BaseType::Real, references, out, |values| &values.reals)
+    }
+
+    /// Reads integers and enumerations.
+    ///
+    /// # Errors
+    ///
+    /// A value reference that is not one of an integer or enumeration.
+    pub fn get_integer(&mut self, references: &[u32], out: &mut [i32]) -> Result<(), Failure> {
+        self.get(BaseType::Integer, references, out, |values| &values.integers)
+    }
+
+    /// Reads booleans, as 0 and 1.
+    ///
+    /// # Errors
+    ///
+    /// A value reference that is not one of a boolean.
+    pub fn get_boolean(&mut self, references: &[u32], out: &mut [i32]) -> Result<(), Failure> {
+        self.check_references(Call::Get, BaseType::Boolean, references)?;
+        self.refresh();
+        for (&reference, o) in references.iter().zip(out) {
+            *o = i32::from(self.values.booleans[reference as usize]);
+        }
+        Ok(())
+    }
+
+    /// Reads or writes strings: there are none, so every reference is an error.
+    ///
+    /// # Errors
+    ///
+    /// Any reference at all.
+    pub fn check_strings(&self, call: Call, references: &[u32]) -> Result<(), Failure> {
+        self.check_references(call, BaseType::String, references)
+    }
+
+    /// Writes reals. Inputs may have any value (what is not finite shows in `status`, or in the next
+    /// step of a plant); parameters must lie within their range.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; a reference that is not one of a real input or parameter; a parameter outside
+    /// its range or after initialization.
+    pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
+        self.check_settable(BaseType::Real, references)?;
+        for (&reference, &value) in references.iter().zip(values) {
+            if let Some(i) = (reference as usize).checked_sub(self.product.layout.parameters) {
+                let name = &self.product.variables[reference as usize].name;
+                self.product.ranges[i].check(name, value).map_err(|e| e.to_string())?;
+            }
+        }
+        for (&reference, &value) in references.iter().zip(values) {
+            self.values.reals[reference as usize] = value;
+            self.configured &= (reference as usize) < self.product.layout.parameters;
+        }
+        self.fresh &= references.is_empty();
+        Ok(())
+    }
+
+    /// Writes integers: there is no integer input or parameter.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; any reference at all.
+    pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), Failure> {
+        self.check_settable(BaseType::Integer, references)?;
+        for (&reference, &value) in references.iter().zip(values) {
+            self.values.integers[reference as usize] = value;
+        }
+        Ok(())
+    }
+
+    /// Writes booleans; every number but 0 is true.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; a reference that is not one of a boolean input.
+    pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), Failure> {
+        self.check_settable(BaseType::Boolean, references)?;
+        for (&reference, &value) in references.iter().zip(values) {
+            self.values.booleans[reference as usize] = value != 0;
+        }
+        self.fresh &= references.is_empty();
+        Ok(())
+    }
+
+    fn get<T: Copy>(
+        &mut self,
+        base: BaseType,
+        references: &[u32],
+        out: &mut [T],
+        array: impl Fn(&Values) -> &Vec<T>,
+    ) -> Result<(), Failure> {
+        self.check_references(Call::Get, base, references)?;
+        self.refresh();
+        for (&reference, o) in references.iter().zip(out) {
+            *o = array(&self.values)[reference as usize];
+        }
+        Ok(())
+    }
+
+    fn check_references(&self, call: Call, base: BaseType, references: &[u32]) -> Result<(), Failure> {
+        self.check(call)?;
+        references.iter().try_for_each(|&reference| self.variable(base, reference).map(|_| ()))
+    }
+
+    fn check_settable(&self, base: BaseType, references: &[u32]) -> Result<(), Failure> {
+        self.check(Call::Set)?;
+        for &reference in references {
+            let variable = self.variable(base, reference)?;
+            match variable.causality {
+                Causality::Input => {}
+                Causality::Parameter if self.mode != Mode::STEP => {}
+                Causality::Parameter => {
+                    return Err(format!(
+                        "{} is a fixed parameter and cannot change after initialization",
+                        variable.name
+                    ));
+                }
+                _ => return Err(format!("{} is an output and cannot be set", variable.name)),
+            }
+        }
+        Ok(())
+    }
+
+    fn variable(&self, base: BaseType, reference: u32) -> Result<&Variable, Failure> {
+        let variables = &self.product.variables;
+        let variable = variables.get(reference as usize).ok_or_else(|| {
+            format!("value reference {reference} is unknown, must be 0 to {}", variables.len() - 1)
+        })?;
+        let found = variable.kind.base_type();
+        if found != base {
+            return Err(format!(
+                "value reference {reference} is {} of type {found:?}, not {base:?}",
+                variable.name
+            ));
+        }
+        Ok(variable)
+    }
+
+    /// Computes the outputs if inputs changed since.
+    fn refresh(&mut self) {
+        let lazy = match self.mode {
+            Mode::INITIALIZATION => true,
+            Mode::STEP => self.block.direct_feedthrough(),
+            _ => false,
+        };
+        if self.fresh || !lazy {
+            return;
+        }
+        // Parameters that contradict each other are an error when initialization ends; until then
+        // the outputs stay what they are.
+        if self.configured || self.configure().is_ok() {
+            self.block.output(self.time, &mut self.values);
+            self.fresh = true;
+        }
+    }
+
+    fn configure(&mut self) -> Result<(), ConfigurationError> {
+        self.block.configure(&self.values)?;
+        self.configured = true;
+        Ok(())
+    }
+
+    fn start_values(&mut self) {
+        for (i, variable) in self.product.variables.iter().enumerate() {
+            match &variable.kind {
+                VariableKind::Real { start: Some(start), .. } => self.values.reals[i] = *start,
+                VariableKind::Boolean { start: Some(start) } => self.values.booleans[i] = *start,
+                VariableKind::Integer { start: Some(start), .. }
+                | VariableKind::Enumeration { start: Some(start), .. } => self.values.integers[i] = *start,
+                _ => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,347 @@
+//! What an FMU shows of itself: variables, value references, model description, GUID.
+//!
+//! The table built here is the only place that knows value references; the XML file and the accessors
+//! of the running instance are both read from it.
+
+use punctual_core::filter::{Phase, Status};
+use punctual_core::plants::Signal;
+use punctual_modeldescription::{
+    BaseUnit, Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
+    ModelDescription, NamingConvention, Unit, Variability, Variable, VariableKind,
+};
+use uuid::Uuid;
+
+use crate::configuration::{
+    Configuration, ConfigurationError, FilterConfiguration, Parameter, PlantConfiguration, Range,
+};
+
+/// Log categories: name and meaning.
+pub const LOG_CATEGORIES: [(&str, &str); 2] = [
+    ("logStatusError", "calls that failed, with the reason"),
+    ("logEvents", "what happened: anchors, arrivals, resets"),
+];
+
+/// Everything derived from one configuration.
+pub struct Product {
+    /// The configuration, completed.
+    pub configuration: Configuration,
+    /// The variables; the value reference of each is its index.
+    pub variables: Vec<Variable>,
+    /// Where the groups of variables lie.
+    pub layout: Layout,
+    /// The ranges of the parameters, in the order of the table.
+    pub ranges: Vec<Range>,
+    /// `{…}`: differs between FMUs that differ in configuration, variables or version.
+    pub guid: String,
+}
+
+/// Value references of the groups of variables, in the order of the table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Number of states: the first inputs of a filter, the outputs of a plant.
+    pub states: usize,
+    /// Number of inputs of the plant.
+    pub inputs: usize,
+    /// First output.
+    pub outputs: usize,
+    /// First parameter.
+    pub parameters: usize,
+    /// One past the last parameter.
+    pub end: usize,
+}
+
+/// Outputs of one barrier, in the order of the table.
+pub const BARRIER_OUTPUTS: usize = 7;
+
+impl Product {
+    /// Derives everything from a completed configuration.
+    ///
+    /// # Errors
+    ///
+    /// None in practice: a completed configuration always has a canonical form.
+    pub fn new(configuration: Configuration) -> Result<Self, ConfigurationError> {
+        let (Table { variables, ranges }, layout) = match &configuration {
+            Configuration::Filter(c) => filter_variables(c),
+            Configuration::Plant(c) => plant_variables(c),
+        };
+        let guid = guid(&configuration.canonical()?, &variables);
+        Ok(Self { configuration, variables, layout, ranges, guid })
+    }
+
+    /// The model description.
+    pub fn model_description(&self) -> ModelDescription {
+        let name = self.configuration.name().to_owned();
+        let experiment = self.configuration.experiment();
+        let description = match &self.configuration {
+            Configuration::Filter(c) => {
+                format!("Fixed-time safety filter for a {}", c.plant.model.title())
+            }
+            Configuration::Plant(c) => format!("Reference plant: {}", c.plant.model.title()),
+        };
+        ModelDescription {
+            model_name: name.clone(),
+            guid: self.guid.clone(),
+            description,
+            author: env!("CARGO_PKG_AUTHORS").to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            license: env!("CARGO_PKG_LICENSE").to_owned(),
+            generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
+            variable_naming_convention: NamingConvention::Structured,
+            co_simulation: CoSimulation {
+                model_identifier: name,
+                can_handle_variable_step: true,
+                can_not_use_memory_management_functions: true,
+                ..CoSimulation::default()
+            },
+            units: units(&self.variables),
+            enumerations: match &self.configuration {
+                Configuration::Filter(_) => vec![status_type(), phase_type()],
+                Configuration::Plant(_) => Vec::new(),
+            },
+            log_categories: LOG_CATEGORIES
+                .map(|(name, description)| LogCategory { name: name.into(), description: description.into() })
+                .into(),
+            default_experiment: Some(DefaultExperiment {
+                start_time: experiment.start_time,
+                stop_time: Some(experiment.stop_time),
+                step_size: Some(experiment.step_size),
+                tolerance: None,
+            }),
+            variables: self.variables.clone(),
+            ..ModelDescription::default()
+        }
+    }
+}
+
+/// The GUID: a name-based UUID (version 5) over version, canonical configuration and variable table.
+fn guid(canonical: &str, variables: &[Variable]) -> String {
+    let mut text = format!("punctual {}\n{canonical}\n", env!("CARGO_PKG_VERSION"));
+    for v in variables {
+        let (causality, variability) = (v.causality.as_str(), v.variability.as_str());
+        text +=
+            &format!("{} {} {causality} {variability} {:?}\n", v.value_reference, v.name, v.kind.base_type());
+    }
+    format!("{{{}}}", Uuid::new_v5(&Uuid::NAMESPACE_OID, text.as_bytes()))
+}
+
+/// The units used, by name, as exponents of SI base units: kg is never needed here.
+fn units(variables: &[Variable]) -> Vec<Unit> {
+    let unit = |name: &str| {
+        let (m, s, rad) = match name {
+            "m" => (1, 0, 0),
+            "m2" => (2, 0, 0),
+            "s" => (0, 1, 0),
+            "1/s" => (0, -1, 0),
+            "m/s" => (1, -1, 0),
+            "m/s2" => (1, -2, 0),
+            "m2/s2" => (2, -2, 0),
+            "rad" => (0, 0, 1),
+            "rad/s" => (0, -1, 1),
+            _ => unreachable!("unit {name} is missing from the table; the test of this module finds it"),
+        };
+        Unit { name: name.to_owned(), base: BaseUnit { m, s, rad, ..BaseUnit::default() } }
+    };
+    let mut names: Vec<&str> = variables
+        .iter()
+        .filter_map(|v| match &v.kind {
+            VariableKind::Real { unit, .. } => unit.as_deref(),
+            _ => None,
+        })
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    names.into_iter().map(unit).collect()
+}
+
+/// The enumeration type of `status`.
+const STATUS: &str = "Status";
+
+/// The enumeration type of `<barrier>.phase`.
+const PHASE: &str = "Phase";
+
+fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> EnumerationType {
+    let item = |&(name, value, description): &(&str, i32, &str)| EnumerationItem {
+        name: name.into(),
+        value,
+        description: description.into(),
+    };
+    EnumerationType {
+        name: name.into(),
+        description: description.into(),
+        items: items.iter().map(item).collect(),
+    }
+}
+
+fn status_type() -> EnumerationType {
+    let describe = |status: Status| match status {
+        Status::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
+        Status::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
+        Status::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
+        Status::Degenerate => ("degenerate", "the barrier cannot be influenced at this state"),
+        Status::InvalidInput => ("invalid_input", "an input is not a number or infinite: u nearest 0"),
+        Status::Singular => ("singular", "the model is not finite at this state: u nearest 0"),
+        Status::WrongRelativeDegree => {
+            ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
+        }
+        Status::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
+    };
+    let items = Status::ALL.map(|s| (describe(s).0, s as i32, describe(s).1));
+    enumeration(STATUS, "What the filter's input means", &items)
+}
+
+fn phase_type() -> EnumerationType {
+    let items = [
+        ("waiting", Phase::Waiting, "no step with valid inputs yet"),
+        ("approach", Phase::Approach, "on the way, before the deadline"),
+        ("late", Phase::Late, "the deadline passed outside; the approach goes on"),
+        ("stay", Phase::Stay, "inside, and kept there"),
+        ("left", Phase::Left, "outside again; pulled back without a deadline"),
+    ]
+    .map(|(name, phase, description)| (name, phase as i32, description));
+    enumeration(PHASE, "Where a barrier stands with its promise", &items)
+}
+
+/// Collects variables; the value reference is the index.
+#[derive(Default)]
+struct Table {
+    variables: Vec<Variable>,
+    ranges: Vec<Range>,
+}
+
+impl Table {
+    fn add(
+        &mut self,
+        name: String,
+        description: &str,
+        causality: Causality,
+        kind: VariableKind,
+    ) -> &mut Variable {
+        let value_reference = self.variables.len() as u32;
+        let variability = match (causality, &kind) {
+            (Causality::Parameter, _) => Variability::Fixed,
+            (_, VariableKind::Real { .. }) => Variability::Continuous,
+            _ => Variability::Discrete,
+        };
+        self.variables.push(Variable {
+            name,
+            value_reference,
+            description: description.to_owned(),
+            causality,
+            variability,
+            initial: None,
+            kind,
+            dependencies: None,
+            initial_dependencies: None,
+        });
+        let last = self.variables.len() - 1;
+        &mut self.variables[last]
+    }
+
+    fn signal(&mut self, prefix: &str, signal: &Signal, what: &str, causality: Causality) -> &mut Variable {
+        let start = (causality == Causality::Input).then_some(0.0);
+        self.add(
+            format!("{prefix}.{}", signal.name),
+            &format!("{what}{}", signal.description),
+            causality,
+            real(start, signal.unit),
+        )
+    }
+
+    fn parameter<C>(&mut self, row: &Parameter<C>, configuration: &mut C) {
+        let kind = VariableKind::Real {
+            start: Some(row.get(configuration)),
+            min: row.range.min,
+            max: row.range.max,
+            nominal: None,
+            quantity: None,
+            unit: Some(row.unit.to_owned()),
+        };
+        self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
+        self.ranges.push(row.range);
+    }
+}
+
+fn real(start: Option<f64>, unit: &str) -> VariableKind {
+    VariableKind::Real {
+        start,
+        min: None,
+        max: None,
+        nominal: None,
+        quantity: None,
+        unit: Some(unit.to_owned()),
+    }
+}
+
+fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
+    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let mut table = Table::default();
+    for state in states {
+        table.signal("x", state, "measured ", Causality::Input);
+    }
+    for input in inputs {
+        table.signal("u_ref", input, "wanted ", Causality::Input);
+    }
+    let rearm = VariableKind::Boolean { start: Some(false) };
+    table.add("rearm".into(), "a rising edge starts every deadline anew", Causality::Input, rearm);
+
+    let outputs = table.variables.len();
+    let output = Causality::Output;
+    for input in inputs {
+        table.signal("u", input, "safe ", output);
+    }
+    let enumerated = |t: &str| VariableKind::Enumeration { declared_type: t.into(), start: None };
+    table.add("status".into(), "what u means", output, enumerated(STATUS));
+    for barrier in &c.barrier {
+        let (unit, rate_unit) = barrier.units();
+        let name = |field: &str| format!("{}.{field}", barrier.name);
+        let flag = || VariableKind::Boolean { start: None };
+        let first = table.variables.len();
+        table.add(name("h"), "barrier; the state is safe where it is >= 0", output, real(None, unit));
+        table.add(name("profile"), "lower bound on h that is promised now", output, real(None, unit));
+        table.add(name("time_left"), "time to the deadline, 0 from then on", output, real(None, "s"));
+        let slack = "row times u minus its floor; < 0: the constraint is violated by that much";
+        table.add(name("slack"), slack, output, real(None, rate_unit));
+        table.add(name("arrived"), "h >= 0 has been reached", output, flag());
+        let guaranteed = "the conditions of the theorem have held since the phase began";
+        table.add(name("guaranteed"), guaranteed, output, flag());
+        table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
+        debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
+    }
+    // Every output follows from state, reference and re-arming at once, or from nothing until a step.
+    let direct: Vec<u32> = if c.direct_feedthrough { (0..outputs as u32).collect() } else { Vec::new() };
+    for variable in &mut table.variables[outputs..] {
+        variable.dependencies = Some(direct.clone());
+    }
+
+    let parameters = table.variables.len();
+    let mut c = c.clone();
+    for row in c.parameters() {
+        table.parameter(&row, &mut c);
+    }
+    let end = table.variables.len();
+    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, parameters, end };
+    (table, layout)
+}
+
+fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
+    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let mut table = Table::default();
+    for input in inputs {
+        table.signal("u", input, "", Causality::Input);
+    }
+    let outputs = table.variables.len();
+    let parameters = outputs + states.len();
+    for (i, state) in states.iter().enumerate() {
+        let variable = table.signal("x", state, "", Causality::Output);
+        variable.dependencies = Some(Vec::new());
+        // `x0.*` are the first parameters, in the order of the states.
+        variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
+    }
+    let mut c = c.clone();
+    for row in c.parameters() {
+        table.parameter(&row, &mut c);
+    }
+    let end = table.variables.len();
+    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, parameters, end };
+    (table, layout)
+}
