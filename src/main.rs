@@ -1,3 +1,48 @@
-//! The `punctual` command line.
+//! The `punctual` command line: arguments in, exit code out. What a command does stands in
+//! [`punctual::command`]; nothing is printed but through [`punctual::output`].
 #![deny(unsafe_code)]
-fn main() {}
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use punctual::command::{build, demo, inspect, run};
+use punctual::output;
+
+/// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple and plot.
+///
+/// Exit codes: 0 success; 1 the run finished but a promise was not kept, or an FMU is at fault; 2 bad
+/// usage or configuration. Results go to stdout, talk and progress to stderr.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Turn a filter or plant configuration into an FMU
+    Build(build::Arguments),
+    /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
+    Demo(demo::Arguments),
+    /// Couple FMUs as a system file says; write CSV and pictures
+    Run(run::Arguments),
+    /// Show what an FMU offers
+    Inspect(inspect::Arguments),
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Build(arguments) => build::execute(&arguments),
+        Command::Demo(arguments) => demo::execute(&arguments),
+        Command::Run(arguments) => run::execute(&arguments),
+        Command::Inspect(arguments) => inspect::execute(&arguments),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            output::error(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

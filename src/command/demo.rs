@@ -1,0 +1,117 @@
+//! `punctual demo`: three plants, two methods, coupled through FMI.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use serde::Serialize;
+
+use crate::demo::{self, DEADLINE, Method, Run, STOP, Summary};
+use crate::error::Error;
+use crate::output::{self, Progress};
+
+/// Arguments of `punctual demo`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Write configurations, FMUs, system files, CSV and pictures into this folder
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    out: PathBuf,
+    /// The shared library to put into the FMUs [default: the one beside this program]
+    #[arg(long, value_name = "FILE")]
+    library: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+/// One run, as JSON.
+#[derive(Serialize)]
+struct Entry<'a> {
+    model: &'a str,
+    method: &'a str,
+    deadline: f64,
+    kept: bool,
+    inputs: [&'a str; 2],
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
+/// Runs the demonstration. The exit code is 1 if our method misses a deadline or leaves the disc; the
+/// paper's is shown for comparison and expected to.
+///
+/// # Errors
+///
+/// A file that cannot be written, a library that cannot be found, an FMU that fails.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let mut progress = Progress::new("demo");
+    let runs = demo::run(&arguments.out, arguments.library.as_deref(), |fraction| progress.update(fraction))?;
+    drop(progress);
+    if arguments.json {
+        output::json(&runs.iter().map(entry).collect::<Vec<_>>());
+    } else {
+        output::result(&text(&runs));
+        output::note(&format!(
+            "written to {}: TOML configurations, FMUs, system files (punctual run), CSV and SVG pictures",
+            arguments.out.display()
+        ));
+    }
+    let kept = runs.iter().filter(|run| run.method == Method::ReferenceProfile).all(|run| run.summary.kept());
+    Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn entry(run: &Run) -> Entry<'_> {
+    Entry {
+        model: run.model.key,
+        method: run.method.key(),
+        deadline: DEADLINE,
+        kept: run.summary.kept(),
+        inputs: run.model.inputs.map(|(name, _)| name),
+        summary: &run.summary,
+    }
+}
+
+fn text(runs: &[Run]) -> String {
+    let header = [
+        "model",
+        "method",
+        "deadline",
+        "arrival",
+        "min h after deadline",
+        "outside after deadline",
+        "peak input to arrival",
+        "peak input, whole run",
+        "steps/s",
+    ];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for run in runs {
+        let s = &run.summary;
+        rows.push(vec![
+            run.model.title.to_owned(),
+            run.method.title().to_owned(),
+            format!("{DEADLINE:.3} s"),
+            s.arrival.map_or("never".to_owned(), |t| format!("{t:.3} s")),
+            format!("{:.3} {}", s.min_h_after_deadline, run.method.unit()),
+            if s.farthest_outside > 0.0 {
+                format!("{:.2} m", s.farthest_outside)
+            } else {
+                "never".to_owned()
+            },
+            peaks(run, s.peak_to_arrival),
+            peaks(run, s.peak),
+            output::number(s.steps_per_second.round()),
+        ]);
+    }
+    format!(
+        "From rest at the origin into a disc of radius 2 m at (45, 45) m within {DEADLINE} s, 1 ms steps, to {STOP} s.\n\
+         Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\n{}",
+        output::table(&rows, &[false, false, true, true, true, true, true, true, true])
+    )
+}
+
+fn peaks(run: &Run, values: [f64; 2]) -> String {
+    let one = |i: usize| format!("{} {}", short(values[i]), run.model.inputs[i].1);
+    format!("{}, {}", one(0), one(1))
+}
+
+fn short(value: f64) -> String {
+    if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
+}

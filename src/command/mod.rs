@@ -1,0 +1,6 @@
+//! One file per subcommand: its arguments, and an `execute` that returns the exit code.
+
+pub mod build;
+pub mod demo;
+pub mod inspect;
+pub mod run;

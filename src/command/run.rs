@@ -1,0 +1,172 @@
+//! `punctual run`: couples FMUs as a system file says.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use serde::Serialize;
+
+use crate::coupling::{Order, Outcome, Simulation, System};
+use crate::error::Error;
+use crate::output::{self, Progress};
+use crate::pictures;
+
+/// Arguments of `punctual run`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The system file (TOML): experiment, components, connections, pictures
+    system: PathBuf,
+    /// Write <system>.csv and the pictures into this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `run` tells, as JSON.
+#[derive(Serialize)]
+struct Report {
+    system: String,
+    order: Order,
+    components: Vec<ComponentReport>,
+    steps: u64,
+    step: f64,
+    final_time: f64,
+    wall_time: f64,
+    steps_per_second: f64,
+    signals: Vec<SignalReport>,
+    files: Vec<String>,
+    notes: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct ComponentReport {
+    name: String,
+    fmu: String,
+    model: String,
+}
+
+/// A recorded signal in short; numbers that are not finite are `null` in JSON.
+#[derive(Serialize)]
+struct SignalReport {
+    name: String,
+    unit: Option<String>,
+    min: f64,
+    max: f64,
+    #[serde(rename = "final")]
+    last: f64,
+}
+
+/// Runs the system.
+///
+/// # Errors
+///
+/// A system file that cannot be used, an FMU that fails, a file that cannot be written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let path = &arguments.system;
+    let system = System::read(path)?;
+    let base = path.parent().unwrap_or(Path::new(""));
+    let mut simulation = Simulation::new(&system, base).map_err(|e| e.in_file(path))?;
+
+    let experiment = *system.experiment();
+    let mut progress = Progress::new(path.display().to_string());
+    let outcome = simulation.run(|time, _| {
+        progress.update((time - experiment.start_time) / (experiment.stop_time - experiment.start_time));
+    })?;
+    drop(progress);
+
+    let files = match &arguments.out {
+        Some(folder) => write_files(&system, path, folder, &outcome)?,
+        None => Vec::new(),
+    };
+    let report = report(path, &system, &simulation, outcome, files);
+    for note in &report.notes {
+        output::note(&format!("note: {note}"));
+    }
+    if arguments.json {
+        output::json(&report);
+    } else {
+        output::result(&text(&report));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the CSV file and the pictures; returns their paths.
+fn write_files(system: &System, path: &Path, folder: &Path, outcome: &Outcome) -> Result<Vec<String>, Error> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
+    let stem = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned());
+    let csv = folder.join(format!("{stem}.csv"));
+    outcome.recording.save_csv(&csv)?;
+    let mut files = vec![csv];
+    for (i, picture) in system.pictures().iter().enumerate() {
+        let name = picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
+        let file = folder.join(format!("{stem}-{name}.svg"));
+        pictures::draw(picture, &outcome.recording, &file)?;
+        files.push(file);
+    }
+    Ok(files.iter().map(|file| file.display().to_string()).collect())
+}
+
+fn report(
+    path: &Path,
+    system: &System,
+    simulation: &Simulation,
+    outcome: Outcome,
+    files: Vec<String>,
+) -> Report {
+    let recording = &outcome.recording;
+    let signal = |index: usize| {
+        let column = &recording.columns()[index];
+        // f64::min and f64::max pass over NaN.
+        let min = recording.column(index).fold(f64::NAN, f64::min);
+        let max = recording.column(index).fold(f64::NAN, f64::max);
+        let last = recording.column(index).last().unwrap_or(f64::NAN);
+        SignalReport { name: column.name.clone(), unit: column.unit.clone(), min, max, last }
+    };
+    Report {
+        system: path.display().to_string(),
+        order: system.experiment().order,
+        components: simulation
+            .components()
+            .map(|(name, fmu)| ComponentReport {
+                name: name.to_owned(),
+                fmu: fmu.path().display().to_string(),
+                model: fmu.description().model_name.clone(),
+            })
+            .collect(),
+        steps: outcome.statistics.steps,
+        step: system.experiment().step,
+        final_time: outcome.statistics.final_time,
+        wall_time: outcome.statistics.wall_time.as_secs_f64(),
+        steps_per_second: outcome.statistics.steps_per_second(),
+        signals: (0..recording.columns().len()).map(signal).collect(),
+        files,
+        notes: outcome.notes,
+    }
+}
+
+fn text(report: &Report) -> String {
+    let row = |cells: [&str; 5]| cells.map(str::to_owned).to_vec();
+    let mut components = vec![vec!["component".to_owned(), "model".to_owned(), "FMU".to_owned()]];
+    components.extend(report.components.iter().map(|c| vec![c.name.clone(), c.model.clone(), c.fmu.clone()]));
+    let mut signals = vec![row(["signal", "unit", "min", "max", "final"])];
+    signals.extend(report.signals.iter().map(|s| {
+        let number = output::number;
+        row([&s.name, s.unit.as_deref().unwrap_or(""), &number(s.min), &number(s.max), &number(s.last)])
+    }));
+    let mut text = format!(
+        "{}\n\n{} steps of {} s to t = {} s in {:.3} s ({} steps/s)\n\n{}",
+        output::table(&components, &[]),
+        report.steps,
+        report.step,
+        report.final_time,
+        report.wall_time,
+        output::number(report.steps_per_second.round()),
+        output::table(&signals, &[false, false, true, true, true]),
+    );
+    if !report.files.is_empty() {
+        text.push_str("\n\nwritten: ");
+        text.push_str(&report.files.join("\n         "));
+    }
+    text
+}

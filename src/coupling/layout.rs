@@ -1,0 +1,106 @@
+//! Which signal has which slot, and how slots become recorded rows.
+
+use std::rc::Rc;
+
+use super::network::{self, Link, Port};
+use super::ports::{Group, Source};
+use super::system::System;
+use crate::host::{Causality, Fmu, Kind};
+use crate::recording::{Column, Recording};
+
+/// Rows for which room is made before a run; longer recordings grow while running.
+const ROWS_RESERVED: usize = 1 << 17;
+
+/// Which port has which slot.
+#[derive(Default)]
+pub(super) struct Layout {
+    pub(super) ports: Vec<Port>,
+    pub(super) names: Vec<String>,
+}
+
+impl Layout {
+    pub(super) fn slot(&self, port: Port) -> Option<usize> {
+        self.ports.iter().position(|other| *other == port)
+    }
+
+    /// Gives slots to the outputs of a component that are connected or recorded and to its
+    /// connected inputs: outputs without feedthrough, outputs with feedthrough, inputs.
+    pub(super) fn add(
+        &mut self,
+        system: &System,
+        fmus: &[Rc<Fmu>],
+        component: usize,
+        links: &[Link],
+        recorded: &[Port],
+    ) -> [Group; 3] {
+        let description = fmus[component].description();
+        let mut parts: [Vec<(usize, u32, Kind)>; 3] = Default::default();
+        for (position, variable) in description.variables.iter().enumerate() {
+            let port = Port { component, variable: position };
+            let entry = (position, variable.value_reference, variable.kind);
+            if variable.causality == Causality::Output {
+                if recorded.contains(&port) || links.iter().any(|link| link.from == port) {
+                    parts[usize::from(network::has_feedthrough(description, position))].push(entry);
+                }
+            } else if links.iter().any(|link| link.to == port) {
+                parts[2].push(entry);
+            }
+        }
+        parts.map(|part| {
+            let (group, positions) = Group::new(self.ports.len(), &part);
+            for variable in positions {
+                self.ports.push(Port { component, variable });
+                let name = &description.variables[variable].name;
+                self.names.push(format!("{}.{name}", system.components()[component].name));
+            }
+            group
+        })
+    }
+
+    /// What the inputs of a component are computed from.
+    pub(super) fn sources(&self, component: usize, links: &[Link]) -> Vec<Source> {
+        let of_link = |link: &Link| {
+            let (input, output) = (self.slot(link.to)?, self.slot(link.from)?);
+            Some(Source { input, output, factor: link.factor, offset: link.offset })
+        };
+        links.iter().filter(|link| link.to.component == component).filter_map(of_link).collect()
+    }
+}
+
+/// Takes a row where one is due.
+pub(super) struct Recorder<'a> {
+    every: u64,
+    last: u64,
+    slots: Vec<usize>,
+    row: Vec<f64>,
+    pub(super) recording: Recording,
+    observer: &'a mut dyn FnMut(f64, &[f64]),
+}
+
+impl<'a> Recorder<'a> {
+    /// Records `slots` as `columns`, every so many of `last` steps and at the last point.
+    pub(super) fn new(
+        columns: &[Column],
+        slots: &[usize],
+        every: u64,
+        last: u64,
+        observer: &'a mut dyn FnMut(f64, &[f64]),
+    ) -> Self {
+        let mut recording = Recording::new(columns.to_vec());
+        let rows = usize::try_from(last / every).unwrap_or(usize::MAX).saturating_add(2);
+        recording.reserve(rows.min(ROWS_RESERVED));
+        Self { every, last, row: vec![0.0; slots.len()], slots: slots.to_vec(), recording, observer }
+    }
+
+    /// Takes the row of point `k` at `time` (s), if one is due.
+    pub(super) fn row(&mut self, k: u64, time: f64, values: &[f64]) {
+        if !k.is_multiple_of(self.every) && k != self.last {
+            return;
+        }
+        for (value, slot) in self.row.iter_mut().zip(&self.slots) {
+            *value = values[*slot];
+        }
+        self.recording.push(time, &self.row);
+        (self.observer)(time, &self.row);
+    }
+}

@@ -1,0 +1,393 @@
+//! The fixed-step master.
+//!
+//! At each communication point t_k, Gauss–Seidel order:
+//!
+//! 1. components with direct feedthrough, in the order of [`super::graph`]: inputs from the latest
+//!    values, `doStep(t_k, h)`, feedthrough outputs read (the sample of t_k);
+//! 2. the other components: inputs from the latest values; then the row of t_k is recorded;
+//! 3. these components: `doStep(t_k, h)`; then all outputs without feedthrough are read (t_{k+1}).
+//!
+//! So what a feedthrough component computes from the state at t_k acts over [t_k, t_k + h], and no
+//! component sees a state of t_{k+1} before all have reached it. Jacobi order: at t_k all inputs
+//! are set from what was read after the previous step, the row is recorded, all step, all is read.
+
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use super::grid::Grid;
+use super::layout::{Layout, Recorder};
+use super::network::{self, Network, Start};
+use super::ports::{Group, Source};
+use super::system::{Order, System};
+use crate::error::{Error, brief_time};
+use crate::host::{Fmu, Slave};
+use crate::recording::{Column, Recording};
+
+/// A component while it runs.
+#[derive(Debug)]
+struct Member {
+    slave: Slave,
+    starts: Vec<Start>,
+    /// Outputs without feedthrough.
+    states: Group,
+    /// Outputs with feedthrough.
+    direct: Group,
+    inputs: Group,
+    sources: Vec<Source>,
+}
+
+/// A coupled system, ready to run.
+#[derive(Debug)]
+pub struct Simulation {
+    members: Vec<Member>,
+    /// Components with direct feedthrough, in running order.
+    direct: Vec<usize>,
+    delayed: Vec<usize>,
+    order: Order,
+    grid: Grid,
+    start_time: f64,
+    stop_time: f64,
+    every: u64,
+    columns: Vec<Column>,
+    /// The slot of each column.
+    slots: Vec<usize>,
+    /// The value of each slot.
+    values: Vec<f64>,
+    /// The name of each slot.
+    names: Vec<String>,
+    /// Whether each slot has been reported as not finite.
+    reported: Vec<bool>,
+    notes: Vec<String>,
+    /// Notes that hold for every run.
+    standing_notes: usize,
+    used: bool,
+}
+
+/// What a run gives.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The rows recorded.
+    pub recording: Recording,
+    /// How long it took.
+    pub statistics: Statistics,
+    /// What the user should know: signals read late, values that are not finite, warnings.
+    pub notes: Vec<String>,
+}
+
+/// Numbers of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Communication steps done.
+    pub steps: u64,
+    /// The last communication point, in seconds.
+    pub final_time: f64,
+    /// Wall time of the steps, without loading and initialisation.
+    pub wall_time: Duration,
+}
+
+impl Statistics {
+    /// Communication steps of the whole system per second of wall time.
+    pub fn steps_per_second(&self) -> f64 {
+        self.steps as f64 / self.wall_time.as_secs_f64().max(1e-9)
+    }
+}
+
+impl Simulation {
+    /// Opens the FMUs of `system`, found relative to the folder `base`, and instantiates them.
+    ///
+    /// # Errors
+    ///
+    /// An FMU that cannot be opened, loaded or instantiated; a connection, start value, recorded
+    /// signal or picture that does not fit the FMUs (with the field of the system file).
+    pub fn new(system: &System, base: &Path) -> Result<Self, Error> {
+        let mut opened: Vec<(PathBuf, Rc<Fmu>)> = Vec::new();
+        let mut fmus = Vec::new();
+        for component in system.components() {
+            let path = base.join(&component.fmu);
+            let shared = opened.iter().find(|(other, fmu)| {
+                *other == path && !fmu.description().capabilities.can_be_instantiated_only_once_per_process
+            });
+            let fmu = match shared {
+                Some((_, fmu)) => Rc::clone(fmu),
+                None => Rc::new(Fmu::open(&path)?),
+            };
+            opened.push((path, Rc::clone(&fmu)));
+            fmus.push(fmu);
+        }
+        Self::with_fmus(system, fmus)
+    }
+
+    /// Instantiates `fmus`, one for each component of `system`, in order; the paths in the system
+    /// are not looked at.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Simulation::new`]; or not one FMU for each component.
+    pub fn with_fmus(system: &System, fmus: Vec<Rc<Fmu>>) -> Result<Self, Error> {
+        if fmus.len() != system.components().len() {
+            let message = format!("{} FMUs for {} components", fmus.len(), system.components().len());
+            return Err(Error::configuration("component", message));
+        }
+        let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
+        let Network { links, mut starts, recorded, direct, delayed, notes } =
+            network::resolve(system, &descriptions)?;
+
+        let mut layout = Layout::default();
+        let mut groups = Vec::new();
+        for component in 0..fmus.len() {
+            groups.push(layout.add(system, &fmus, component, &links, &recorded));
+        }
+        let slots = recorded.iter().filter_map(|port| layout.slot(*port)).collect();
+        let columns = recorded
+            .iter()
+            .map(|port| {
+                let variable = &fmus[port.component].description().variables[port.variable];
+                let component = &system.components()[port.component].name;
+                Column { name: format!("{component}.{}", variable.name), unit: variable.unit.clone() }
+            })
+            .collect();
+        let mut members = Vec::new();
+        for (component, ([states, direct, inputs], fmu)) in groups.into_iter().zip(fmus).enumerate() {
+            members.push(Member {
+                slave: Slave::instantiate(fmu, &system.components()[component].name)?,
+                starts: std::mem::take(&mut starts[component]),
+                states,
+                direct,
+                inputs,
+                sources: layout.sources(component, &links),
+            });
+        }
+        let experiment = system.experiment();
+        let mut simulation = Self {
+            members,
+            direct,
+            delayed,
+            order: experiment.order,
+            grid: Grid::new(experiment.start_time, experiment.stop_time, experiment.step),
+            start_time: experiment.start_time,
+            stop_time: experiment.stop_time,
+            every: system.record().every,
+            columns,
+            slots,
+            values: vec![0.0; layout.ports.len()],
+            reported: vec![false; layout.ports.len()],
+            names: layout.names,
+            notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
+            standing_notes: 0,
+            used: false,
+        };
+        simulation.note_shortened_step();
+        simulation.standing_notes = simulation.notes.len();
+        Ok(simulation)
+    }
+
+    /// The columns of a row, in order.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The communication points.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Component names and their FMUs, in the system's order.
+    pub fn components(&self) -> impl Iterator<Item = (&str, &Rc<Fmu>)> {
+        self.members.iter().map(|member| (member.slave.name(), member.slave.fmu()))
+    }
+
+    /// Runs from start to stop and records. `observer` gets the time (s) and the values of each
+    /// recorded row, in the order of [`Simulation::columns`]. Can be called again: instances are
+    /// then reset first.
+    ///
+    /// # Errors
+    ///
+    /// An FMI call that returns neither OK nor Warning; the run ends there.
+    pub fn run(&mut self, mut observer: impl FnMut(f64, &[f64])) -> Result<Outcome, Error> {
+        self.initialise()?;
+        let mut recorder =
+            Recorder::new(&self.columns, &self.slots, self.every, self.grid.steps(), &mut observer);
+        let begin = Instant::now();
+        match self.order {
+            Order::GaussSeidel => self.run_gauss_seidel(&mut recorder)?,
+            Order::Jacobi => self.run_jacobi(&mut recorder)?,
+        }
+        let wall_time = begin.elapsed();
+        let recording = recorder.recording;
+        for member in &mut self.members {
+            member.slave.terminate()?;
+            let count = member.slave.warnings();
+            if count > 0 {
+                let last = member.slave.log().last().map(|m| format!("; last: {m}")).unwrap_or_default();
+                self.notes.push(format!("{}: {count} calls returned fmi2Warning{last}", member.slave.name()));
+            }
+        }
+        let statistics = Statistics { steps: self.grid.steps(), final_time: self.stop_time, wall_time };
+        Ok(Outcome { recording, statistics, notes: self.notes.clone() })
+    }
+
+    fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
+        for k in 0..self.grid.steps() {
+            let (time, step) = (self.grid.time(k), self.grid.step(k));
+            for i in 0..self.direct.len() {
+                let c = self.direct[i];
+                self.set_inputs(c)?;
+                self.members[c].slave.do_step(time, step)?;
+                self.read_direct(c, time)?;
+            }
+            for i in 0..self.delayed.len() {
+                self.set_inputs(self.delayed[i])?;
+            }
+            recorder.row(k, time, &self.values);
+            for i in 0..self.delayed.len() {
+                self.members[self.delayed[i]].slave.do_step(time, step)?;
+            }
+            for c in 0..self.members.len() {
+                self.read_states(c, self.grid.time(k + 1))?;
+            }
+        }
+        // Feedthrough outputs at the stop time, for FMUs that compute them on reading.
+        let (k, time) = (self.grid.steps(), self.stop_time);
+        for i in 0..self.direct.len() {
+            let c = self.direct[i];
+            self.set_inputs(c)?;
+            self.read_direct(c, time)?;
+        }
+        for i in 0..self.delayed.len() {
+            self.set_inputs(self.delayed[i])?;
+        }
+        recorder.row(k, time, &self.values);
+        Ok(())
+    }
+
+    fn run_jacobi(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
+        for c in 0..self.members.len() {
+            self.read_direct(c, self.start_time)?;
+        }
+        for k in 0..self.grid.steps() {
+            let (time, step) = (self.grid.time(k), self.grid.step(k));
+            for c in 0..self.members.len() {
+                self.set_inputs(c)?;
+            }
+            recorder.row(k, time, &self.values);
+            for member in &mut self.members {
+                member.slave.do_step(time, step)?;
+            }
+            for c in 0..self.members.len() {
+                self.read_states(c, self.grid.time(k + 1))?;
+                self.read_direct(c, self.grid.time(k + 1))?;
+            }
+        }
+        for c in 0..self.members.len() {
+            self.set_inputs(c)?;
+        }
+        recorder.row(self.grid.steps(), self.stop_time, &self.values);
+        Ok(())
+    }
+
+    /// Start values, then initialisation mode: outputs and inputs are passed on until nothing
+    /// changes, at most once for each component (enough wherever there is no loop).
+    fn initialise(&mut self) -> Result<(), Error> {
+        self.notes.truncate(self.standing_notes);
+        self.reported.fill(false);
+        for member in &mut self.members {
+            if self.used {
+                member.slave.reset()?;
+            }
+            member.slave.setup_experiment(self.start_time, self.stop_time)?;
+            for start in &member.starts {
+                match *start {
+                    Start::Real(reference, value) => member.slave.set_real(&[reference], &[value])?,
+                    Start::Integer(reference, value) => member.slave.set_integer(&[reference], &[value])?,
+                    Start::Boolean(reference, value) => member.slave.set_boolean(&[reference], &[value])?,
+                }
+            }
+            member.slave.enter_initialization_mode()?;
+        }
+        self.used = true;
+        let mut before: Vec<f64> = Vec::new();
+        for _ in 0..=self.members.len() {
+            for member in &mut self.members {
+                member.states.read(&mut member.slave, &mut self.values)?;
+            }
+            for i in 0..self.direct.len() {
+                let c = self.direct[i];
+                self.set_inputs(c)?;
+                let member = &mut self.members[c];
+                member.direct.read(&mut member.slave, &mut self.values)?;
+            }
+            for i in 0..self.delayed.len() {
+                self.set_inputs(self.delayed[i])?;
+            }
+            let unchanged = before.len() == self.values.len()
+                && before.iter().zip(&self.values).all(|(a, b)| a.to_bits() == b.to_bits());
+            if unchanged {
+                break;
+            }
+            before.clone_from(&self.values);
+        }
+        for member in &mut self.members {
+            member.slave.exit_initialization_mode()?;
+        }
+        for c in 0..self.members.len() {
+            self.read_states(c, self.start_time)?;
+        }
+        Ok(())
+    }
+
+    fn set_inputs(&mut self, c: usize) -> Result<(), Error> {
+        let member = &mut self.members[c];
+        for source in &member.sources {
+            source.transfer(&mut self.values);
+        }
+        member.inputs.write(&mut member.slave, &self.values)
+    }
+
+    fn read_states(&mut self, c: usize, time: f64) -> Result<(), Error> {
+        let member = &mut self.members[c];
+        member.states.read(&mut member.slave, &mut self.values)?;
+        let slots = member.states.real_slots();
+        self.check_finite(slots, time);
+        Ok(())
+    }
+
+    fn read_direct(&mut self, c: usize, time: f64) -> Result<(), Error> {
+        let member = &mut self.members[c];
+        member.direct.read(&mut member.slave, &mut self.values)?;
+        let slots = member.direct.real_slots();
+        self.check_finite(slots, time);
+        Ok(())
+    }
+
+    fn check_finite(&mut self, slots: std::ops::Range<usize>, time: f64) {
+        if !self.values[slots.clone()].iter().all(|value| value.is_finite()) {
+            self.report_not_finite(slots, time);
+        }
+    }
+
+    #[cold]
+    fn report_not_finite(&mut self, slots: std::ops::Range<usize>, time: f64) {
+        for slot in slots {
+            if !self.values[slot].is_finite() && !self.reported[slot] {
+                self.reported[slot] = true;
+                let (name, value, time) = (&self.names[slot], self.values[slot], brief_time(time));
+                self.notes
+                    .push(format!("{name} is {value} at t = {time} s for the first time; the run goes on"));
+            }
+        }
+    }
+
+    fn note_shortened_step(&mut self) {
+        let Some(last) = self.grid.shortened() else { return };
+        for member in &self.members {
+            if !member.slave.fmu().description().capabilities.can_handle_variable_communication_step_size {
+                let name = member.slave.name();
+                self.notes.push(format!(
+                    "the last step is {last} s long, but the FMU of {name} does not say that it can handle steps \
+                     of different length"
+                ));
+            }
+        }
+    }
+}

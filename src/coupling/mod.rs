@@ -1,0 +1,17 @@
+//! Couples FMUs: a system file says which FMUs, how they are wired and for how long; a fixed-step
+//! master runs them and records. Knows FMUs only through [`crate::host`].
+
+mod graph;
+mod grid;
+mod layout;
+mod master;
+mod network;
+mod ports;
+mod system;
+
+pub use grid::Grid;
+pub use master::{Outcome, Simulation, Statistics};
+pub use system::{
+    ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
+    StartValue, System, TimePicture, Variant,
+};

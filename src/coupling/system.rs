@@ -1,0 +1,502 @@
+//! The system file: TOML text to a checked [`System`]. Everything that can be checked without
+//! opening an FMU is checked here; the rest in `network`.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use punctual_fmu::configuration::{ConfigurationError, read_toml};
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
+
+use crate::error::Error;
+
+/// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
+/// so its numbers are in range and its component names are unique.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct System {
+    experiment: Experiment,
+    component: Vec<Component>,
+    #[serde(default)]
+    connection: Vec<Connection>,
+    #[serde(default)]
+    connect_by_name: Vec<ByName>,
+    #[serde(default)]
+    record: Record,
+    #[serde(default)]
+    plot: Vec<Picture>,
+}
+
+/// When, in which steps and in which order.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// Start time in seconds, finite; default 0.
+    #[serde(default)]
+    pub start_time: f64,
+    /// Stop time in seconds, finite, after the start time.
+    pub stop_time: f64,
+    /// Communication step in seconds, finite, > 0.
+    pub step: f64,
+    /// Order of calls within a communication step; default Gauss–Seidel.
+    #[serde(default)]
+    pub order: Order,
+}
+
+/// Order of calls within a communication step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// Components with direct feedthrough first, in the order of the signals: no delay.
+    #[default]
+    GaussSeidel,
+    /// All components at once on the values of the last communication point: feedthrough outputs
+    /// act one step late.
+    Jacobi,
+}
+
+/// An instance of an FMU.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Component {
+    /// Its name: unique, not empty, without a dot.
+    pub name: String,
+    /// Its FMU, relative to the folder of the system file.
+    pub fmu: String,
+    /// Start values of parameters and inputs, in the variable's unit.
+    #[serde(default)]
+    pub start: BTreeMap<String, StartValue>,
+}
+
+/// A start value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartValue {
+    /// For a Real variable.
+    Real(f64),
+    /// For an Integer, Enumeration or Real variable.
+    Integer(i64),
+    /// For a Boolean variable.
+    Boolean(bool),
+}
+
+impl<'de> Deserialize<'de> for StartValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Expected;
+        impl<'de> Visitor<'de> for Expected {
+            type Value = StartValue;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or true or false")
+            }
+            fn visit_f64<E>(self, value: f64) -> Result<StartValue, E> {
+                Ok(StartValue::Real(value))
+            }
+            fn visit_i64<E>(self, value: i64) -> Result<StartValue, E> {
+                Ok(StartValue::Integer(value))
+            }
+            fn visit_bool<E>(self, value: bool) -> Result<StartValue, E> {
+                Ok(StartValue::Boolean(value))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, _: A) -> Result<StartValue, A::Error> {
+                Err(serde::de::Error::custom(
+                    "expected a number or true or false; a name with dots needs quotes: \"x0.x_p\" = 1.0",
+                ))
+            }
+        }
+        deserializer.deserialize_any(Expected)
+    }
+}
+
+/// One signal from an output to an input: `to = factor · from + offset`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Connection {
+    /// `component.variable` of an output.
+    pub from: String,
+    /// `component.variable` of an input.
+    pub to: String,
+    /// Factor, finite, in units of the input per unit of the output; default 1. Real signals only.
+    #[serde(default = "one")]
+    pub factor: f64,
+    /// Offset, finite, in the unit of the input; default 0. Real signals only.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+/// Connects every output of one component to the input of equal name of the other, both ways.
+/// An explicit [`Connection`] to the same input wins.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ByName {
+    /// The two components.
+    pub components: [String; 2],
+}
+
+/// What is recorded.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Communication steps per row, ≥ 1; default 1. The last point is always recorded.
+    #[serde(default = "one_step")]
+    pub every: u64,
+    /// The signals, as `component.variable`; default all outputs and all connected inputs.
+    pub signals: Option<Vec<String>>,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self { every: 1, signals: None }
+    }
+}
+
+/// A picture drawn from the recording after the run.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Picture {
+    /// Paths in a plane.
+    Path(PathPicture),
+    /// Signals over time.
+    Time(TimePicture),
+}
+
+impl Picture {
+    /// The name given for its file, if any.
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Path(picture) => picture.name.as_deref(),
+            Self::Time(picture) => picture.name.as_deref(),
+        }
+    }
+}
+
+/// Paths in a plane, with equal axes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathPicture {
+    /// Its file is `<system>-<name>.svg`; default the number of the picture.
+    pub name: Option<String>,
+    /// Title; default none.
+    pub title: Option<String>,
+    /// The signal along x.
+    pub x: String,
+    /// The signal along y.
+    pub y: String,
+    /// The legend entry of this path; default the component's name.
+    pub label: Option<String>,
+    /// A signal; the path is marked where it is first true (not 0).
+    pub arrival: Option<String>,
+    /// Further paths.
+    #[serde(default)]
+    pub more: Vec<PathEntry>,
+    /// Discs drawn beneath.
+    #[serde(default)]
+    pub discs: Vec<DiscEntry>,
+}
+
+/// A further path of a [`PathPicture`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathEntry {
+    /// The signal along x.
+    pub x: String,
+    /// The signal along y.
+    pub y: String,
+    /// The legend entry; default the component's name.
+    pub label: Option<String>,
+    /// A signal; the path is marked where it is first true (not 0).
+    pub arrival: Option<String>,
+}
+
+/// A disc of a [`PathPicture`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiscEntry {
+    /// Its centre, in the units of the axes, finite.
+    pub centre: [f64; 2],
+    /// Its radius, in the units of the axes, finite, > 0.
+    pub radius: f64,
+    /// Its legend entry; default none.
+    pub label: Option<String>,
+}
+
+/// Signals over time.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimePicture {
+    /// Its file is `<system>-<name>.svg`; default the number of the picture.
+    pub name: Option<String>,
+    /// Title; default none.
+    pub title: Option<String>,
+    /// The signals drawn as lines, as `component.variable`.
+    pub signals: Vec<String>,
+    /// Signals drawn as dashed lines.
+    #[serde(default)]
+    pub dashed: Vec<String>,
+    /// The label of the y axis; default the unit, where all signals share one.
+    pub ylabel: Option<String>,
+    /// A vertical line at this time in seconds, finite.
+    pub deadline: Option<f64>,
+    /// Horizontal lines at these values, finite.
+    #[serde(default)]
+    pub bounds: Vec<f64>,
+    /// Whether the y axis is linear, cut to the bulk of the values, or logarithmic; default linear.
+    #[serde(default)]
+    pub scale: Variant,
+}
+
+/// The y axis of a [`TimePicture`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// All values, linear.
+    #[default]
+    Linear,
+    /// Linear, without the rare extremes; what is cut off is said in the picture.
+    Clipped,
+    /// Logarithm of the absolute values.
+    Log,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn one_step() -> u64 {
+    1
+}
+
+impl System {
+    /// Reads and checks the text of a system file.
+    ///
+    /// # Errors
+    ///
+    /// Text that is not TOML, unknown or missing keys, values of the wrong type or out of range,
+    /// component names that are empty, have a dot or are used twice: each with the field.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        let system: Self = read_toml(text)?;
+        system.check()?;
+        Ok(system)
+    }
+
+    /// Reads and checks the system file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or as for [`System::parse`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+        Self::parse(&text).map_err(|e| e.in_file(path))
+    }
+
+    /// When, in which steps and in which order.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
+    }
+
+    /// The components, in the file's order.
+    pub fn components(&self) -> &[Component] {
+        &self.component
+    }
+
+    /// The explicit connections.
+    pub fn connections(&self) -> &[Connection] {
+        &self.connection
+    }
+
+    /// The pairs connected by name.
+    pub fn by_name(&self) -> &[ByName] {
+        &self.connect_by_name
+    }
+
+    /// What is recorded.
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// The pictures asked for.
+    pub fn pictures(&self) -> &[Picture] {
+        &self.plot
+    }
+
+    fn check(&self) -> Result<(), ConfigurationError> {
+        let Experiment { start_time, stop_time, step, .. } = self.experiment;
+        finite("experiment.start_time", start_time)?;
+        finite("experiment.stop_time", stop_time)?;
+        finite("experiment.step", step)?;
+        ensure(stop_time > start_time, "experiment.stop_time", || {
+            format!("is {stop_time} s; must be after start_time = {start_time} s")
+        })?;
+        ensure(step > 0.0, "experiment.step", || format!("is {step} s; must be > 0"))?;
+        let steps = (stop_time - start_time) / step;
+        ensure(steps <= super::grid::MAX_STEPS, "experiment.step", || {
+            format!(
+                "is {step} s, which makes {steps:.3e} steps; at most {:e} are allowed",
+                super::grid::MAX_STEPS
+            )
+        })?;
+        self.check_components()?;
+        for (i, connection) in self.connection.iter().enumerate() {
+            finite(&format!("connection[{i}].factor"), connection.factor)?;
+            finite(&format!("connection[{i}].offset"), connection.offset)?;
+        }
+        ensure(self.record.every >= 1, "record.every", || "is 0; must be ≥ 1".to_owned())?;
+        self.plot.iter().enumerate().try_for_each(|(i, picture)| check_picture(i, picture))
+    }
+
+    fn check_components(&self) -> Result<(), ConfigurationError> {
+        ensure(!self.component.is_empty(), "component", || "at least one component is needed".to_owned())?;
+        for (i, Component { name, fmu, start }) in self.component.iter().enumerate() {
+            let field = format!("component[{i}].name");
+            ensure(!name.is_empty(), &field, || "is empty; must be a name".to_owned())?;
+            ensure(!name.contains(['.', '\0']), &field, || format!("is {name:?}; must not contain a dot"))?;
+            let first = self.component.iter().position(|other| other.name == *name).unwrap_or(i);
+            ensure(first == i, &field, || format!("{name:?} is also the name of component[{first}]"))?;
+            ensure(!fmu.is_empty(), &format!("component[{i}].fmu"), || {
+                "is empty; must be a file".to_owned()
+            })?;
+            for (variable, value) in start {
+                if let StartValue::Real(value) = value {
+                    finite(&format!("component[{i}].start.{variable:?}"), *value)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_picture(i: usize, picture: &Picture) -> Result<(), ConfigurationError> {
+    if let Some(name) = picture.name() {
+        ensure(!name.is_empty() && !name.contains(['/', '\\', '\0']), &format!("plot[{i}].name"), || {
+            format!("is {name:?}; must be part of a file name")
+        })?;
+    }
+    match picture {
+        Picture::Path(path) => {
+            for (j, disc) in path.discs.iter().enumerate() {
+                finite(&format!("plot[{i}].discs[{j}].centre[0]"), disc.centre[0])?;
+                finite(&format!("plot[{i}].discs[{j}].centre[1]"), disc.centre[1])?;
+                let radius = format!("plot[{i}].discs[{j}].radius");
+                finite(&radius, disc.radius)?;
+                ensure(disc.radius > 0.0, &radius, || format!("is {}; must be > 0", disc.radius))?;
+            }
+        }
+        Picture::Time(time) => {
+            ensure(
+                !time.signals.is_empty() || !time.dashed.is_empty(),
+                &format!("plot[{i}].signals"),
+                || "at least one signal is needed".to_owned(),
+            )?;
+            for (j, bound) in time.bounds.iter().enumerate() {
+                finite(&format!("plot[{i}].bounds[{j}]"), *bound)?;
+            }
+            if let Some(deadline) = time.deadline {
+                finite(&format!("plot[{i}].deadline"), deadline)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn ensure(kept: bool, field: &str, message: impl FnOnce() -> String) -> Result<(), ConfigurationError> {
+    if kept { Ok(()) } else { Err(ConfigurationError::new(field, message())) }
+}
+
+fn finite(field: &str, value: f64) -> Result<(), ConfigurationError> {
+    ensure(value.is_finite(), field, || format!("is {value}; must be finite"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VALID: &str = r#"
+[experiment]
+stop_time = 2.0
+step = 0.5
+
+[[component]]
+name = "a"
+fmu = "a.fmu"
+start = { "goal.deadline" = 5.0, n = 3, on = true }
+
+[[component]]
+name = "b"
+fmu = "b.fmu"
+
+[[connection]]
+from = "a.y"
+to = "b.u"
+
+[record]
+every = 2
+
+[[plot]]
+kind = "path"
+x = "a.x"
+y = "a.y"
+discs = [{ centre = [45, 45], radius = 2, label = "goal" }]
+
+[[plot]]
+kind = "time"
+signals = ["a.y"]
+"#;
+
+    #[test]
+    fn a_valid_file_is_read_with_its_defaults() {
+        let system = System::parse(VALID).unwrap();
+        assert_eq!(system.experiment().order, Order::GaussSeidel);
+        assert_eq!(system.experiment().start_time, 0.0);
+        assert_eq!(system.connections()[0].factor, 1.0);
+        assert_eq!(system.components()[0].start["goal.deadline"], StartValue::Real(5.0));
+        assert_eq!(system.components()[0].start["n"], StartValue::Integer(3));
+        assert_eq!(system.components()[0].start["on"], StartValue::Boolean(true));
+        assert_eq!(system.pictures().len(), 2);
+    }
+
+    #[test]
+    fn each_defect_is_told_with_its_field() {
+        let defects = [
+            (
+                "stop_time = 2.0",
+                "stop_time = 0.0",
+                "experiment.stop_time: is 0 s; must be after start_time = 0 s",
+            ),
+            ("stop_time = 2.0", "stop_time = nan", "experiment.stop_time: is NaN; must be finite"),
+            ("stop_time = 2.0", "", "missing field `stop_time`"),
+            ("step = 0.5", "step = -0.5", "experiment.step: is -0.5 s; must be > 0"),
+            (
+                "step = 0.5",
+                "step = 1e-30",
+                "experiment.step: is 0.000000000000000000000000000001 s, which makes",
+            ),
+            ("step = 0.5", "step = 0.5\nsteps = 1", "unknown field `steps`"),
+            ("step = 0.5", "step = 0.5\norder = \"random\"", "unknown variant `random`"),
+            ("name = \"b\"", "name = \"a\"", "component[1].name: \"a\" is also the name of component[0]"),
+            ("name = \"b\"", "name = \"\"", "component[1].name: is empty"),
+            ("name = \"b\"", "name = \"b.c\"", "component[1].name: is \"b.c\"; must not contain a dot"),
+            ("fmu = \"b.fmu\"", "fmu = \"\"", "component[1].fmu: is empty"),
+            ("5.0", "inf", "component[0].start.\"goal.deadline\": is inf; must be finite"),
+            ("\"goal.deadline\" = 5.0", "goal.deadline = 5.0", "a name with dots needs quotes"),
+            (
+                "on = true",
+                "on = \"true\"",
+                "invalid type: string \"true\", expected a number or true or false",
+            ),
+            ("to = \"b.u\"", "to = \"b.u\"\nfactor = nan", "connection[0].factor: is NaN; must be finite"),
+            ("every = 2", "every = 0", "record.every: is 0; must be ≥ 1"),
+            ("radius = 2", "radius = 0", "plot[0].discs[0].radius: is 0; must be > 0"),
+            ("signals = [\"a.y\"]", "signals = []", "plot[1].signals: at least one signal is needed"),
+            (
+                "signals = [\"a.y\"]",
+                "signals = [\"a.y\"]\nname = \"../x\"",
+                "plot[1].name: is \"../x\"; must be part",
+            ),
+            ("kind = \"time\"", "kind = \"pie\"", "unknown variant `pie`"),
+        ];
+        for (valid, broken, expected) in defects {
+            assert!(VALID.contains(valid), "{valid}");
+            let message = System::parse(&VALID.replacen(valid, broken, 1)).unwrap_err().to_string();
+            assert!(message.contains(expected), "{broken}: {message}");
+        }
+    }
+}

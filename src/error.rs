@@ -1,0 +1,214 @@
+//! The one error type of the command line's library: what went wrong, with the names and numbers
+//! needed to mend it, and which exit code it means.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use punctual_fmu::configuration::ConfigurationError;
+
+use crate::host::{LogMessage, Status};
+
+/// Something that keeps the command from being carried out.
+#[derive(Debug)]
+pub struct Error(Box<Kind>);
+
+#[derive(Debug)]
+enum Kind {
+    Configuration { file: Option<PathBuf>, error: ConfigurationError },
+    Io { action: &'static str, path: PathBuf, source: io::Error },
+    Fmu { path: PathBuf, problem: FmuProblem },
+    Call(CallFailure),
+    Plot { path: PathBuf, message: String },
+}
+
+/// Why an `.fmu` file cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FmuProblem {
+    /// Not a zip archive, or a damaged one; with the reason.
+    Archive(String),
+    /// An entry of this name would be written outside the folder it is unpacked to.
+    UnsafeEntry(String),
+    /// The model description is missing, not FMI 2.0, or malformed; with the reason.
+    Description(String),
+    /// It offers no co-simulation interface.
+    NoCoSimulation,
+    /// Its model identifier is not a C identifier, so it names no library.
+    ModelIdentifier(String),
+    /// No shared library for this platform.
+    NoBinary {
+        /// The folder looked for, such as `linux64`.
+        wanted: &'static str,
+        /// The folders present.
+        present: Vec<String>,
+    },
+    /// The shared library cannot be loaded; with the loader's words.
+    Load(String),
+    /// The shared library lacks a function that co-simulation needs.
+    MissingSymbol(&'static str),
+    /// `fmi2GetVersion` or `fmi2GetTypesPlatform` gave something else than FMI 2.0.
+    Version {
+        /// The function asked.
+        call: &'static str,
+        /// What it answered.
+        answer: String,
+    },
+}
+
+impl fmt::Display for FmuProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Archive(reason) => write!(f, "not a readable FMU archive: {reason}"),
+            Self::UnsafeEntry(entry) => {
+                write!(f, "refused, because the archive entry {entry:?} points out of the archive")
+            }
+            Self::Description(reason) => write!(f, "modelDescription.xml: {reason}"),
+            Self::NoCoSimulation => f.write_str("has no co-simulation interface (no CoSimulation element)"),
+            Self::ModelIdentifier(name) => write!(f, "modelIdentifier {name:?} is not a C identifier"),
+            Self::NoBinary { wanted, present } if present.is_empty() => {
+                write!(f, "holds no binary at all, so none for {wanted}")
+            }
+            Self::NoBinary { wanted, present } => {
+                write!(f, "holds no binary for {wanted}, only for {}", present.join(", "))
+            }
+            Self::Load(reason) => write!(f, "its library cannot be loaded: {reason}"),
+            Self::MissingSymbol(name) => write!(f, "its library does not export {name}"),
+            Self::Version { call, answer } => write!(f, "{call} answered {answer:?}, not FMI 2.0"),
+        }
+    }
+}
+
+/// An FMI function that did not succeed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CallFailure {
+    /// The FMI function, such as `fmi2DoStep`.
+    pub call: &'static str,
+    /// The instance name.
+    pub instance: String,
+    /// The FMU's file.
+    pub path: PathBuf,
+    /// The communication point of the call, in seconds; `None` before the experiment is set up.
+    pub time: Option<f64>,
+    /// What it returned; `None` where it returned a null instance.
+    pub status: Option<Status>,
+    /// The last log messages of that instance, oldest first.
+    pub log: Vec<LogMessage>,
+}
+
+impl fmt::Display for CallFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {} ({})", self.call, self.instance, self.path.display())?;
+        if let Some(time) = self.time {
+            write!(f, " at t = {} s", brief_time(time))?;
+        }
+        match self.status {
+            None => f.write_str(" returned no instance")?,
+            Some(Status::Discard) => {
+                f.write_str(" returned fmi2Discard: it refuses this step, and steps are not retried")?;
+            }
+            Some(Status::Pending) => {
+                f.write_str(" returned fmi2Pending: asynchronous steps are not supported")?;
+            }
+            Some(status) => write!(f, " returned {status}")?,
+        }
+        if self.log.is_empty() {
+            f.write_str("; it logged nothing")?;
+        }
+        self.log.iter().try_for_each(|message| write!(f, "\n  {message}"))
+    }
+}
+
+/// A time in seconds without the rounding error of its last digits.
+pub(crate) fn brief_time(time: f64) -> f64 {
+    let rounded = (time * 1e9).round() / 1e9;
+    if rounded.is_finite() { rounded } else { time }
+}
+
+impl Error {
+    /// A configuration that cannot be used, without the file it came from.
+    pub fn configuration(field: impl Into<String>, message: impl Into<String>) -> Self {
+        ConfigurationError::new(field, message).into()
+    }
+
+    /// A file that cannot be read or written; `action` is the verb, such as `"read"`.
+    pub fn io(action: &'static str, path: &Path, source: io::Error) -> Self {
+        Self(Box::new(Kind::Io { action, path: path.to_owned(), source }))
+    }
+
+    /// An `.fmu` file that cannot be used.
+    pub fn fmu(path: &Path, problem: FmuProblem) -> Self {
+        Self(Box::new(Kind::Fmu { path: path.to_owned(), problem }))
+    }
+
+    /// An FMI function that did not succeed.
+    pub fn call(failure: CallFailure) -> Self {
+        Self(Box::new(Kind::Call(failure)))
+    }
+
+    /// A picture that cannot be drawn.
+    pub fn plot(path: &Path, message: impl Into<String>) -> Self {
+        Self(Box::new(Kind::Plot { path: path.to_owned(), message: message.into() }))
+    }
+
+    /// The same error, naming the configuration file it is about.
+    #[must_use]
+    pub fn in_file(mut self, path: &Path) -> Self {
+        if let Kind::Configuration { file, .. } = &mut *self.0 {
+            file.get_or_insert_with(|| path.to_owned());
+        }
+        self
+    }
+
+    /// The configuration error inside, if it is one.
+    pub fn as_configuration(&self) -> Option<&ConfigurationError> {
+        match &*self.0 {
+            Kind::Configuration { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+
+    /// The failed FMI call inside, if it is one.
+    pub fn as_call(&self) -> Option<&CallFailure> {
+        match &*self.0 {
+            Kind::Call(failure) => Some(failure),
+            _ => None,
+        }
+    }
+
+    /// The exit code: 1 where an FMU is at fault, 2 where usage, configuration or a file is.
+    pub fn exit_code(&self) -> u8 {
+        match &*self.0 {
+            Kind::Fmu { .. } | Kind::Call(_) => 1,
+            Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => 2,
+        }
+    }
+}
+
+impl From<ConfigurationError> for Error {
+    fn from(error: ConfigurationError) -> Self {
+        Self(Box::new(Kind::Configuration { file: None, error }))
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &*self.0 {
+            Kind::Configuration { file: Some(file), error } => write!(f, "{}: {error}", file.display()),
+            Kind::Configuration { file: None, error } => error.fmt(f),
+            Kind::Io { action, path, source } => write!(f, "cannot {action} {}: {source}", path.display()),
+            Kind::Fmu { path, problem } => write!(f, "{}: {problem}", path.display()),
+            Kind::Call(failure) => failure.fmt(f),
+            Kind::Plot { path, message } => write!(f, "cannot draw {}: {message}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match &*self.0 {
+            Kind::Configuration { error, .. } => Some(error),
+            Kind::Io { source, .. } => Some(source),
+            _ => None,
+        }
+    }
+}

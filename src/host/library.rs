@@ -1,0 +1,111 @@
+//! A loaded shared library and the FMI 2.0 functions the host uses, all resolved when loading.
+//! Signatures stand in section 2.1 and 4.2 of the standard; this file trusts libraries to follow them.
+
+use std::ffi::{c_char, c_int, c_void};
+use std::path::Path;
+
+use super::logging::{CallbackFunctions, owned};
+use crate::error::FmuProblem;
+
+pub(super) type Component = *mut c_void;
+pub(super) type ValueReference = u32;
+type Get<T> = unsafe extern "C" fn(Component, *const ValueReference, usize, *mut T) -> c_int;
+type Set<T> = unsafe extern "C" fn(Component, *const ValueReference, usize, *const T) -> c_int;
+type Plain = unsafe extern "C" fn(Component) -> c_int;
+type Text = unsafe extern "C" fn() -> *const c_char;
+
+/// `fmi2CoSimulation` of `fmi2Type`.
+pub(super) const CO_SIMULATION: c_int = 1;
+/// `fmi2True`.
+pub(super) const TRUE: c_int = 1;
+/// `fmi2False`.
+pub(super) const FALSE: c_int = 0;
+
+macro_rules! functions {
+    ($($(#[$doc:meta])* $field:ident: $name:literal, $type:ty;)*) => {
+        /// The functions used, by their standard names.
+        pub(super) struct Functions { $($(#[$doc])* pub(super) $field: $type,)* }
+
+        impl Functions {
+            fn resolve(library: &libloading::Library) -> Result<Self, FmuProblem> {
+                Ok(Self { $($field: {
+                    // SAFETY: the type is the one the standard gives the function of this name.
+                    let symbol = unsafe { library.get::<$type>($name) };
+                    *symbol.map_err(|_| FmuProblem::MissingSymbol($name))?
+                },)* })
+            }
+        }
+    };
+}
+
+functions! {
+    get_types_platform: "fmi2GetTypesPlatform", Text;
+    get_version: "fmi2GetVersion", Text;
+    instantiate: "fmi2Instantiate", unsafe extern "C" fn(
+        *const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int,
+    ) -> Component;
+    free_instance: "fmi2FreeInstance", unsafe extern "C" fn(Component);
+    setup_experiment: "fmi2SetupExperiment", unsafe extern "C" fn(
+        Component, c_int, f64, f64, c_int, f64,
+    ) -> c_int;
+    enter_initialization_mode: "fmi2EnterInitializationMode", Plain;
+    exit_initialization_mode: "fmi2ExitInitializationMode", Plain;
+    terminate: "fmi2Terminate", Plain;
+    reset: "fmi2Reset", Plain;
+    get_real: "fmi2GetReal", Get<f64>;
+    get_integer: "fmi2GetInteger", Get<c_int>;
+    get_boolean: "fmi2GetBoolean", Get<c_int>;
+    set_real: "fmi2SetReal", Set<f64>;
+    set_integer: "fmi2SetInteger", Set<c_int>;
+    set_boolean: "fmi2SetBoolean", Set<c_int>;
+    do_step: "fmi2DoStep", unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
+}
+
+/// A loaded library. The functions are valid while it lives.
+pub(super) struct Library {
+    pub(super) functions: Functions,
+    _library: libloading::Library,
+}
+
+impl std::fmt::Debug for Library {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Library")
+    }
+}
+
+impl Library {
+    /// Loads the library, resolves every function used and asks for its version. Its undefined
+    /// symbols are resolved now, so that none is missed in mid-run; its own stay its own.
+    pub(super) fn load(path: &Path) -> Result<Self, FmuProblem> {
+        let library = open(path).map_err(|e| FmuProblem::Load(e.to_string()))?;
+        let functions = Functions::resolve(&library)?;
+        let asked = [
+            ("fmi2GetVersion", functions.get_version, "2."),
+            ("fmi2GetTypesPlatform", functions.get_types_platform, "default"),
+        ];
+        for (call, function, expected) in asked {
+            // SAFETY: the function takes nothing and may be called at any time.
+            let answer = unsafe { function() };
+            // SAFETY: the standard has it return a zero-terminated text; NULL is allowed for.
+            let answer = unsafe { owned(answer) };
+            if !answer.starts_with(expected) {
+                return Err(FmuProblem::Version { call, answer });
+            }
+        }
+        Ok(Self { functions, _library: library })
+    }
+}
+
+#[cfg(unix)]
+fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
+    let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }?;
+    Ok(library.into())
+}
+
+#[cfg(not(unix))]
+fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
+    // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
+    unsafe { libloading::Library::new(path) }
+}

@@ -1,0 +1,179 @@
+//! What an FMU says through its logger: the callbacks handed to `fmi2Instantiate`, and the last
+//! messages kept for error texts. Knows nothing of calls and their order.
+
+use std::collections::VecDeque;
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::fmt;
+use std::rc::Rc;
+use std::sync::{Mutex, PoisonError};
+
+use super::Status;
+
+/// Messages kept per instance; older ones are dropped.
+const KEPT: usize = 8;
+
+/// One message of an FMU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogMessage {
+    /// The status the FMU gave with it.
+    pub status: Status,
+    /// The log category, empty where the FMU gave none.
+    pub category: String,
+    /// The finished text, at most 2047 bytes of it.
+    pub text: String,
+}
+
+impl fmt::Display for LogMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "[{}", self.status)?;
+        if !self.category.is_empty() {
+            write!(f, ", {}", self.category)?;
+        }
+        write!(f, "] {}", self.text)
+    }
+}
+
+type Receive = unsafe extern "C" fn(*const Environment, *const c_char, c_int, *const c_char, *const c_char);
+
+/// What `componentEnvironment` points to. `logger.c` reads the first member.
+#[repr(C)]
+pub(super) struct Environment {
+    receive: Receive,
+    // An FMU may log from a thread of its own.
+    messages: Mutex<VecDeque<LogMessage>>,
+}
+
+/// `fmi2CallbackFunctions` of the standard, section 2.1.5.
+#[repr(C)]
+pub(super) struct CallbackFunctions {
+    logger: *const c_void,
+    allocate_memory: unsafe extern "C" fn(usize, usize) -> *mut c_void,
+    free_memory: unsafe extern "C" fn(*mut c_void),
+    step_finished: *const c_void,
+    component_environment: *const Environment,
+}
+
+unsafe extern "C" {
+    /// Defined in `logger.c`; only its address is used here.
+    fn punctual_host_logger();
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(pointer: *mut c_void);
+}
+
+/// The callbacks of one instance and the messages it sent. Must outlive the instance.
+pub(super) struct Logging {
+    environment: Rc<Environment>,
+    callbacks: Rc<CallbackFunctions>,
+}
+
+impl Logging {
+    pub(super) fn new() -> Self {
+        let environment =
+            Rc::new(Environment { receive, messages: Mutex::new(VecDeque::with_capacity(KEPT)) });
+        let callbacks = Rc::new(CallbackFunctions {
+            logger: punctual_host_logger as *const c_void,
+            allocate_memory: calloc,
+            free_memory: free,
+            step_finished: std::ptr::null(),
+            component_environment: Rc::as_ptr(&environment),
+        });
+        Self { environment, callbacks }
+    }
+
+    /// The address for `fmi2Instantiate`; valid and unmoved while `self` lives.
+    pub(super) fn callbacks(&self) -> *const CallbackFunctions {
+        Rc::as_ptr(&self.callbacks)
+    }
+
+    /// The messages kept, oldest first.
+    pub(super) fn messages(&self) -> Vec<LogMessage> {
+        let messages = self.environment.messages.lock().unwrap_or_else(PoisonError::into_inner);
+        messages.iter().cloned().collect()
+    }
+}
+
+/// Called by `logger.c` with finished text.
+///
+/// # Safety
+///
+/// `environment` is one that [`Logging`] made and still holds; every text is NULL or ends in a zero byte.
+unsafe extern "C" fn receive(
+    environment: *const Environment,
+    _instance: *const c_char,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: by contract the environment lives; it is only ever shared.
+    let Some(environment) = (unsafe { environment.as_ref() }) else { return };
+    // SAFETY: by contract NULL or zero-terminated.
+    let category = unsafe { owned(category) };
+    // SAFETY: as above.
+    let text = unsafe { owned(text) };
+    let mut messages = environment.messages.lock().unwrap_or_else(PoisonError::into_inner);
+    if messages.len() == KEPT {
+        messages.pop_front();
+    }
+    messages.push_back(LogMessage {
+        status: Status::from_code(status),
+        category,
+        text: text.trim_end().into(),
+    });
+}
+
+/// A copy of a C text, invalid UTF-8 replaced; empty for NULL.
+///
+/// # Safety
+///
+/// `text` is NULL or ends in a zero byte.
+pub(super) unsafe fn owned(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: not NULL, zero-terminated by contract.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Logger =
+        unsafe extern "C" fn(*const Environment, *const c_char, c_int, *const c_char, *const c_char, ...);
+
+    fn logger() -> Logger {
+        // SAFETY: the C function has this signature.
+        unsafe { std::mem::transmute::<*const c_void, Logger>(punctual_host_logger as *const c_void) }
+    }
+
+    #[test]
+    fn formats_and_tolerates_null_and_strange_statuses() {
+        let logging = Logging::new();
+        let environment = Rc::as_ptr(&logging.environment);
+        let null = std::ptr::null();
+        let (instance, category, format) = (c"i".as_ptr(), c"logError".as_ptr(), c"%s is %d".as_ptr());
+        // SAFETY: the environment lives; texts are literals; arguments match the format.
+        unsafe { logger()(environment, instance, 3, category, format, c"n".as_ptr(), 7) };
+        // SAFETY: as above.
+        unsafe { logger()(environment, null, -5, null, null) };
+        // SAFETY: a NULL environment is allowed.
+        unsafe { logger()(null.cast(), null, 0, null, c"lost".as_ptr()) };
+        let messages = logging.messages();
+        assert_eq!(messages.len(), 2);
+        assert_eq!(messages[0].to_string(), "[fmi2Error, logError] n is 7");
+        assert_eq!(messages[1].to_string(), "[unknown status -5] ");
+    }
+
+    #[test]
+    fn keeps_the_last_messages_and_bounds_their_length() {
+        let logging = Logging::new();
+        let environment = Rc::as_ptr(&logging.environment);
+        let long = std::ffi::CString::new("x".repeat(10_000)).unwrap();
+        for _ in 0..3 * KEPT {
+            // SAFETY: the environment lives; the text has no conversion.
+            unsafe { logger()(environment, std::ptr::null(), 0, std::ptr::null(), long.as_ptr()) };
+        }
+        assert_eq!(logging.messages().len(), KEPT);
+        assert_eq!(logging.messages()[0].text.len(), 2047);
+    }
+}

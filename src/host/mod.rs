@@ -1,0 +1,130 @@
+//! A host for FMI 2.0 co-simulation FMUs: unpack, describe, load, instantiate, call. The only
+//! module of this crate with unsafe code; everything it offers is safe, as far as the FMU itself
+//! keeps to the standard. Knows nothing of coupling.
+
+mod archive;
+mod description;
+mod library;
+mod logging;
+mod slave;
+
+use std::cell::OnceCell;
+use std::ffi::c_int;
+use std::fmt;
+use std::path::Path;
+
+pub use archive::PLATFORM;
+pub use description::{
+    Capabilities, Causality, DefaultExperiment, Description, Item, Kind, Output, Variability, Variable,
+};
+pub use logging::LogMessage;
+pub use slave::Slave;
+
+use archive::Archive;
+use library::Library;
+
+use crate::error::{Error, FmuProblem};
+
+/// What an FMI 2.0 function returns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Done.
+    Ok,
+    /// Done, with a remark in the log.
+    Warning,
+    /// Not done; the instance is as before.
+    Discard,
+    /// Not done; the instance can only be reset or freed.
+    Error,
+    /// Not done; no instance of this FMU can be used any more.
+    Fatal,
+    /// Still being done (asynchronous steps).
+    Pending,
+    /// A number the standard does not know.
+    Unknown(c_int),
+}
+
+impl Status {
+    fn from_code(code: c_int) -> Self {
+        match code {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            3 => Self::Error,
+            4 => Self::Fatal,
+            5 => Self::Pending,
+            other => Self::Unknown(other),
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ok => "fmi2OK",
+            Self::Warning => "fmi2Warning",
+            Self::Discard => "fmi2Discard",
+            Self::Error => "fmi2Error",
+            Self::Fatal => "fmi2Fatal",
+            Self::Pending => "fmi2Pending",
+            Self::Unknown(code) => return write!(f, "unknown status {code}"),
+        })
+    }
+}
+
+/// An FMU: its archive unpacked, its description read, its library loaded when first needed.
+#[derive(Debug)]
+pub struct Fmu {
+    description: Description,
+    // Dropped before the archive: the library is unloaded before its file goes.
+    library: OnceCell<Library>,
+    archive: Archive,
+}
+
+impl Fmu {
+    /// Unpacks and reads the FMU at `path`; nothing of it is run.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, is not a sound archive, or its description is missing, malformed,
+    /// not of FMI 2.0, or without a co-simulation interface.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let archive = Archive::open(path)?;
+        let description =
+            Description::read(&archive.model_description()).map_err(|problem| Error::fmu(path, problem))?;
+        Ok(Self { description, library: OnceCell::new(), archive })
+    }
+
+    /// The file it was read from.
+    pub fn path(&self) -> &Path {
+        self.archive.source()
+    }
+
+    /// What its model description says.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// The platforms it has binaries for, such as `linux64`; sorted.
+    pub fn platforms(&self) -> &[String] {
+        self.archive.platforms()
+    }
+
+    /// Its shared library, loaded at the first call.
+    fn library(&self) -> Result<&Library, Error> {
+        if let Some(library) = self.library.get() {
+            return Ok(library);
+        }
+        let path = self.archive.library(&self.description.model_identifier);
+        if !path.is_file() {
+            let present = self.archive.platforms().to_vec();
+            return Err(Error::fmu(self.path(), FmuProblem::NoBinary { wanted: PLATFORM, present }));
+        }
+        let library = Library::load(&path).map_err(|problem| Error::fmu(self.path(), problem))?;
+        Ok(self.library.get_or_init(|| library))
+    }
+
+    fn resource_location(&self) -> String {
+        self.archive.resource_location()
+    }
+}

@@ -1,0 +1,30 @@
+//! The library behind the `punctual` command line: a host for FMI 2.0 co-simulation FMUs, the
+//! engine that couples them, recordings and pictures. `main.rs` only parses arguments.
+//!
+//! Each module uses only modules above it (`error` only names the statuses of `host`):
+//!
+//! ```text
+//! error                what went wrong, with names and numbers
+//! host                 one FMU: archive, description, library, instance
+//! recording            what a run leaves behind; CSV
+//! coupling             several FMUs: system file, order, fixed-step master
+//! plot                 pictures of series; knows no FMU
+//! pictures             from a system file's plots and a recording to pictures
+//! package              from a configuration to an .fmu file
+//! demo                 the demonstration: three plants, two methods
+//! output               the one place that prints
+//! command              one thin function per subcommand
+//! ```
+#![deny(unsafe_code)]
+
+pub mod command;
+pub mod coupling;
+pub mod demo;
+pub mod error;
+#[expect(unsafe_code, reason = "FMUs are shared libraries called through C")]
+pub mod host;
+pub mod output;
+pub mod package;
+pub mod pictures;
+pub mod plot;
+pub mod recording;

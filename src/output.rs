@@ -1,0 +1,159 @@
+//! The one place that prints: results on stdout, talk and progress on stderr. A reader that went
+//! away (a closed pipe) is no error.
+
+use std::io::{self, IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Prints a result: `text` and a line break, on stdout.
+pub fn result(text: &str) {
+    let mut out = io::stdout().lock();
+    // Nobody is left to tell if this fails.
+    let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+}
+
+/// Prints a result as JSON on stdout.
+pub fn json(value: &impl serde::Serialize) {
+    match serde_json::to_string_pretty(value) {
+        Ok(text) => result(&text),
+        Err(error) => note(&format!("cannot be written as JSON: {error}")),
+    }
+}
+
+/// Says something that is not a result, on stderr.
+pub fn note(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Says what went wrong, on stderr.
+pub fn error(error: &dyn std::fmt::Display) {
+    note(&format!("error: {error}"));
+}
+
+/// A progress bar on stderr that shows after a second, and only on a terminal.
+#[derive(Debug)]
+pub struct Progress {
+    message: String,
+    begin: Instant,
+    calls: u64,
+    bar: Option<ProgressBar>,
+    wanted: bool,
+}
+
+/// Calls of [`Progress::update`] between two looks at the clock.
+const CALLS: u64 = 512;
+/// How long a run takes before the bar shows.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Parts the bar is divided into.
+const PARTS: u64 = 1000;
+
+impl Progress {
+    /// A bar for work named `message`.
+    pub fn new(message: impl Into<String>) -> Self {
+        let wanted = io::stderr().is_terminal();
+        Self { message: message.into(), begin: Instant::now(), calls: 0, bar: None, wanted }
+    }
+
+    /// Says that `fraction` (0 to 1) is done. Cheap enough for every step.
+    pub fn update(&mut self, fraction: f64) {
+        self.calls += 1;
+        if !self.wanted || !self.calls.is_multiple_of(CALLS) {
+            return;
+        }
+        if self.bar.is_none() && self.begin.elapsed() > PATIENCE {
+            let bar =
+                ProgressBar::new(PARTS).with_message(self.message.clone()).with_elapsed(self.begin.elapsed());
+            // The template is a constant; with a broken one the default style stays.
+            if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %  {eta} left") {
+                bar.set_style(style);
+            }
+            self.bar = Some(bar);
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_position((fraction.clamp(0.0, 1.0) * PARTS as f64) as u64);
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Text columns lined up: the first row is the header; columns marked `true` in `right` are set to
+/// the right.
+pub fn table(rows: &[Vec<String>], right: &[bool]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width =
+        |c: usize| rows.iter().filter_map(|row| row.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().enumerate().map(|(c, cell)| {
+            let width = widths[c];
+            if right.get(c) == Some(&true) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    let mut lines: Vec<String> = rows.iter().map(line).collect();
+    if lines.len() > 1 {
+        let rule = widths.iter().map(|w| "─".repeat(*w)).collect::<Vec<_>>().join("  ");
+        lines.insert(1, rule);
+    }
+    lines.join("\n")
+}
+
+/// A number for people: six significant digits, powers of ten only where they help.
+pub fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    let size = value.abs();
+    let text = if (1e-4..1e7).contains(&size) {
+        let digits = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+        format!("{value:.digits$}")
+    } else {
+        let text = format!("{value:.5e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{exponent}", trimmed(mantissa));
+    };
+    trimmed(&text).to_owned()
+}
+
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        let cases = [
+            (0.0, "0"),
+            (10.0, "10"),
+            (-31949.7754, "-31949.8"),
+            (0.001, "0.001"),
+            (1.0 / 3.0, "0.333333"),
+            (1.5e-9, "1.5e-9"),
+            (123_456_789.0, "1.23457e8"),
+            (f64::INFINITY, "inf"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [vec!["name".into(), "n".into()], vec!["ä".into(), "10".into()]];
+        assert_eq!(table(&rows, &[false, true]), "name   n\n────  ──\nä     10");
+    }
+}

@@ -1,0 +1,84 @@
+//! `documentation/index.html` of an FMU: what it does, how to couple it, its variables.
+
+use punctual_fmu::configuration::Configuration;
+use punctual_fmu::product::Product;
+use punctual_modeldescription::{ModelDescription, VariableKind};
+
+/// The page.
+pub(super) fn page(product: &Product, description: &ModelDescription, canonical: &str) -> String {
+    let mut rows = String::new();
+    for v in &description.variables {
+        let (unit, start, range) = match &v.kind {
+            VariableKind::Real { start, min, max, unit, .. } => {
+                let text = |value: &Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+                let range = match (min, max) {
+                    (None, None) => String::new(),
+                    _ => format!("{} … {}", text(min), text(max)),
+                };
+                (unit.clone().unwrap_or_default(), text(start), range)
+            }
+            VariableKind::Enumeration { declared_type, .. } => {
+                (String::new(), String::new(), declared_type.clone())
+            }
+            VariableKind::Boolean { start } => {
+                (String::new(), start.map(|s| s.to_string()).unwrap_or_default(), String::new())
+            }
+            _ => Default::default(),
+        };
+        let cells = [&v.name, v.causality.as_str(), &unit, &start, &range, &v.description];
+        let cells: String = cells.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
+        rows += &format!("<tr>{cells}</tr>\n");
+    }
+    let mut enumerations = String::new();
+    for e in &description.enumerations {
+        let items: String = e
+            .items
+            .iter()
+            .map(|i| {
+                format!(
+                    "<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                    i.value,
+                    i.name,
+                    escape(&i.description)
+                )
+            })
+            .collect();
+        enumerations +=
+            &format!("<h2>{}: {}</h2>\n<table>\n{items}</table>\n", e.name, escape(&e.description));
+    }
+    let use_of = match &product.configuration {
+        Configuration::Filter(_) => FILTER,
+        Configuration::Plant(_) => PLANT,
+    };
+    let step = product.configuration.experiment().step_size;
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}</title>\n<style>{STYLE}</style></head>\n\
+         <body>\n<h1>{name}</h1>\n<p>{text}. Made for a communication step of {step} s.</p>\n{use_of}\n\
+         <h2>Variables</h2>\n<table>\n<tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th>\
+         <th>meaning</th></tr>\n{rows}</table>\n{enumerations}<h2>Configuration</h2>\n<pre>{canonical}</pre>\n\
+         <p>{tool}</p>\n</body></html>\n",
+        name = escape(&description.model_name),
+        text = escape(&description.description),
+        canonical = escape(canonical),
+        tool = escape(&description.generation_tool),
+    )
+}
+
+const STYLE: &str = "body{font:15px/1.45 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}\
+                     table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.2em .6em;text-align:left}";
+
+const FILTER: &str = "<p>Connect the measured state to <code>x.*</code>, the wanted input to <code>u_ref.*</code>, and \
+<code>u.*</code> to the plant. The first step with finite inputs is the anchor: every deadline counts from it. \
+An output read after inputs were set belongs to those inputs at that communication point; after a step without new \
+inputs it stays the sample taken at the step's start, which is the input to hold over the step. A master that \
+exchanges all values before stepping (Jacobi) therefore delays <code>u.*</code> by one step.</p>\n\
+<p><code>status</code> says what <code>u.*</code> means; only <code>unchanged</code> and <code>filtered</code> satisfy \
+every constraint. The promise is one of continuous time: between samples the input is held, and the margin has to \
+cover what that costs.</p>";
+
+const PLANT: &str = "<p>Set the initial state through the parameters <code>x0.*</code>. Inputs are held over a step; the \
+step is divided into equal Runge-Kutta steps of at most <code>inner_step</code>.</p>";
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

@@ -1,0 +1,75 @@
+//! From a configuration to an `.fmu` file: model description, library, resources, documentation and
+//! icon. No compiler is needed; the same configuration and library give the same bytes.
+
+mod documentation;
+pub mod library;
+
+use std::path::Path;
+use std::rc::Rc;
+
+use punctual_fmu::configuration::{Configuration, RESOURCE};
+use punctual_fmu::product::Product;
+use punctual_modeldescription::{Archive, Timestamp};
+
+use crate::error::Error;
+use crate::host::{Fmu, PLATFORM, Slave};
+
+/// The picture that importers show.
+const ICON: &[u8] = include_bytes!("model.png");
+
+/// Reads a configuration file and completes it.
+///
+/// # Errors
+///
+/// A file that cannot be read, or a configuration that cannot be used (naming the file and field).
+pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+    Configuration::parse(&text).map_err(|e| Error::from(e).in_file(path))
+}
+
+/// The entries of the FMU of `product` around the shared library `binary`. Entries carry the time of
+/// the environment variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
+///
+/// # Errors
+///
+/// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold.
+pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
+    let broken = |e: punctual_modeldescription::Error| Error::configuration("", e.to_string());
+    let timestamp = match std::env::var("SOURCE_DATE_EPOCH") {
+        Ok(text) => Timestamp::from_source_date_epoch(&text).map_err(broken)?,
+        Err(_) => Timestamp::default(),
+    };
+    let description = product.model_description();
+    let canonical = product.configuration.canonical()?;
+    let page = documentation::page(product, &description, &canonical);
+    let suffix = std::env::consts::DLL_SUFFIX;
+    let library = format!("binaries/{PLATFORM}/{}{suffix}", description.co_simulation.model_identifier);
+    let mut archive = Archive::new().with_timestamp(timestamp);
+    archive.add("modelDescription.xml", description.to_xml().map_err(broken)?).map_err(broken)?;
+    archive.add("model.png", ICON).map_err(broken)?;
+    archive.add("documentation/index.html", page).map_err(broken)?;
+    archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
+    archive.add(&library, binary).map_err(broken)?;
+    Ok(archive)
+}
+
+/// Writes the FMU of `configuration` to `file`, then opens the file as an importer would: reads its
+/// description, loads the library, makes an instance and initialises it.
+///
+/// # Errors
+///
+/// A file that cannot be written, or a product that does not work.
+pub fn build(configuration: Configuration, library: Option<&Path>, file: &Path) -> Result<Rc<Fmu>, Error> {
+    let product = Product::new(configuration)?;
+    let bytes = archive(&product, library::read(library)?)?
+        .to_bytes()
+        .map_err(|e| Error::configuration("", e.to_string()))?;
+    std::fs::write(file, bytes).map_err(|e| Error::io("write", file, e))?;
+    let fmu = Rc::new(Fmu::open(file)?);
+    let mut slave = Slave::instantiate(Rc::clone(&fmu), product.configuration.name())?;
+    let experiment = product.configuration.experiment();
+    slave.setup_experiment(experiment.start_time, experiment.stop_time)?;
+    slave.enter_initialization_mode()?;
+    slave.exit_initialization_mode()?;
+    Ok(fmu)
+}

@@ -1,0 +1,61 @@
+//! The legend: a column right of the axes, so that it never covers data.
+
+use super::canvas::{Anchor, Canvas, INK, Pen, Point};
+
+/// Text size in pixels.
+const SIZE: f64 = 12.0;
+/// Height of an entry in pixels.
+const ROW: f64 = 21.0;
+/// Width of the key in pixels.
+const KEY: f64 = 26.0;
+
+/// What stands before the text of an entry.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Key {
+    Line(Pen),
+    /// Fill colour, its opacity, and the rim.
+    Patch([u8; 3], f64, Pen),
+    Start,
+    Arrival,
+}
+
+/// An entry.
+pub(super) type Entry = (Key, String);
+
+/// The width a column of these entries needs, in pixels, about; 0 for none.
+pub(super) fn width(entries: &[Entry]) -> f64 {
+    let longest = entries.iter().map(|(_, text)| text.chars().count()).max();
+    longest.map_or(0.0, |n| KEY + 8.0 + n as f64 * SIZE * 0.55)
+}
+
+/// Draws the entries downwards from `at`.
+pub(super) fn draw(canvas: &mut Canvas, entries: &[Entry], at: Point) {
+    for (i, (key, text)) in entries.iter().enumerate() {
+        let y = at.1 + (i as f64 + 0.5) * ROW;
+        let (left, right) = (at.0, at.0 + KEY);
+        let middle = ((left + right) / 2.0, y);
+        match *key {
+            Key::Line(pen) => canvas.line(&[(left, y), (right, y)], pen),
+            Key::Patch(colour, opacity, pen) => {
+                let corners = [(left, y - 6.0), (right, y - 6.0), (right, y + 6.0), (left, y + 6.0)];
+                canvas.polygon(&corners, colour, opacity);
+                canvas.line(&[corners[0], corners[1], corners[2], corners[3], corners[0]], pen);
+            }
+            Key::Start => start_marker(canvas, middle, INK),
+            Key::Arrival => arrival_marker(canvas, middle, INK),
+        }
+        canvas.text(text, (right + 8.0, y), SIZE, Anchor::Left, INK);
+    }
+}
+
+/// A ring.
+pub(super) fn start_marker(canvas: &mut Canvas, at: Point, colour: [u8; 3]) {
+    canvas.circle(at, 4.5, ([255; 3], 1.0), Pen::solid(colour, 1.8));
+}
+
+/// A diamond with a white rim.
+pub(super) fn arrival_marker(canvas: &mut Canvas, at: Point, colour: [u8; 3]) {
+    let diamond = |r: f64| [(at.0, at.1 - r), (at.0 + r, at.1), (at.0, at.1 + r), (at.0 - r, at.1)];
+    canvas.polygon(&diamond(8.0), [255; 3], 1.0);
+    canvas.polygon(&diamond(6.0), colour, 1.0);
+}

@@ -1,0 +1,131 @@
+//! Paths in a plane, drawn with equal axes.
+
+use super::axes::Axes;
+use super::canvas::{Anchor, Canvas, INK, Pen};
+use super::decimate::decimate;
+use super::legend::{self, Entry, Key};
+use super::scale::{Axis, extent};
+use super::{POINTS, PathPlot, Style, colour};
+
+/// Size of the sheet in pixels.
+pub(super) const WIDTH: f64 = 860.0;
+/// See [`WIDTH`].
+pub(super) const HEIGHT: f64 = 640.0;
+/// Colour of discs.
+const DISC: [u8; 3] = [0, 158, 115];
+/// Share of the range left free at each side.
+const MARGIN: f64 = 0.06;
+
+pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
+    let legend = entries(plot);
+    let legend_width = legend::width(&legend);
+    let title = if plot.title.is_empty() { 0.0 } else { 30.0 };
+    let space = if legend.is_empty() { 20.0 } else { legend_width + 34.0 };
+    let area = [84.0, 18.0 + title, canvas.width() - space, canvas.height() - 62.0];
+    let axes = equal_axes(plot, area)?;
+    axes.frame(canvas, &plot.x_label, &plot.y_label, true);
+    if !plot.title.is_empty() {
+        canvas.text(&plot.title, ((area[0] + area[2]) / 2.0, 24.0), 16.0, Anchor::Middle, INK);
+    }
+    let scale = (area[2] - area[0]) / (axes.x.high - axes.x.low);
+    canvas.clipped(area, |canvas| {
+        for disc in &plot.discs {
+            let centre = axes.place(disc.centre[0], disc.centre[1]);
+            canvas.circle(centre, disc.radius * scale, (DISC, 0.18), Pen::solid(DISC, 1.2));
+        }
+    });
+    for (i, path) in plot.paths.iter().enumerate() {
+        let pen = pen(i, path.style);
+        let kept = decimate(&[&path.x, &path.y], POINTS);
+        axes.curve(canvas, kept.into_iter().map(|k| (path.x[k], path.y[k])), pen, false);
+    }
+    for (i, path) in plot.paths.iter().enumerate() {
+        let point = |k: usize| Some(axes.place(*path.x.get(k)?, *path.y.get(k)?));
+        let shown = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        if let Some(at) = point(0).filter(shown) {
+            legend::start_marker(canvas, at, colour(i));
+        }
+        if let Some(at) = path.arrival.and_then(point).filter(shown) {
+            legend::arrival_marker(canvas, at, colour(i));
+        }
+    }
+    legend::draw(canvas, &legend, (area[2] + 18.0, area[1]));
+    Ok(())
+}
+
+fn pen(i: usize, style: Style) -> Pen {
+    let dash = (style == Style::Dashed).then_some((7.0, 5.0));
+    Pen { colour: colour(i), width: 2.0, dash }
+}
+
+fn entries(plot: &PathPlot) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    for (i, path) in plot.paths.iter().enumerate().filter(|(_, path)| !path.label.is_empty()) {
+        entries.push((Key::Line(pen(i, path.style)), path.label.clone()));
+    }
+    if !plot.paths.is_empty() {
+        entries.push((Key::Start, "start".to_owned()));
+    }
+    if plot.paths.iter().any(|path| path.arrival.is_some()) {
+        entries.push((Key::Arrival, "arrival".to_owned()));
+    }
+    for disc in plot.discs.iter().filter(|disc| !disc.label.is_empty()) {
+        if !entries.iter().any(|(_, text)| *text == disc.label) {
+            entries.push((Key::Patch(DISC, 0.18, Pen::solid(DISC, 1.2)), disc.label.clone()));
+        }
+    }
+    entries
+}
+
+/// Axes over everything drawn, one pixel meaning the same length on both.
+fn equal_axes(plot: &PathPlot, area: [f64; 4]) -> Result<Axes, String> {
+    let discs = |axis: usize| {
+        plot.discs.iter().flat_map(move |d| [d.centre[axis] - d.radius, d.centre[axis] + d.radius])
+    };
+    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)));
+    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)));
+    let (Some(x), Some(y)) = (x, y) else { return Err("there is no finite point".to_owned()) };
+    let (width, height) = (area[2] - area[0], area[3] - area[1]);
+    let share = 1.0 - 2.0 * MARGIN;
+    let unit = ((x.1 - x.0) / (share * width)).max((y.1 - y.0) / (share * height));
+    let unit = if unit > 0.0 && unit.is_finite() { unit } else { 1.0 / width };
+    let around = |(low, high): (f64, f64), pixels: f64| {
+        let middle = low / 2.0 + high / 2.0;
+        (middle - unit * pixels / 2.0, middle + unit * pixels / 2.0)
+    };
+    let (x, y) = (around(x, width), around(y, height));
+    let count = |pixels: f64| (pixels / 75.0) as usize;
+    // The same ticks on both axes: their number follows from the longer one.
+    let step = Axis::linear(x.0, x.1, count(width), false);
+    let spacing = if step.ticks.len() > 1 { step.ticks[1].0 - step.ticks[0].0 } else { x.1 - x.0 };
+    let y_axis = Axis::linear(y.0, y.1, ((y.1 - y.0) / spacing * (1.0 + 1e-6)).ceil() as usize, false);
+    Ok(Axes { area, x: step, y: y_axis })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::{Disc, Path};
+
+    #[test]
+    fn axes_are_equal_and_hold_everything() {
+        let plot = PathPlot {
+            paths: vec![Path { x: vec![0.0, 10.0], y: vec![0.0, f64::NAN], ..Path::default() }],
+            discs: vec![Disc { label: String::new(), centre: [45.0, 5.0], radius: 2.0 }],
+            ..PathPlot::default()
+        };
+        let axes = equal_axes(&plot, [0.0, 0.0, 600.0, 400.0]).unwrap();
+        let (x, y) = (
+            axes.place(1.0, 0.0).0 - axes.place(0.0, 0.0).0,
+            axes.place(0.0, 0.0).1 - axes.place(0.0, 1.0).1,
+        );
+        assert!((x - y).abs() < 1e-9, "{x} {y}");
+        assert!(axes.x.low < 0.0 && axes.x.high > 47.0);
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error() {
+        let mut canvas = Canvas::new(WIDTH, HEIGHT);
+        assert!(draw(&PathPlot::default(), &mut canvas).unwrap_err().contains("no finite point"));
+    }
+}

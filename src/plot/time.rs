@@ -1,0 +1,205 @@
+//! Signals over time, in one panel or several over one time axis.
+
+use super::axes::Axes;
+use super::canvas::{Anchor, Canvas, INK, MARK, Pen};
+use super::decimate::decimate;
+use super::legend::{self, Entry, Key};
+use super::scale::{Axis, extent, percentiles};
+use super::{POINTS, Scale, Series, Style, TimePlot, colour};
+
+/// Width of the sheet in pixels.
+pub(super) const WIDTH: f64 = 900.0;
+/// Height of a single panel with everything around it, in pixels.
+const SINGLE: f64 = 460.0;
+/// Height of each of several panels, in pixels.
+const PANEL: f64 = 290.0;
+/// Room below the last panel, in pixels.
+const BOTTOM: f64 = 58.0;
+/// Colour of shaded regions.
+const REGION: [u8; 3] = [0, 158, 115];
+/// Decades shown on a logarithmic axis at most.
+const DECADES: f64 = 12.0;
+
+/// Height of the sheet for this many panels.
+pub(super) fn height(panels: usize) -> f64 {
+    if panels <= 1 { SINGLE } else { panels as f64 * PANEL + BOTTOM }
+}
+
+pub(super) fn draw(plots: &[TimePlot], canvas: &mut Canvas) -> Result<(), String> {
+    let times = plots.iter().flat_map(|p| &p.series).flat_map(|s| s.time.iter().copied());
+    let (start, stop) = extent(times).ok_or("there is no series with a finite time")?;
+    let legends: Vec<Vec<Entry>> = plots.iter().map(entries).collect();
+    let widest = legends.iter().map(|l| legend::width(l)).fold(0.0, f64::max);
+    let right = canvas.width() - if widest > 0.0 { widest + 34.0 } else { 24.0 };
+    let panel = (canvas.height() - BOTTOM) / plots.len().max(1) as f64;
+    for (i, (plot, legend)) in plots.iter().zip(&legends).enumerate() {
+        let title = if plot.title.is_empty() { 14.0 } else { 40.0 };
+        let above = plot.instants.iter().any(|mark| !mark.label.is_empty())
+            || matches!(plot.scale, Scale::Percentiles(..) | Scale::Fixed(..));
+        let notes = if above { 16.0 } else { 0.0 };
+        let last = i + 1 == plots.len();
+        let top = i as f64 * panel + title + notes;
+        let bottom = (i + 1) as f64 * panel - if last { 0.0 } else { 22.0 };
+        let area = [92.0, top, right, bottom];
+        let (y, note) = y_axis(plot, bottom - top)?;
+        let x = Axis::linear(start, stop, ((right - area[0]) / 80.0) as usize, false);
+        let axes = Axes { area, x, y };
+        draw_panel(plot, &axes, canvas, last);
+        if !plot.title.is_empty() {
+            let at = ((area[0] + area[2]) / 2.0, i as f64 * panel + 20.0);
+            canvas.text(&plot.title, at, 16.0, Anchor::Middle, INK);
+        }
+        legend::draw(canvas, legend, (right + 18.0, top));
+        if let Some(note) = note {
+            canvas.text(&note, (area[0], top - 8.0), 11.0, Anchor::Left, MARK);
+        }
+    }
+    Ok(())
+}
+
+fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
+    let [left, top, right, bottom] = axes.area;
+    for region in &plot.regions {
+        let clamp = |value: f64, axis: &Axis| value.clamp(axis.low, axis.high);
+        let from = axes.place(clamp(region.time[0], &axes.x), clamp(region.values[0], &axes.y));
+        let to = axes.place(clamp(region.time[1], &axes.x), clamp(region.values[1], &axes.y));
+        canvas.polygon(&[from, (to.0, from.1), to, (from.0, to.1)], REGION, 0.10);
+    }
+    axes.frame(canvas, if last { "time (s)" } else { "" }, &plot.y_label, last);
+    let dashed = Pen { colour: MARK, width: 1.4, dash: Some((3.0, 3.0)) };
+    for mark in &plot.instants {
+        let (x, _) = axes.place(mark.at, axes.y.low);
+        if (left..=right).contains(&x) {
+            canvas.line(&[(x, top), (x, bottom)], dashed);
+            canvas.text(&mark.label, (x, top - 8.0), 12.0, Anchor::Middle, MARK);
+        }
+    }
+    for (i, series) in plot.series.iter().enumerate() {
+        let length = series.time.len().min(series.values.len());
+        let kept = decimate(&[&series.values[..length]], POINTS);
+        let points = kept.into_iter().map(|k| (series.time[k], series.values[k]));
+        axes.curve(canvas, points, pen(i, series), series.style == Style::Steps);
+    }
+    let mut labelled: Vec<f64> = Vec::new();
+    for mark in &plot.bounds {
+        let (_, y) = axes.place(axes.x.low, mark.at);
+        if !(top..=bottom).contains(&y) {
+            continue;
+        }
+        canvas.line(&[(left, y), (right, y)], dashed);
+        // One label where several would cover one another, as of both bounds on a logarithmic axis.
+        if labelled.iter().all(|other| (other - y).abs() > 14.0) {
+            let above = if y - top > 18.0 { y - 9.0 } else { y + 10.0 };
+            canvas.text(&mark.label, (right - 6.0, above), 12.0, Anchor::Right, MARK);
+            labelled.push(y);
+        }
+    }
+}
+
+fn pen(i: usize, series: &Series) -> Pen {
+    let dash = (series.style == Style::Dashed).then_some((7.0, 4.0));
+    Pen { colour: colour(series.colour.unwrap_or(i)), width: if dash.is_some() { 1.6 } else { 1.9 }, dash }
+}
+
+fn entries(plot: &TimePlot) -> Vec<Entry> {
+    let series = plot.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty());
+    let mut entries: Vec<Entry> =
+        series.map(|(i, series)| (Key::Line(pen(i, series)), series.label.clone())).collect();
+    for region in plot.regions.iter().filter(|region| !region.label.is_empty()) {
+        entries.push((Key::Patch(REGION, 0.10, Pen::solid(REGION, 0.5)), region.label.clone()));
+    }
+    entries
+}
+
+/// The y axis, and a note where values lie beyond it.
+fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String> {
+    let values = || plot.series.iter().flat_map(|s| s.values.iter().copied());
+    let bounds = || plot.bounds.iter().map(|mark| mark.at);
+    let (low, high) = extent(values()).ok_or("there is no finite value")?;
+    let count = ((height / 45.0) as usize).max(2);
+    // An axis over a range and the bounds: its ends are ticks, but bounds stand clear of the frame.
+    let linear = |(low, high): (f64, f64)| {
+        let (from, to) = extent([low, high].into_iter().chain(bounds())).unwrap_or((low, high));
+        let axis = Axis::linear(from, to, count, true);
+        if bounds().all(|bound| bound != axis.low && bound != axis.high) {
+            return axis;
+        }
+        let room = 0.04 * (to - from);
+        Axis::linear(from - room, to + room, count, false)
+    };
+    let whole = || linear((low, high));
+    let cut = |axis: Axis| {
+        let beyond = low < axis.low || high > axis.high;
+        let note = beyond.then(|| format!("axis cut: values reach from {} to {}", brief(low), brief(high)));
+        (axis, note)
+    };
+    Ok(match plot.scale {
+        Scale::Linear => (whole(), None),
+        Scale::Percentiles(from, to) => {
+            let bulk = percentiles(values(), from, to).unwrap_or((low, high));
+            // Cutting off less than a third of the range gains nothing.
+            if bulk.1 - bulk.0 > (high - low) / 1.5 || bulk.0 >= bulk.1 {
+                return Ok((whole(), None));
+            }
+            cut(linear(bulk))
+        }
+        Scale::Fixed(from, to) => cut(Axis::linear(from, to, count, false)),
+        Scale::Logarithmic => {
+            let sizes = || values().map(f64::abs).filter(|size| *size > 0.0);
+            let high = extent(sizes().chain(bounds().map(f64::abs))).map_or(1.0, |range| range.1);
+            // Passing through zero must not stretch the axis without end.
+            let low = percentiles(sizes(), 1.0, 100.0).map_or(0.1, |range| range.0);
+            (Axis::logarithmic(low.max(high * 10_f64.powf(-DECADES)), high), None)
+        }
+    })
+}
+
+/// A number in three digits, with a true minus sign.
+fn brief(value: f64) -> String {
+    let size = value.abs();
+    let text = if size == 0.0 || (0.01..1e5).contains(&size) {
+        let digits = if size >= 100.0 || size == 0.0 { 0 } else { 2 };
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.2e}")
+    };
+    text.replace('-', "−")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Mark;
+
+    fn plot(values: Vec<f64>, scale: Scale) -> TimePlot {
+        let time = (0..values.len()).map(|i| i as f64).collect();
+        TimePlot { series: vec![Series { time, values, ..Series::default() }], scale, ..TimePlot::default() }
+    }
+
+    #[test]
+    fn rare_extremes_are_cut_off_and_told() {
+        let mut values = vec![1.0; 1000];
+        values[1] = 0.0;
+        values[500] = 31_950.0;
+        (2..100).for_each(|i| values[i] = i as f64 / 100.0);
+        let (axis, note) = y_axis(&plot(values.clone(), Scale::Percentiles(1.0, 99.0)), 300.0).unwrap();
+        assert!(axis.high < 3.0, "{}", axis.high);
+        assert!(note.unwrap().contains("to 31950"));
+        let (axis, note) = y_axis(&plot(values, Scale::Linear), 300.0).unwrap();
+        assert!(axis.high > 31_000.0 && note.is_none());
+    }
+
+    #[test]
+    fn bounds_are_always_in_the_picture() {
+        let mut plot = plot(vec![0.0, 1.0], Scale::Linear);
+        plot.bounds = vec![Mark { label: "max".into(), at: 60.0 }];
+        assert!(y_axis(&plot, 300.0).unwrap().0.high > 60.0);
+    }
+
+    #[test]
+    fn zeros_on_a_logarithmic_axis_are_left_out() {
+        let (axis, _) = y_axis(&plot(vec![0.0, -5.0, 300.0], Scale::Logarithmic), 300.0).unwrap();
+        assert_eq!((axis.low, axis.high), (1.0, 1000.0));
+        assert!(y_axis(&plot(vec![f64::NAN], Scale::Linear), 300.0).is_err());
+    }
+}
