@@ -77,7 +77,7 @@ fn text(runs: &[Run]) -> String {
         "arrival",
         "min h after deadline",
         "outside after deadline",
-        "peak input to arrival",
+        "peak input before arrival",
         "peak input, whole run",
         "steps/s",
     ];
@@ -95,8 +95,8 @@ fn text(runs: &[Run]) -> String {
             } else {
                 "never".to_owned()
             },
-            peaks(run, s.peak_to_arrival),
-            peaks(run, s.peak),
+            peaks(run, s.peak_to_arrival, s.peak_norm_to_arrival),
+            peaks(run, s.peak, s.peak_norm),
             output::number(s.steps_per_second.round()),
         ]);
     }
@@ -107,9 +107,13 @@ fn text(runs: &[Run]) -> String {
     )
 }
 
-fn peaks(run: &Run, values: [f64; 2]) -> String {
-    let one = |i: usize| format!("{} {}", short(values[i]), run.model.inputs[i].1);
-    format!("{}, {}", one(0), one(1))
+/// The length of the input vector where its components share a unit, else both components.
+fn peaks(run: &Run, values: [f64; 2], norm: f64) -> String {
+    let [(_, first), (_, second)] = run.model.inputs;
+    if first == second {
+        return format!("{} {first}", short(norm));
+    }
+    format!("{} {first}, {} {second}", short(values[0]), short(values[1]))
 }
 
 fn short(value: f64) -> String {

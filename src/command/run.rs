@@ -15,7 +15,7 @@ use crate::pictures;
 pub struct Arguments {
     /// The system file (TOML): experiment, components, connections, pictures
     system: PathBuf,
-    /// Write <system>.csv and the pictures into this folder
+    /// Write the CSV file (named as the system) and the pictures into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON instead of text

@@ -21,6 +21,8 @@ pub struct Summary {
     pub peak_norm_to_arrival: f64,
     /// Largest size of each input in the whole run, in its unit.
     pub peak: [f64; 2],
+    /// Largest length of the input vector in the whole run; for the point mass, in m/s².
+    pub peak_norm: f64,
     /// Samples whose constraint could not be met.
     pub unsatisfied: usize,
     /// Communication steps of the coupled system per second of wall time.
@@ -46,13 +48,15 @@ impl Summary {
         let after = times.iter().position(|&t| t >= DEADLINE - 0.5 * super::cases::STEP).unwrap_or(h.len());
         let outside = |k: usize| ((x[k] - CENTRE[0]).hypot(y[k] - CENTRE[1]) - RADIUS).max(0.0);
         let largest = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let longest = |end: usize| (0..end).map(|k| u[0][k].hypot(u[1][k])).fold(0.0, f64::max);
         Ok(Self {
             arrival: arrived.map(|k| times[k]),
             min_h_after_deadline: h[after..].iter().copied().fold(f64::INFINITY, f64::min),
             farthest_outside: (after..h.len()).map(outside).fold(0.0, f64::max),
             peak_to_arrival: [largest(&u[0][..approach]), largest(&u[1][..approach])],
-            peak_norm_to_arrival: (0..approach).map(|k| u[0][k].hypot(u[1][k])).fold(0.0, f64::max),
+            peak_norm_to_arrival: longest(approach),
             peak: [largest(&u[0]), largest(&u[1])],
+            peak_norm: longest(h.len()),
             // The statuses unchanged (0) and filtered (1) satisfy every constraint.
             unsatisfied: status.iter().filter(|&&s| s > 1.0).count(),
             steps_per_second,

@@ -1,0 +1,37 @@
+"""Fixtures: the FMUs of the demonstration, built by the command line under test."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+MODELS = ["point_mass", "unicycle", "bicycle"]
+METHODS = ["repeated_root", "reference_profile"]
+
+
+def punctual(*arguments, check=True, cwd=None):
+    """Runs the command line; the binary is PUNCTUAL or the release build."""
+    binary = os.environ.get("PUNCTUAL", ROOT / "target" / "release" / "punctual")
+    return subprocess.run(
+        [str(binary), *map(str, arguments)], check=check, capture_output=True, text=True, cwd=cwd
+    )
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory):
+    """The folder that `punctual demo` writes, and what it prints as JSON."""
+    folder = tmp_path_factory.mktemp("demo")
+    done = punctual("demo", "--out", folder, "--json")
+    return folder, json.loads(done.stdout)
+
+
+@pytest.fixture(scope="session")
+def fmus(demo):
+    """All FMUs of the demonstration."""
+    folder, _ = demo
+    found = sorted(folder.glob("*.fmu"))
+    assert len(found) == len(MODELS) * (1 + len(METHODS))
+    return found
