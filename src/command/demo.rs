@@ -75,10 +75,10 @@ fn text(runs: &[Run]) -> String {
         "method",
         "deadline",
         "arrival",
-        "min h after deadline",
-        "outside after deadline",
-        "peak input before arrival",
-        "peak input, whole run",
+        "min h after",
+        "outside after",
+        "peak u before arrival",
+        "peak u, whole run",
         "steps/s",
     ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
@@ -102,7 +102,7 @@ fn text(runs: &[Run]) -> String {
     }
     format!(
         "From rest at the origin into a disc of radius 2 m at (45, 45) m within {DEADLINE} s, 1 ms steps, to {STOP} s.\n\
-         Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\n{}",
+         Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\"after\": from the deadline to the end of the run.\n\n{}",
         output::table(&rows, &[false, false, true, true, true, true, true, true, true])
     )
 }
