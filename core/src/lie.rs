@@ -71,7 +71,8 @@ impl Derivatives {
     }
 }
 
-/// Anything that supplies the derivatives of one barrier: [`Along`] here, or a user's own code.
+/// Anything that supplies the derivatives of one barrier: [`along`] makes one from the traits, a
+/// user's own code can be another.
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
@@ -149,9 +150,9 @@ where
         ));
     }
     macro_rules! by_degree {
-        ($($k:literal)*) => {
-            match n + 1 {
-                $($k => Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _),)*
+        ($($n:literal => $k:literal),*) => {
+            match n {
+                $($n => Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _),)*
                 _ => Err(Error::new(
                     ErrorKind::RelativeDegree,
                     "relative_degree",
@@ -160,7 +161,7 @@ where
             }
         };
     }
-    by_degree!(2 3 4 5 6 7 8 9)
+    by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9)
 }
 
 /// The relative degree found on sample states: the order of the first derivative of h that an

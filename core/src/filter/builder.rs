@@ -80,7 +80,8 @@ impl FilterBuilder {
     pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
         length("u_min", min.len(), self.input_dim)?;
         length("u_max", max.len(), self.input_dim)?;
-        for (i, (&low, &high)) in min.iter().zip(max).enumerate() {
+        // More inputs than that are refused by `build`.
+        for (i, (&low, &high)) in min.iter().zip(max).enumerate().take(MAX_INPUTS) {
             let range = |field: &str, message: String| {
                 Err(Error::new(ErrorKind::Range, format!("{field}[{}]", i + 1), message))
             };

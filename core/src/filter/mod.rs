@@ -18,10 +18,21 @@ use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Outcome, Row};
 
 /// What a filter remembers between samples: one promise per barrier.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct FilterState {
     /// In the order of the barriers.
     pub barriers: Vec<FixedTimeState>,
+}
+
+impl Clone for FilterState {
+    fn clone(&self) -> Self {
+        Self { barriers: self.barriers.clone() }
+    }
+
+    /// Reuses the memory, which a derived `Clone` would not: a step must not allocate.
+    fn clone_from(&mut self, source: &Self) {
+        self.barriers.clone_from(&source.barriers);
+    }
 }
 
 /// One barrier of a filter.
@@ -150,8 +161,12 @@ impl SafetyFilter {
             }
         }
         if report.status != Status::Unchanged {
-            safe_input(&self.bounds, u);
+            // Nothing is remembered, so nothing else is reported.
             next.clone_from(&self.state);
+            for (b, promise) in report.barriers.iter_mut().zip(&next.barriers) {
+                b.remember(promise);
+            }
+            safe_input(&self.bounds, u);
             return Ok(());
         }
 

@@ -1,66 +1,90 @@
 //! Several rows: the interior-point solver clarabel. The only file that names it.
 //!
 //! Settings are pinned: equilibration is off, because clarabel fixes its scaling from the first data
-//! it sees; rows are scaled to unit length here instead. A solver is built for every solve, so the
-//! answer depends on nothing but its arguments. Its accuracy on u is about 1e-6 of the data, not
-//! round-off; it allocates. Infeasible rows are relaxed together with an exact (L1) penalty.
+//! it sees; here rows are scaled to unit length and u to the least correction instead. A solver is
+//! built for every solve, so the answer depends on nothing but its arguments. Its accuracy on u is
+//! about 1e-6 of the correction, not round-off; it allocates. Infeasible rows are relaxed together
+//! with an exact (L1) penalty.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 
-use super::{Bounds, Outcome, Row, Solution, Solver, dot};
+use super::{Bounds, Outcome, Row, Solution, Solver, distance_from_clamped, dot, scaled};
 
-/// Weight of a violated row (of unit length) against ½‖u − u_ref‖²: the multipliers of feasible
-/// problems stay far below it for corrections up to 1e6.
-const PENALTY: f64 = 1e8;
+/// Weight of a violated row against ½‖u − u_ref‖², both in units of the least correction needed: an
+/// exact penalty up to multipliers of this size. The second is for the rare problem on which the first
+/// does not converge; far larger ones often do not.
+const PENALTIES: [f64; 2] = [1e4, 1e2];
 
-/// Largest violation of a scaled row that the relaxed problem counts as met.
+/// Largest violation of a row of unit length that counts as met, as a part of its terms and 1.
 const MET: f64 = 1e-6;
 
 pub(super) fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], limit: f64, u: &mut [f64]) -> Solution {
+    // A row whose normal vanishes says nothing about u: it holds or it does not.
+    let lost = rows.iter().any(|row| scaled(row).is_none() && row.floor > 0.0);
+    let units: Vec<Row> = rows.iter().filter_map(of_unit_length).collect();
     let mut iterations = 0;
-    let mut answer = |relaxed, u: &mut [f64]| {
-        let (found, used) = attempt(rows, bounds, u_ref, relaxed, u);
-        iterations += used;
-        found
+    let mut converged = false;
+    let mut answer = |rows: &[Row], penalties: &[Option<f64>], u: &mut [f64]| {
+        let found = penalties.iter().any(|&penalty| {
+            let (found, used) = attempt(rows, bounds, u_ref, penalty, u);
+            iterations += used;
+            found
+        });
+        converged |= found;
+        found && distance_from_clamped(u, bounds, u_ref) <= limit
     };
-    let exact = answer(false, u);
-    let outcome = if exact && distance(u, u_ref) <= limit {
-        Outcome::Optimal
-    } else if answer(true, u) && distance(u, u_ref) <= limit {
-        if rows.iter().all(|row| scaled_slack(row, u) >= -MET) {
-            Outcome::Optimal
-        } else {
-            Outcome::Infeasible
+    let relaxed = PENALTIES.map(Some);
+    let met = |rows: &[Row], u: &[f64]| rows.iter().all(|row| row.slack(u) >= -MET * size(row, u));
+    let within_reach = |row: &&Row| row.floor - dot(&row.normal, u_ref) <= limit;
+    let outcome = if answer(&units, &[None], u) && met(&units, u) {
+        if lost { Outcome::Degenerate } else { Outcome::Optimal }
+    } else if answer(&units, &relaxed, u) {
+        match (met(&units, u), lost) {
+            (_, true) => Outcome::Degenerate,
+            (true, false) => Outcome::Optimal,
+            (false, false) => Outcome::Infeasible,
         }
     } else {
-        for (i, ui) in u.iter_mut().enumerate() {
-            *ui = bounds.clamp(i, u_ref[i]);
+        // Some row asks for more than the limit: the others are still to be met.
+        let near: Vec<Row> = units.iter().filter(within_reach).copied().collect();
+        let far = near.len() < units.len();
+        if !(far && answer(&near, &relaxed, u)) {
+            for (i, ui) in u.iter_mut().enumerate() {
+                *ui = bounds.clamp(i, u_ref[i]);
+            }
         }
-        if exact { Outcome::Degenerate } else { Outcome::Failed }
+        if far || lost || converged { Outcome::Degenerate } else { Outcome::Failed }
     };
     Solution { outcome, solver: Solver::InteriorPoint, iterations }
 }
 
-fn distance(u: &[f64], u_ref: &[f64]) -> f64 {
-    u.iter().zip(u_ref).fold(0.0, |d: f64, (a, b)| d.hypot(a - b))
+/// `row` with a normal of length 1, `None` where it vanishes.
+fn of_unit_length(row: &Row) -> Option<Row> {
+    let Row { normal, floor } = scaled(row)?;
+    let norm = normal.iter().map(|a| a * a).sum::<f64>().sqrt();
+    Some(Row { normal: normal.map(|a| a / norm), floor: floor / norm })
 }
 
-fn norm(row: &Row, m: usize) -> f64 {
-    row.normal[..m].iter().fold(0.0, |n: f64, v| n.hypot(*v))
+/// The size of the terms of a slack, at least 1.
+fn size(row: &Row, u: &[f64]) -> f64 {
+    row.normal.iter().zip(u).fold(1.0 + row.floor.abs(), |s, (a, v)| s + (a * v).abs())
 }
 
-fn scaled_slack(row: &Row, u: &[f64]) -> f64 {
-    let size = norm(row, u.len());
-    if size > 0.0 { row.slack(u) / size } else { -row.floor }
-}
-
-/// One call of clarabel in v = u − u_ref; with `relaxed`, one slack per row is added to v.
-/// Writes `u` and returns true where it converged.
-fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], relaxed: bool, u: &mut [f64]) -> (bool, u32) {
+/// One call of clarabel in v = u − u_ref for rows of unit length; with a penalty, one slack per row
+/// is added to v. Writes `u` and returns true where it converged, with the number of iterations.
+fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], penalty: Option<f64>, u: &mut [f64]) -> (bool, u32) {
     let m = u.len();
-    let slacks = if relaxed { rows.len() } else { 0 };
+    let slacks = if penalty.is_some() { rows.len() } else { 0 };
     let variables = m + slacks;
+    // The unit of v and of the slacks: no correction is smaller than the largest violation at u_ref. It
+    // makes the solver's absolute tolerances relative to the answer.
+    let outside = u_ref.iter().enumerate().map(|(i, r)| (r - bounds.max[i]).max(bounds.min[i] - r));
+    let missing = rows.iter().map(|row| row.floor - dot(&row.normal, u_ref));
+    let unit = outside.chain(missing).fold(0.0, f64::max);
+    if !(unit > 0.0 && unit.is_finite()) {
+        return (false, 0);
+    }
     // Constraints in the form G v + s = d, s ≥ 0.
     let (mut is, mut js, mut values, mut d) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut entry = |i: usize, j: usize, value: f64| {
@@ -69,15 +93,13 @@ fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], relaxed: bool, u: &mut 
         values.push(value);
     };
     for (k, row) in rows.iter().enumerate() {
-        let size = norm(row, m);
-        let scale = if size > 0.0 { 1.0 / size } else { 1.0 };
         for (j, a) in row.normal[..m].iter().enumerate() {
-            entry(d.len(), j, -a * scale);
+            entry(d.len(), j, -a);
         }
-        if relaxed {
+        if penalty.is_some() {
             entry(d.len(), m + k, -1.0);
         }
-        d.push((dot(&row.normal, u_ref) - row.floor) * scale);
+        d.push((dot(&row.normal, u_ref) - row.floor) / unit);
     }
     for k in 0..slacks {
         entry(d.len(), m + k, -1.0);
@@ -86,17 +108,17 @@ fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], relaxed: bool, u: &mut 
     for (i, r) in u_ref.iter().enumerate() {
         if bounds.max[i].is_finite() {
             entry(d.len(), i, 1.0);
-            d.push(bounds.max[i] - r);
+            d.push((bounds.max[i] - r) / unit);
         }
         if bounds.min[i].is_finite() {
             entry(d.len(), i, -1.0);
-            d.push(r - bounds.min[i]);
+            d.push((r - bounds.min[i]) / unit);
         }
     }
     let diagonal: Vec<f64> = (0..variables).map(|j| if j < m { 1.0 } else { 0.0 }).collect();
     let indices: Vec<usize> = (0..variables).collect();
     let p = CscMatrix::new_from_triplets(variables, variables, indices.clone(), indices, diagonal);
-    let q: Vec<f64> = (0..variables).map(|j| if j < m { 0.0 } else { PENALTY }).collect();
+    let q: Vec<f64> = (0..variables).map(|j| if j < m { 0.0 } else { penalty.unwrap_or(0.0) }).collect();
     let g = CscMatrix::new_from_triplets(d.len(), variables, is, js, values);
     let settings =
         DefaultSettings { verbose: false, equilibrate_enable: false, ..DefaultSettings::default() };
@@ -107,7 +129,7 @@ fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], relaxed: bool, u: &mut 
         && solver.solution.x.iter().all(|v| v.is_finite());
     if converged {
         for (i, ui) in u.iter_mut().enumerate() {
-            *ui = bounds.clamp(i, u_ref[i] + solver.solution.x[i]);
+            *ui = bounds.clamp(i, u_ref[i] + unit * solver.solution.x[i]);
         }
     }
     (converged, solver.solution.iterations)

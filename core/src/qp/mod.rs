@@ -5,8 +5,8 @@
 //! ```
 //!
 //! - u_ref feasible: it is returned unchanged, bit for bit.
-//! - one row: closed form, with or without bounds ([`single_row`]), no allocation.
-//! - several rows: an interior-point method ([`interior_point`]), which allocates.
+//! - one row: closed form, with or without bounds (module `single_row`), no allocation.
+//! - several rows: an interior-point method (module `interior_point`), which allocates.
 //!
 //! Bounds are never relaxed. Rows that cannot be met within them are violated as little as possible,
 //! and the status says so.
@@ -49,6 +49,23 @@ impl Row {
 /// Σ a_i b_i over the shorter of the two.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// `row` times the power of two that brings the largest component of its normal to 1 ..< 2: exact, and
+/// out of reach of overflow. `None` where the normal vanishes (is zero or subnormal).
+fn scaled(row: &Row) -> Option<Row> {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    let largest = row.normal.iter().fold(0.0, |s: f64, a| s.max(a.abs()));
+    if largest < f64::MIN_POSITIVE {
+        return None;
+    }
+    let scale = 1.0 / f64::from_bits(largest.to_bits() & EXPONENT);
+    Some(Row { normal: row.normal.map(|a| a * scale), floor: row.floor * scale })
+}
+
+/// How far the rows moved `u`: its distance from the reference within the bounds.
+fn distance_from_clamped(u: &[f64], bounds: &Bounds, u_ref: &[f64]) -> f64 {
+    u.iter().zip(u_ref).enumerate().fold(0.0, |d: f64, (i, (v, r))| d.hypot(v - bounds.clamp(i, *r)))
 }
 
 /// Bounds on u; ±infinity where there is none.
@@ -115,7 +132,8 @@ pub struct Solution {
 
 /// Solves the programme into `u`, which has the length of `u_ref` (finite, 1 to [`MAX_INPUTS`]).
 ///
-/// `correction_limit` > 0 bounds ‖u − u_ref‖: a row that needs more is degenerate.
+/// `correction_limit` > 0 bounds how far the rows may move u from the reference within its bounds: one
+/// that needs more is degenerate.
 pub fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], correction_limit: f64, u: &mut [f64]) -> Solution {
     for (i, (ui, r)) in u.iter_mut().zip(u_ref).enumerate() {
         *ui = bounds.clamp(i, *r);

@@ -1,0 +1,115 @@
+//! The promise of `SafetyFilter::step`: with one barrier it does not allocate.
+//!
+//! The allocator of this test binary counts, thread by thread, so that the test harness's own threads
+//! do not disturb. It is the only `unsafe` in the tests of this crate.
+
+mod scenario;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Status};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::qp::Solver;
+use scenario::{distance_disc, one, quadratic_disc};
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+fn count() {
+    // The counter may be gone while a thread ends; nothing is measured then.
+    let _ = ALLOCATIONS.try_with(|n| n.set(n.get() + 1));
+}
+
+// SAFETY: every call is passed on to the system's allocator unchanged; counting does not allocate.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller keeps the contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps the contract of `dealloc`; `alloc` and `realloc` are the system's.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: the caller keeps the contract of `realloc`; `pointer` is the system's.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.get();
+    work();
+    ALLOCATIONS.get() - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 1);
+    assert_eq!(allocations(|| drop(std::hint::black_box(vec![0_u8; 100]))), 1);
+}
+
+fn filters() -> Vec<(&'static str, SafetyFilter)> {
+    let settings = BarrierSettings::within(5.0);
+    let repeated = BarrierSettings { method: Method::RepeatedRoot, ..settings };
+    let bounded = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, distance_disc(), settings)
+        .and_then(|b| b.bounds(&[-5.0, -5.0], &[5.0, 5.0]))
+        .and_then(punctual_core::filter::FilterBuilder::build)
+        .expect("valid filter");
+    let bicycle = Bicycle::new(10.0).expect("valid bicycle");
+    vec![
+        ("point mass", one(PointMass, distance_disc(), settings)),
+        ("unicycle", one(Unicycle, distance_disc(), settings)),
+        ("bicycle, repeated root", one(bicycle, quadratic_disc(), repeated)),
+        ("point mass, bounded", bounded),
+    ]
+}
+
+/// All that a single barrier can go through: anchor, filtered and unchanged steps, infeasible rows,
+/// invalid and singular samples, arrival, deadline, re-arming, peeking.
+#[test]
+fn a_step_with_one_barrier_allocates_nothing() {
+    for (name, mut filter) in filters() {
+        let (mut u, mut seen) = ([0.0; 2], [false; Status::ALL.len()]);
+        let first = allocations(|| {
+            filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+        });
+        assert_eq!(first, 0, "{name}: the first step");
+        let found = allocations(|| {
+            for k in 1..2000 {
+                let t = f64::from(k) * 0.005;
+                let inside = t > 3.0;
+                let mut x = if inside { [44.0, 45.2, 0.1, 0.2] } else { [8.0 * t, 7.0 * t, 0.3, 5.0] };
+                match k % 50 {
+                    10 => x[1] = f64::NAN,
+                    20 => x[0] = 1e300,
+                    30 => x[3] = -200.0,
+                    _ => {}
+                }
+                let u_ref = [0.1, -0.1];
+                filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions");
+                let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+                seen[report.status as usize] = true;
+                assert!(matches!(report.solver, Solver::Unchanged | Solver::ClosedForm));
+                if k == 1000 {
+                    filter.rearm();
+                }
+            }
+        });
+        assert_eq!(found, 0, "{name}: 1999 steps");
+        for status in [Status::Unchanged, Status::Filtered, Status::InvalidInput, Status::Singular] {
+            assert!(seen[status as usize], "{name}: {status:?} was not exercised");
+        }
+    }
+}

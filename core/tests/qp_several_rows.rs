@@ -1,0 +1,210 @@
+//! The quadratic programme with several rows, against the enumeration of active sets.
+
+mod quadratic;
+
+use proptest::prelude::*;
+use punctual_core::nalgebra::{DMatrix, DVector};
+use punctual_core::qp::{Bounds, Outcome, Row, Solver, solve};
+use quadratic::{bounds, config, row};
+
+const NO_LIMIT: f64 = 1e6;
+
+/// Error of the interior-point method on u: it stops at a duality gap of 1e-8 (relative), and a gap δ
+/// of ½‖u − u_ref‖² bounds the argument only by √(2δ) = 1.4e-4.
+const GAP: f64 = 1.4e-4;
+
+/// Violation allowed to a row of unit length: the feasibility tolerance of 1e-8, with room for the
+/// problem's numbers of order 10.
+const FEASIBILITY: f64 = 1e-6;
+
+/// The rows and the finite bounds, as one list of unit rows.
+fn all_rows(rows: &[Row], b: &Bounds, m: usize) -> Vec<(DVector<f64>, f64)> {
+    let mut list = Vec::new();
+    for row in rows {
+        let normal = DVector::from_column_slice(&row.normal[..m]);
+        let norm = normal.norm();
+        list.push((normal / norm, row.floor / norm));
+    }
+    for i in 0..m {
+        let mut axis = DVector::zeros(m);
+        axis[i] = 1.0;
+        if b.max[i].is_finite() {
+            list.push((-&axis, -b.max[i]));
+        }
+        if b.min[i].is_finite() {
+            list.push((axis, b.min[i]));
+        }
+    }
+    list
+}
+
+/// The minimiser by brute force: every set of at most m independent rows active; the best of the
+/// candidates that violate nothing. `None` if there is none.
+fn enumerated(rows: &[(DVector<f64>, f64)], u_ref: &DVector<f64>) -> Option<DVector<f64>> {
+    let m = u_ref.len();
+    let mut best: Option<DVector<f64>> = None;
+    for set in 0_u32..1 << rows.len() {
+        let active: Vec<usize> = (0..rows.len()).filter(|k| set >> k & 1 == 1).collect();
+        if active.len() > m {
+            continue;
+        }
+        let mut u = u_ref.clone();
+        if !active.is_empty() {
+            let a = DMatrix::from_fn(active.len(), m, |k, j| rows[active[k]].0[j]);
+            let missing =
+                DVector::from_fn(active.len(), |k, _| rows[active[k]].1 - rows[active[k]].0.dot(u_ref));
+            let Some(lambda) = (&a * a.transpose()).lu().solve(&missing) else { continue };
+            u += a.transpose() * lambda;
+        }
+        let feasible = rows.iter().all(|(a, floor)| a.dot(&u) - floor >= -1e-9);
+        if feasible && best.as_ref().is_none_or(|v| (&u - u_ref).norm() < (v - u_ref).norm()) {
+            best = Some(u);
+        }
+    }
+    best
+}
+
+/// Rows of length 1 to 4, two to four of them, in two or three inputs, maybe bounded.
+fn several() -> impl Strategy<Value = (Vec<Row>, Bounds, Vec<f64>)> {
+    let one = (prop::collection::vec(-1.0..1.0, 3), 1.0..4.0, -6.0..6.0);
+    let parts = prop::collection::vec((quadratic::interval(), -10.0..10.0), 2..=3);
+    (prop::collection::vec(one, 2..=4), parts, any::<bool>()).prop_filter_map(
+        "a direction",
+        |(rows, parts, bounded)| {
+            let m = parts.len();
+            let rows: Option<Vec<Row>> = rows
+                .iter()
+                .map(|(direction, length, floor): &(Vec<f64>, f64, f64)| {
+                    let norm = direction[..m].iter().map(|v| v * v).sum::<f64>().sqrt();
+                    let normal: Vec<f64> = direction[..m].iter().map(|v| v / norm * length).collect();
+                    (norm > 0.1).then(|| row(&normal, *floor))
+                })
+                .collect();
+            let (min, max): (Vec<f64>, Vec<f64>) = parts.iter().map(|p| p.0).unzip();
+            let b = if bounded { bounds(&min, &max) } else { Bounds::NONE };
+            Some((rows?, b, parts.iter().map(|p| p.1).collect()))
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(config(400))]
+
+    #[test]
+    fn several_rows_equal_enumeration((rows, b, u_ref) in several()) {
+        let m = u_ref.len();
+        let list = all_rows(&rows, &b, m);
+        let reference = DVector::from_column_slice(&u_ref);
+        let mut u = vec![f64::NAN; m];
+        let solution = solve(&rows, &b, &u_ref, NO_LIMIT, &mut u);
+        prop_assert!(b.contain(&u), "{u:?}");
+        let found = DVector::from_column_slice(&u);
+        let least_slack = list.iter().map(|(a, floor)| a.dot(&found) - floor).fold(f64::INFINITY, f64::min);
+        match enumerated(&list, &reference) {
+            Some(wanted) => {
+                prop_assert_eq!(solution.outcome, Outcome::Optimal, "wanted {:?}", wanted);
+                prop_assert!(least_slack >= -FEASIBILITY * (1.0 + found.norm()), "slack {least_slack:e}");
+                // Far from u_ref the gap is relative to the cost.
+                let size = 1.0 + (&wanted - &reference).norm();
+                let error = (&found - &wanted).norm();
+                prop_assert!(error <= GAP * size, "{found} {wanted} error {error:e}, size {size}");
+            }
+            None => {
+                // Nearly parallel rows can meet farther out than enumeration resolves.
+                if solution.outcome == Outcome::Optimal {
+                    prop_assert!(least_slack >= -FEASIBILITY * (1.0 + found.norm()), "slack {least_slack:e}");
+                } else {
+                    prop_assert_eq!(solution.outcome, Outcome::Infeasible);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_problem_gives_the_same_bits((rows, b, u_ref) in several(), (others, _, _) in several()) {
+        let mut first = vec![f64::NAN; u_ref.len()];
+        let mut second = vec![0.5; u_ref.len()];
+        let one = solve(&rows, &b, &u_ref, NO_LIMIT, &mut first);
+        solve(&others, &b, &u_ref, NO_LIMIT, &mut second);
+        let two = solve(&rows, &b, &u_ref, NO_LIMIT, &mut second);
+        prop_assert_eq!(one, two);
+        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(&first), bits(&second));
+    }
+
+    #[test]
+    fn extreme_data_give_a_finite_input_within_bounds((rows, b, u_ref, limit) in quadratic::extreme(0)) {
+        let mut u = vec![f64::NAN; u_ref.len()];
+        let solution = solve(&rows, &b, &u_ref, limit, &mut u);
+        prop_assert!(u.iter().all(|v| v.is_finite()), "{u:?} {solution:?}");
+        prop_assert!(b.contain(&u), "{u:?} {solution:?}");
+    }
+
+    /// A row twice, or in other units, is the same problem.
+    #[test]
+    fn scaling_a_row_changes_nothing((rows, b, u_ref) in several(), exponent in -200..200) {
+        let mut u = vec![f64::NAN; u_ref.len()];
+        let mut v = u.clone();
+        let one = solve(&rows, &b, &u_ref, NO_LIMIT, &mut u);
+        let mut in_other_units = rows.clone();
+        let factor = 2.0_f64.powi(exponent);
+        in_other_units[0].normal = rows[0].normal.map(|a| a * factor);
+        in_other_units[0].floor *= factor;
+        let two = solve(&in_other_units, &b, &u_ref, NO_LIMIT, &mut v);
+        prop_assert_eq!(one, two);
+        prop_assert_eq!(u, v);
+    }
+}
+
+#[test]
+fn a_feasible_reference_is_returned_bit_for_bit() {
+    let u_ref = [0.1 + 0.2, -0.0];
+    let mut u = [f64::NAN; 2];
+    let rows = [row(&[1.0, 0.0], 0.0), row(&[0.0, 1.0], -1.0)];
+    let solution = solve(&rows, &Bounds::NONE, &u_ref, NO_LIMIT, &mut u);
+    assert_eq!((solution.outcome, solution.solver), (Outcome::Optimal, Solver::Unchanged));
+    assert_eq!(u.map(f64::to_bits), u_ref.map(f64::to_bits));
+}
+
+#[test]
+fn rows_that_the_bounds_forbid_are_violated_least() {
+    let mut u = [f64::NAN; 2];
+    let rows = [row(&[1.0, 0.0], 5.0), row(&[0.0, -2.0], 5.0)];
+    let solution = solve(&rows, &bounds(&[-1.0; 2], &[1.0; 2]), &[0.25, 0.5], NO_LIMIT, &mut u);
+    assert_eq!((solution.outcome, solution.solver), (Outcome::Infeasible, Solver::InteriorPoint));
+    assert!((u[0] - 1.0).abs() < GAP && (u[1] + 1.0).abs() < GAP, "{u:?}");
+}
+
+#[test]
+fn contradictory_rows_share_the_violation() {
+    // u₁ ≥ 1 and u₁ ≤ −1: every u₁ between has the same total violation, 2; the nearest to u_ref wins.
+    let mut u = [f64::NAN; 2];
+    let rows = [row(&[1.0, 0.0], 1.0), row(&[-1.0, 0.0], 1.0)];
+    let solution = solve(&rows, &Bounds::NONE, &[0.25, 7.0], NO_LIMIT, &mut u);
+    assert_eq!(solution.outcome, Outcome::Infeasible);
+    assert!(u[0].abs() <= 1.0 + GAP && (u[1] - 7.0).abs() <= 0.01, "{u:?}");
+}
+
+/// A barrier that cannot be influenced does not switch the others off.
+#[test]
+fn a_vanishing_row_leaves_the_others_in_force() {
+    for vanishing in [row(&[0.0, 0.0], 1.0), row(&[1e-310, 0.0], 1.0), row(&[1e-200, 1e-200], 1.0)] {
+        let mut u = [f64::NAN; 2];
+        let rows = [vanishing, row(&[1.0, 0.0], 3.0)];
+        let solution = solve(&rows, &Bounds::NONE, &[0.5, 0.5], NO_LIMIT, &mut u);
+        assert_eq!(solution.outcome, Outcome::Degenerate, "{vanishing:?}");
+        assert!((u[0] - 3.0).abs() < GAP && (u[1] - 0.5).abs() < GAP, "{vanishing:?} {u:?}");
+    }
+    // The others hold already: the reference is left as it is.
+    for vanishing in [row(&[0.0, 0.0], 1.0), row(&[1e-310, 0.0], 1.0), row(&[1e-200, 1e-200], 1.0)] {
+        let mut u = [f64::NAN; 2];
+        let rows = [vanishing, row(&[1.0, 0.0], 0.25)];
+        let solution = solve(&rows, &Bounds::NONE, &[0.5, 0.5], NO_LIMIT, &mut u);
+        assert_eq!((solution.outcome, u), (Outcome::Degenerate, [0.5, 0.5]), "{vanishing:?}");
+    }
+    // One that asks for nothing is no defect.
+    let mut u = [f64::NAN; 2];
+    let rows = [row(&[0.0, 0.0], -1.0), row(&[1.0, 0.0], 3.0)];
+    let solution = solve(&rows, &Bounds::NONE, &[0.5, 0.5], NO_LIMIT, &mut u);
+    assert_eq!(solution.outcome, Outcome::Optimal);
+}

@@ -1,0 +1,173 @@
+//! Systems for the tests of derivatives, one for each case of `cas/generate.py`.
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::lie::{self, DerivativeSource};
+use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::scalar::Scalar;
+
+/// A matrix of zeros with `value` in the last row: one input, in the last equation.
+fn last_equation<S: Scalar, const NX: usize>(value: S) -> SMatrix<S, NX, 1> {
+    let mut g = SMatrix::zeros();
+    g[(NX - 1, 0)] = value;
+    g
+}
+
+/// ẋ₁ = x₂, ẋ₂ = −x₂²/8 − x₁³ + e^{−x₁/4} u.
+#[derive(Clone, Copy)]
+pub(crate) struct Cart;
+
+impl ControlAffine<2, 1> for Cart {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1], -x[1].squared() / 8.0 - x[0].powi(3)])
+    }
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        last_equation((-x[0] / 4.0).exp())
+    }
+}
+
+/// h = (1 + x₁²)^{−7/4} − x₁⁵/16 + (3 + x₁)⁻³.
+pub(crate) struct Powers;
+
+impl Barrier<2> for Powers {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+        (x[0].squared() + 1.0).powf(-1.75) - x[0].powi(5) / 16.0 + (x[0] + 3.0).powi(-3)
+    }
+}
+
+/// Four equations, a different function in each, u in the last.
+#[derive(Clone, Copy)]
+pub(crate) struct Chain4;
+
+impl ControlAffine<4, 1> for Chain4 {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        SVector::from([
+            x[1].sin(),
+            x[2] / (x[0].squared() + 1.0),
+            (-x[0]).exp() + x[3],
+            (x[0].sin() + 2.0).sqrt() * (x[1].squared() + 1.5).powf(0.625),
+        ])
+    }
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 1> {
+        last_equation(x[0].cos() + 2.0)
+    }
+}
+
+/// h = ln(2 + x₁) + atan x₁ − ½ tan(x₁/2).
+pub(crate) struct Logarithmic;
+
+impl Barrier<4> for Logarithmic {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+        (x[0] + 2.0).ln() + x[0].atan() - (x[0] / 2.0).tan() / 2.0
+    }
+}
+
+/// Eight equations, nonlinear terms that leave the order of u at eight.
+#[derive(Clone, Copy)]
+pub(crate) struct Chain8;
+
+impl ControlAffine<8, 1> for Chain8 {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 8>) -> SVector<S, 8> {
+        SVector::from([
+            x[1],
+            x[2],
+            x[3] + x[0].sin() / 2.0,
+            x[4],
+            x[5] - x[1] * x[2] / 4.0,
+            x[6],
+            x[7] + x[3].cos(),
+            -x[0],
+        ])
+    }
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 8>) -> SMatrix<S, 8, 1> {
+        last_equation(x[0].cos() + 2.0)
+    }
+}
+
+/// h = e^{−x₁/2} − 1.
+pub(crate) struct Exponential;
+
+impl Barrier<8> for Exponential {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 8>) -> S {
+        (-x[0] / 2.0).exp() - 1.0
+    }
+}
+
+/// A disc whose centre moves and whose radius breathes:
+/// h = 2 + cos(t)/4 − √((x_p − 8 − 3 sin(t/2))² + (y_p − t²/4 + 1)² + 1).
+pub(crate) struct MovingDisc;
+
+impl Barrier<4> for MovingDisc {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 4>) -> S {
+        let dx = x[0] - 8.0 - (t / 2.0).sin() * 3.0;
+        let dy = x[1] - t.squared() / 4.0 + 1.0;
+        t.cos() / 4.0 + 2.0 - (dx.squared() + dy.squared() + 1.0).sqrt()
+    }
+}
+
+/// h = 30 − v²/4.
+pub(crate) struct SpeedLimit;
+
+impl Barrier<4> for SpeedLimit {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+        -x[3].squared() / 4.0 + 30.0
+    }
+}
+
+/// h = 1 − x₂: for a state that no input reaches.
+pub(crate) struct SecondState;
+
+impl<const NX: usize> Barrier<NX> for SecondState {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+        -x[1] + 1.0
+    }
+}
+
+/// ẋ₁ = u, ẋ₂ = −x₂ + x₂²/2: the second state is autonomous.
+#[derive(Clone, Copy)]
+pub(crate) struct Uncoupled;
+
+impl ControlAffine<2, 1> for Uncoupled {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([S::zero(), -x[1] + x[1].squared() / 2.0])
+    }
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::one(), S::zero()]])
+    }
+}
+
+/// The quadratic disc of the cases `*/quadratic`.
+pub(crate) fn quadratic_disc() -> QuadraticDisc {
+    QuadraticDisc::new([45.0, 45.0], 2.0).expect("valid disc")
+}
+
+/// The distance-shaped disc of the cases `*/distance`.
+pub(crate) fn distance_disc() -> DistanceDisc {
+    DistanceDisc::new([40.5, -3.25], 2.5, 0.75).expect("valid disc")
+}
+
+/// The bicycle of the paper.
+pub(crate) fn bicycle() -> Bicycle {
+    Bicycle::new(10.0).expect("valid bicycle")
+}
+
+/// The derivatives of the case `name` of `values.csv`, at its relative degree.
+pub(crate) fn source(name: &str) -> Box<dyn DerivativeSource> {
+    match name {
+        "point_mass/quadratic" => lie::along(PointMass, quadratic_disc(), 2),
+        "point_mass/distance" => lie::along(PointMass, distance_disc(), 2),
+        "unicycle/quadratic" => lie::along(Unicycle, quadratic_disc(), 2),
+        "unicycle/distance" => lie::along(Unicycle, distance_disc(), 2),
+        "unicycle/moving" => lie::along(Unicycle, MovingDisc, 2),
+        "bicycle/quadratic" => lie::along(bicycle(), quadratic_disc(), 2),
+        "bicycle/distance" => lie::along(bicycle(), distance_disc(), 2),
+        "bicycle/speed" => lie::along(bicycle(), SpeedLimit, 1),
+        "cart/powers" => lie::along(Cart, Powers, 2),
+        "chain4" => lie::along(Chain4, Logarithmic, 4),
+        "chain8" => lie::along(Chain8, Exponential, 8),
+        _ => panic!("values.csv has the case {name}, which tests/support does not"),
+    }
+    .expect("a relative degree in range")
+}
