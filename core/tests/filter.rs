@@ -3,6 +3,7 @@
 mod scenario;
 
 use proptest::prelude::*;
+use punctual_core::convergence::FixedTimeState;
 use punctual_core::filter::{BarrierSettings, FilterState, Method, Phase, SafetyFilter, Status};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
@@ -129,9 +130,13 @@ fn anchoring_waits_for_the_first_valid_sample() {
     let state = filter.state().barriers[0];
     assert_eq!((state.phase, state.anchor_time), (Phase::Approach, 17.0));
     assert_eq!(filter.report().barriers[0].time_left, 5.0);
-    // Invalid samples later change nothing either.
+    // A sample that is lost later takes the guarantee with it and changes nothing else; a state above
+    // the profile, from which the lemma starts again, brings it back.
     step(&mut filter, 17.1, &[f64::NAN; 4]);
-    assert_eq!(filter.state().barriers[0], state);
+    assert_eq!(filter.state().barriers[0], FixedTimeState { guaranteed: false, ..state });
+    assert!(!filter.report().barriers[0].guaranteed);
+    step(&mut filter, 17.2, &[20.0, 20.0, 1.0, 0.0]);
+    assert!(filter.report().barriers[0].guaranteed);
 }
 
 #[test]

@@ -91,7 +91,8 @@ pub struct FixedTimeState {
     pub rate: f64,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
-    /// Whether the conditions of the theorem behind the present phase have held since it began.
+    /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
+    /// phase, and every step since then was satisfied (whoever enforces the row clears this if not).
     pub guaranteed: bool,
 }
 
@@ -149,11 +150,11 @@ impl FixedTime {
             state.arrival = Some(t);
         }
         match state.phase {
-            Phase::Stay if h[0] >= 0.0 => {}
             _ if stay::is_invariant(stay_rate, e) => {
                 state.phase = Phase::Stay;
                 state.guaranteed = true;
             }
+            Phase::Stay if h[0] >= 0.0 => {}
             Phase::Stay | Phase::Left => {
                 state.phase = Phase::Left;
                 state.guaranteed = false;
@@ -191,7 +192,7 @@ impl FixedTime {
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
-    fn approach(&self, state: &FixedTimeState, elapsed: f64, e: &[f64]) -> (f64, f64) {
+    fn approach(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64]) -> (f64, f64) {
         let anchor = &state.anchor[..self.n];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
@@ -201,7 +202,10 @@ impl FixedTime {
                 for k in 0..self.n {
                     error[k] = e[k] - r[k];
                 }
-                (r[self.n] - lower_terms(state.rate, &error[..self.n]), r[0])
+                let error = &error[..self.n];
+                // The lemma can start at any sample before the deadline, also after one that was lost.
+                state.guaranteed |= elapsed < self.settings.deadline && stay::is_invariant(state.rate, error);
+                (r[self.n] - lower_terms(state.rate, error), r[0])
             }
         }
     }

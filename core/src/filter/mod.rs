@@ -129,10 +129,7 @@ impl SafetyFilter {
         report.reset(t);
         if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
             report.status = Status::InvalidInput;
-            for (b, promise) in report.barriers.iter_mut().zip(&next.barriers) {
-                b.remember(promise);
-            }
-            safe_input(&self.bounds, u);
+            abstain(&self.state, &self.bounds, next, report, u);
             return Ok(());
         }
 
@@ -142,10 +139,8 @@ impl SafetyFilter {
             let n = channel.source.relative_degree();
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
             report_b.h = derivatives.drift[0];
-            let problem = defect(derivatives);
-            if let Some(status) = problem {
+            if let Some(status) = defect(derivatives) {
                 report.status = status;
-                report_b.remember(promise);
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
@@ -161,12 +156,7 @@ impl SafetyFilter {
             }
         }
         if report.status != Status::Unchanged {
-            // Nothing is remembered, so nothing else is reported.
-            next.clone_from(&self.state);
-            for (b, promise) in report.barriers.iter_mut().zip(&next.barriers) {
-                b.remember(promise);
-            }
-            safe_input(&self.bounds, u);
+            abstain(&self.state, &self.bounds, next, report, u);
             return Ok(());
         }
 
@@ -229,8 +219,14 @@ impl SafetyFilter {
     }
 }
 
-/// An input that is finite and within bounds when nothing is known: the admissible point nearest 0.
-fn safe_input(bounds: &Bounds, u: &mut [f64]) {
+/// A sample that enforces nothing: the admissible input nearest 0. The promises stay as they were in
+/// `state`, but those already given lose their guarantee.
+fn abstain(state: &FilterState, bounds: &Bounds, next: &mut FilterState, report: &mut Report, u: &mut [f64]) {
+    next.clone_from(state);
+    for (promise, b) in next.barriers.iter_mut().zip(&mut report.barriers) {
+        promise.guaranteed = false;
+        b.remember(promise);
+    }
     for (i, ui) in u.iter_mut().enumerate() {
         *ui = bounds.clamp(i, 0.0);
     }

@@ -19,7 +19,7 @@ pub enum Status {
     /// influenced at this instant): the bounded input of least violation, or u_ref without bounds.
     Degenerate = 3,
     /// Time, state or reference input is not a number or infinite: the admissible input nearest 0.
-    /// Nothing is remembered.
+    /// Nothing is remembered but that guarantees already given are lost.
     InvalidInput = 4,
     /// The model's derivatives are not finite at this state: the admissible input nearest 0.
     Singular = 5,
@@ -64,7 +64,8 @@ pub struct BarrierReport {
     pub arrived: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival_time: Option<f64>,
-    /// Whether the conditions of the theorem behind the present phase have held since it began.
+    /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
+    /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
     /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ.
     pub row: Row,
