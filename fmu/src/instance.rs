@@ -14,9 +14,17 @@ use crate::block::{self, Block, Values};
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
 
-/// Times that differ by less than this part of their size (or of 1 s) are the same communication
-/// point: importers accumulate time by addition, count it in nanoseconds or multiply it out.
+/// Times in s that differ by no more than this and [`TIME_ROUND_OFF`] are the same communication point:
+/// importers count time in nanoseconds.
 const SAME_TIME: f64 = 1e-9;
+
+/// Part of a time that is round-off, some hundred units in the last place: importers accumulate time
+/// by addition or multiply it out. Much less than any step, also where time is counted from 1970.
+const TIME_ROUND_OFF: f64 = 1e-13;
+
+/// Part of the last step by which a plant's next step may start later: importers that round times to
+/// their own resolution.
+const GAP: f64 = 1e-3;
 
 /// The modes of an instance, as flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,8 +55,8 @@ impl Mode {
     pub fn name(self) -> &'static str {
         match self {
             Self::INSTANTIATED => "instantiated",
-            Self::INITIALIZATION => "initialization mode",
-            Self::STEP => "step mode",
+            Self::INITIALIZATION => "initialization",
+            Self::STEP => "step",
             Self::TERMINATED => "terminated",
             _ => "several modes",
         }
@@ -57,37 +65,34 @@ impl Mode {
 
 /// The calls whose legality depends on the mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "each is the FMI function of its name")]
 pub enum Call {
-    SetDebugLogging,
+    /// `fmi2SetupExperiment`.
     SetupExperiment,
+    /// `fmi2EnterInitializationMode`; `fmi2SetupExperiment` before it is not insisted on.
     EnterInitializationMode,
+    /// `fmi2ExitInitializationMode`.
     ExitInitializationMode,
+    /// `fmi2Terminate`.
     Terminate,
-    Reset,
+    /// `fmi2GetReal` and its like.
     Get,
+    /// `fmi2SetReal` and its like.
     Set,
+    /// `fmi2DoStep`.
     DoStep,
-    CancelStep,
-    GetStatus,
-    Unsupported,
 }
 
-/// Call, its name in messages, and the modes in which it is legal (FMI 2.0.4, section 4.2.4, figure
-/// 11). Wider than the standard where importers are: values may be read in every mode.
-pub const LEGAL: [(Call, &str, Mode); 12] = [
-    (Call::SetDebugLogging, "fmi2SetDebugLogging", Mode::ANY),
-    (Call::SetupExperiment, "fmi2SetupExperiment", Mode::INSTANTIATED),
-    (Call::EnterInitializationMode, "fmi2EnterInitializationMode", Mode::INSTANTIATED),
-    (Call::ExitInitializationMode, "fmi2ExitInitializationMode", Mode::INITIALIZATION),
-    (Call::Terminate, "fmi2Terminate", Mode::STEP),
-    (Call::Reset, "fmi2Reset", Mode::ANY),
-    (Call::Get, "fmi2Get", Mode::ANY),
-    (Call::Set, "fmi2Set", Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
-    (Call::DoStep, "fmi2DoStep", Mode::STEP),
-    (Call::CancelStep, "fmi2CancelStep", Mode::STEP),
-    (Call::GetStatus, "fmi2GetStatus", Mode::ANY),
-    (Call::Unsupported, "a function that the capability flags exclude", Mode::ANY),
+/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11).
+/// Wider than the standard where importers are: values may be read in every mode. Calls that are not
+/// here are legal in every mode.
+pub const LEGAL: [(Call, Mode); 7] = [
+    (Call::SetupExperiment, Mode::INSTANTIATED),
+    (Call::EnterInitializationMode, Mode::INSTANTIATED),
+    (Call::ExitInitializationMode, Mode::INITIALIZATION),
+    (Call::Terminate, Mode::STEP),
+    (Call::Get, Mode::ANY),
+    (Call::Set, Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
+    (Call::DoStep, Mode::STEP),
 ];
 
 /// Why a call failed, for the log: what was given and what is allowed.
@@ -101,6 +106,10 @@ pub struct Instance {
     /// The present communication point in s.
     time: f64,
     values: Values,
+    /// Whether a step was made since initialization.
+    stepped: bool,
+    /// The length of the last step in s.
+    last_step: f64,
     /// Whether the outputs in `values` belong to the inputs in `values`.
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
@@ -131,6 +140,8 @@ impl Instance {
             block,
             mode: Mode::INSTANTIATED,
             time: 0.0,
+            stepped: false,
+            last_step: 0.0,
             values,
             fresh: false,
             configured: false,
@@ -160,16 +171,16 @@ impl Instance {
     ///
     /// A call that [`LEGAL`] excludes in this mode.
     pub fn check(&self, call: Call) -> Result<(), Failure> {
-        let (_, name, modes) = LEGAL[call as usize];
+        let (_, modes) = LEGAL[call as usize];
         if self.mode.is_in(modes) {
             return Ok(());
         }
         let allowed: Vec<_> = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED]
             .into_iter()
             .filter(|m| m.is_in(modes))
-            .map(Mode::name)
+            .map(|mode| format!("{:?}", mode.name()))
             .collect();
-        Err(format!("{name} is not allowed in mode {}, only in {}", self.mode.name(), allowed.join(", ")))
+        Err(format!("not allowed in the mode {:?}, only in {}", self.mode.name(), allowed.join(", ")))
     }
 
     /// Takes the start time; tolerance and stop time are not needed.
@@ -230,6 +241,8 @@ impl Instance {
     pub fn reset(&mut self) {
         self.mode = Mode::INSTANTIATED;
         self.time = 0.0;
+        self.stepped = false;
+        self.last_step = 0.0;
         self.fresh = false;
         self.configured = false;
         let len = self.product.variables.len();
@@ -241,11 +254,22 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// The wrong mode; a time that is not finite or lies before the present communication point; a
-    /// step that is not finite or negative; what the block itself refuses.
+    /// The wrong mode; a time that is not finite or lies before the present communication point; for a
+    /// plant also one after it (a part of its motion would be missing); a step that is not finite or
+    /// negative; what the block itself refuses. Importers that ignore the error see it in the outputs
+    /// of a filter: `status` is `invalid_input` and `u` nearest 0 until an input is set or a step made.
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.check(Call::DoStep)?;
-        let same = SAME_TIME * t.abs().max(1.0);
+        let done = self.step(t, h);
+        if done.is_err() {
+            self.block.show_refusal(&mut self.values);
+            self.fresh = true;
+        }
+        done
+    }
+
+    fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        let same = SAME_TIME + TIME_ROUND_OFF * t.abs();
         if !t.is_finite() || t < self.time - same {
             return Err(format!(
                 "currentCommunicationPoint is {t}, must be finite and not before the present one, {}",
@@ -255,9 +279,22 @@ impl Instance {
         if !(h.is_finite() && h >= 0.0) {
             return Err(format!("communicationStepSize is {h} at t = {t}, must be finite and >= 0"));
         }
-        let start = if t <= self.time + same { self.time } else { t };
+        if !(t + h).is_finite() {
+            return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
+        }
+        let gap = t - self.time;
+        if self.stepped && !self.block.accepts_gaps() && gap > same.max(GAP * self.last_step) {
+            return Err(format!(
+                "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
+                self.time
+            ));
+        }
+        let start = if gap <= same { self.time } else { t };
         self.block.step(start, h, &mut self.values)?;
-        self.time = t + h;
+        // Not before `start`: a tiny step from a time that is early by round-off must not go back.
+        self.time = (t + h).max(start);
+        self.stepped = true;
+        self.last_step = h;
         self.fresh = true;
         Ok(())
     }

@@ -18,7 +18,7 @@ use crate::configuration::{
 /// Log categories: name and meaning.
 pub const LOG_CATEGORIES: [(&str, &str); 2] = [
     ("logStatusError", "calls that failed, with the reason"),
-    ("logEvents", "what happened: anchors, arrivals, resets"),
+    ("logEvents", "what happened: instantiation, initialization, reset"),
 ];
 
 /// Everything derived from one configuration.
@@ -124,23 +124,8 @@ fn guid(canonical: &str, variables: &[Variable]) -> String {
     format!("{{{}}}", Uuid::new_v5(&Uuid::NAMESPACE_OID, text.as_bytes()))
 }
 
-/// The units used, by name, as exponents of SI base units: kg is never needed here.
+/// The units used. One that [`base_unit`] cannot read is left out, and the XML is then refused.
 fn units(variables: &[Variable]) -> Vec<Unit> {
-    let unit = |name: &str| {
-        let (m, s, rad) = match name {
-            "m" => (1, 0, 0),
-            "m2" => (2, 0, 0),
-            "s" => (0, 1, 0),
-            "1/s" => (0, -1, 0),
-            "m/s" => (1, -1, 0),
-            "m/s2" => (1, -2, 0),
-            "m2/s2" => (2, -2, 0),
-            "rad" => (0, 0, 1),
-            "rad/s" => (0, -1, 1),
-            _ => unreachable!("unit {name} is missing from the table; the test of this module finds it"),
-        };
-        Unit { name: name.to_owned(), base: BaseUnit { m, s, rad, ..BaseUnit::default() } }
-    };
     let mut names: Vec<&str> = variables
         .iter()
         .filter_map(|v| match &v.kind {
@@ -150,7 +135,30 @@ fn units(variables: &[Variable]) -> Vec<Unit> {
         .collect();
     names.sort_unstable();
     names.dedup();
-    names.into_iter().map(unit).collect()
+    names
+        .into_iter()
+        .filter_map(|name| Some(Unit { name: name.to_owned(), base: base_unit(name)? }))
+        .collect()
+}
+
+/// The exponents of SI base units in a name such as `m`, `1/s` or `m2/s2`; kg is never needed here.
+fn base_unit(name: &str) -> Option<BaseUnit> {
+    let mut base = BaseUnit::default();
+    for (part, sign) in name.splitn(2, '/').zip([1, -1]) {
+        let symbol = part.trim_end_matches(|c: char| c.is_ascii_digit());
+        let exponent = match &part[symbol.len()..] {
+            "" => 1,
+            digits => digits.parse().ok()?,
+        };
+        match symbol {
+            "" if part == "1" => {}
+            "m" => base.m = sign * exponent,
+            "s" => base.s = sign * exponent,
+            "rad" => base.rad = sign * exponent,
+            _ => return None,
+        }
+    }
+    Some(base)
 }
 
 /// The enumeration type of `status`.
@@ -302,7 +310,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         let slack = "row times u minus its floor; < 0: the constraint is violated by that much";
         table.add(name("slack"), slack, output, real(None, rate_unit));
         table.add(name("arrived"), "h >= 0 has been reached", output, flag());
-        let guaranteed = "the conditions of the theorem have held since the phase began";
+        let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
         table.add(name("guaranteed"), guaranteed, output, flag());
         table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
         debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
@@ -345,3 +353,6 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
     let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, parameters, end };
     (table, layout)
 }
+
+#[cfg(test)]
+mod tests;

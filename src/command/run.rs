@@ -68,6 +68,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let base = path.parent().unwrap_or(Path::new(""));
     let mut simulation = Simulation::new(&system, base).map_err(|e| e.in_file(path))?;
 
+    if let Some(folder) = &arguments.out {
+        // Before the run, which may be long.
+        std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
+    }
+
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
     let outcome = simulation.run(|time, _| {
@@ -91,9 +96,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes the CSV file and the pictures; returns their paths.
+/// Writes the CSV file and the pictures into `folder`, which exists; returns their paths.
 fn write_files(system: &System, path: &Path, folder: &Path, outcome: &Outcome) -> Result<Vec<String>, Error> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let stem = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned());
     let csv = folder.join(format!("{stem}.csv"));
     outcome.recording.save_csv(&csv)?;

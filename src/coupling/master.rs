@@ -103,8 +103,15 @@ impl Simulation {
     pub fn new(system: &System, base: &Path) -> Result<Self, Error> {
         let mut opened: Vec<(PathBuf, Rc<Fmu>)> = Vec::new();
         let mut fmus = Vec::new();
-        for component in system.components() {
+        for (i, component) in system.components().iter().enumerate() {
             let path = base.join(&component.fmu);
+            if !path.exists() {
+                let message = format!(
+                    "there is no file {}; `punctual build` makes an FMU from a configuration",
+                    path.display()
+                );
+                return Err(Error::configuration(format!("component[{i}].fmu"), message));
+            }
             let shared = opened.iter().find(|(other, fmu)| {
                 *other == path && !fmu.description().capabilities.can_be_instantiated_only_once_per_process
             });

@@ -388,7 +388,13 @@ impl<'a> Resolver<'a> {
 
 /// "≥ a", "≤ b" or "from a to b".
 fn range(min: f64, max: f64, unit: &str) -> String {
-    match (min.is_finite(), max.is_finite()) {
+    let number = |value: f64| {
+        let size = value.abs();
+        if size == 0.0 || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
+    };
+    let (low, high) = (min.is_finite(), max.is_finite());
+    let (min, max) = (number(min), number(max));
+    match (low, high) {
         (true, true) => format!("from {min} to {max}{unit}"),
         (true, false) => format!("≥ {min}{unit}"),
         _ => format!("≤ {max}{unit}"),

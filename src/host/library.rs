@@ -4,6 +4,7 @@
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
+use super::archive::chain;
 use super::logging::{CallbackFunctions, owned};
 use crate::error::FmuProblem;
 
@@ -77,7 +78,7 @@ impl Library {
     /// Loads the library, resolves every function used and asks for its version. Its undefined
     /// symbols are resolved now, so that none is missed in mid-run; its own stay its own.
     pub(super) fn load(path: &Path) -> Result<Self, FmuProblem> {
-        let library = open(path).map_err(|e| FmuProblem::Load(e.to_string()))?;
+        let library = open(path).map_err(|e| FmuProblem::Load(chain(&e)))?;
         let functions = Functions::resolve(&library)?;
         let asked = [
             ("fmi2GetVersion", functions.get_version, "2."),

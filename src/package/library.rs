@@ -17,7 +17,8 @@ pub const VARIABLE: &str = "PUNCTUAL_FMU_LIBRARY";
 ///
 /// A file that cannot be read, or no library anywhere.
 pub fn read(given: Option<&Path>) -> Result<Vec<u8>, Error> {
-    let path = match given.map(Path::to_owned).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from)) {
+    let named = || std::env::var_os(VARIABLE).filter(|name| !name.is_empty()).map(PathBuf::from);
+    let path = match given.map(Path::to_owned).or_else(named) {
         Some(path) => path,
         None => find()?,
     };

@@ -35,9 +35,9 @@ pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
 /// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold.
 pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
     let broken = |e: punctual_modeldescription::Error| Error::configuration("", e.to_string());
-    let timestamp = match std::env::var("SOURCE_DATE_EPOCH") {
-        Ok(text) => Timestamp::from_source_date_epoch(&text).map_err(broken)?,
-        Err(_) => Timestamp::default(),
+    let timestamp = match std::env::var_os("SOURCE_DATE_EPOCH") {
+        Some(text) => Timestamp::from_source_date_epoch(&text.to_string_lossy()).map_err(broken)?,
+        None => Timestamp::default(),
     };
     let description = product.model_description();
     let canonical = product.configuration.canonical()?;
@@ -54,7 +54,8 @@ pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
 }
 
 /// Writes the FMU of `configuration` to `file`, then opens the file as an importer would: reads its
-/// description, loads the library, makes an instance and initialises it.
+/// description, loads the library, makes an instance and initialises it. A product that does not work
+/// is removed again.
 ///
 /// # Errors
 ///
@@ -65,6 +66,14 @@ pub fn build(configuration: Configuration, library: Option<&Path>, file: &Path) 
         .to_bytes()
         .map_err(|e| Error::configuration("", e.to_string()))?;
     std::fs::write(file, bytes).map_err(|e| Error::io("write", file, e))?;
+    tried(&product, file).inspect_err(|_| {
+        // If this fails too, the first error is the one to tell.
+        let _ = std::fs::remove_file(file);
+    })
+}
+
+/// Opens the FMU of `product` at `file` and initialises an instance.
+fn tried(product: &Product, file: &Path) -> Result<Rc<Fmu>, Error> {
     let fmu = Rc::new(Fmu::open(file)?);
     let mut slave = Slave::instantiate(Rc::clone(&fmu), product.configuration.name())?;
     let experiment = product.configuration.experiment();

@@ -1,7 +1,7 @@
 //! The one boundary between C and Rust: NULL checks, panics, slices.
 
 use std::any::Any;
-use std::ffi::{CStr, c_void};
+use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, Once, PoisonError};
 
@@ -85,8 +85,8 @@ pub(super) unsafe fn slice<'a, T>(name: &str, pointer: *const T, len: usize) -> 
     if len == 0 {
         return Ok(&[]);
     }
-    check_array(name, pointer.cast(), len, size_of::<T>())?;
-    // SAFETY: not NULL, of possible size, and the caller's contract.
+    check_array(name, pointer, len)?;
+    // SAFETY: not NULL, aligned, of possible size, and the caller's contract.
     Ok(unsafe { std::slice::from_raw_parts(pointer, len) })
 }
 
@@ -107,16 +107,19 @@ pub(super) unsafe fn slice_mut<'a, T>(
     if len == 0 {
         return Ok(&mut []);
     }
-    check_array(name, pointer.cast(), len, size_of::<T>())?;
-    // SAFETY: not NULL, of possible size, and the caller's contract.
+    check_array(name, pointer.cast_const(), len)?;
+    // SAFETY: not NULL, aligned, of possible size, and the caller's contract.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, len) })
 }
 
-fn check_array(name: &str, pointer: *const c_void, len: usize, size: usize) -> Result<(), Failure> {
+fn check_array<T>(name: &str, pointer: *const T, len: usize) -> Result<(), Failure> {
     if pointer.is_null() {
         return Err(format!("{name} is NULL with {len} elements"));
     }
-    if len > isize::MAX as usize / size {
+    if !pointer.is_aligned() {
+        return Err(format!("{name} is not aligned to {} bytes", align_of::<T>()));
+    }
+    if len > isize::MAX as usize / size_of::<T>() {
         return Err(format!("{name} cannot have {len} elements"));
     }
     Ok(())
@@ -134,3 +137,6 @@ pub(super) unsafe fn text(pointer: StringPointer) -> Option<String> {
     // SAFETY: not NULL, and the caller's contract.
     Some(unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned())
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,6 @@
 //! A filter: samples its inputs, remembers its promises.
 
-use punctual_core::filter::{FilterState, SafetyFilter};
+use punctual_core::filter::{FilterState, SafetyFilter, Status};
 
 use super::{Block, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
@@ -99,5 +99,20 @@ impl Block for FilterBlock {
 
     fn direct_feedthrough(&self) -> bool {
         self.configuration.direct_feedthrough
+    }
+
+    fn accepts_gaps(&self) -> bool {
+        true
+    }
+
+    fn show_refusal(&self, values: &mut Values) {
+        let (outputs, inputs) = (self.layout.outputs, self.layout.inputs);
+        let names = self.configuration.plant.model.inputs();
+        for (i, input) in names.iter().enumerate() {
+            let [min, max] = self.configuration.bounds.get(input.name).copied().unwrap_or_default();
+            // Not `clamp`, which panics where the bounds contradict each other.
+            values.reals[outputs + i] = 0.0_f64.max(min).min(max);
+        }
+        values.integers[outputs + inputs] = Status::InvalidInput as i32;
     }
 }

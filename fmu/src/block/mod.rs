@@ -49,6 +49,12 @@ pub trait Block: Send {
 
     /// Whether outputs depend on inputs without a step between.
     fn direct_feedthrough(&self) -> bool;
+
+    /// Whether a step may start later than the last one ended.
+    fn accepts_gaps(&self) -> bool;
+
+    /// Shows in the outputs, where they can, that a step was refused.
+    fn show_refusal(&self, values: &mut Values);
 }
 
 /// The block of a product, configured with its start values.

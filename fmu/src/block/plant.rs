@@ -77,4 +77,12 @@ impl Block for PlantBlock {
     fn direct_feedthrough(&self) -> bool {
         false
     }
+
+    fn accepts_gaps(&self) -> bool {
+        false
+    }
+
+    fn show_refusal(&self, _values: &mut Values) {
+        // A state has no value that says so; the next step is refused too, because time stands still.
+    }
 }

@@ -15,6 +15,9 @@ use super::{
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
 
+/// Default margin of a `disc`, as a part of its radius.
+const MARGIN_OF_RADIUS: f64 = 0.01;
+
 /// The shape of a barrier.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -50,7 +53,7 @@ pub struct BarrierSection {
     pub centre: [f64; 2],
     /// Radius in m, > 0.
     pub radius: f64,
-    /// `disc` only: ε in m, > 0. Default: the radius.
+    /// `disc` only: ε in m, ≥ 0. Default 0: the radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub smoothing: Option<f64>,
     /// Deadline T in s after the first step, > 0.
@@ -58,15 +61,16 @@ pub struct BarrierSection {
     /// How it is met. Default `reference_profile`.
     #[serde(default)]
     pub method: MethodName,
-    /// Rate a of the profile method in 1/s, > 0. Default 20 / deadline.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub rate: Option<f64>,
-    /// Rate of the stay constraint in 1/s, > 0. Default: `rate`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stay_rate: Option<f64>,
-    /// Margin μ in the unit of h, ≥ 0. Default 0.
+    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
     #[serde(default)]
-    pub margin: f64,
+    pub rate: f64,
+    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`.
+    #[serde(default)]
+    pub stay_rate: f64,
+    /// Margin μ in the unit of h, ≥ 0. Default: a hundredth of the radius for `disc`, none for
+    /// `quadratic_disc`.
+    #[serde(default)]
+    pub margin: Option<f64>,
 }
 
 impl BarrierSection {
@@ -74,16 +78,17 @@ impl BarrierSection {
         check_identifier(&format!("{path}.name"), &self.name)?;
         match self.shape {
             ShapeName::Disc => {
-                self.smoothing.get_or_insert(self.radius);
+                self.smoothing.get_or_insert(0.0);
+                self.margin.get_or_insert(MARGIN_OF_RADIUS * self.radius);
             }
             ShapeName::QuadraticDisc if self.smoothing.is_some() => {
                 let message = "belongs to the shape disc; quadratic_disc has none";
                 return Err(ConfigurationError::new(format!("{path}.smoothing"), message));
             }
-            ShapeName::QuadraticDisc => {}
+            ShapeName::QuadraticDisc => {
+                self.margin.get_or_insert(0.0);
+            }
         }
-        let rate = *self.rate.get_or_insert(BarrierSettings::within(self.deadline).rate);
-        self.stay_rate.get_or_insert(rate);
         Ok(())
     }
 
@@ -109,13 +114,23 @@ impl BarrierSection {
             row("deadline", "s", Range::POSITIVE, "time from the first step to be inside", |b| {
                 &mut b.deadline
             }),
-            row("rate", "1/s", Range::POSITIVE, "decay rate of an error against the profile", |b| {
-                b.rate.get_or_insert(0.0)
+            row(
+                "rate",
+                "1/s",
+                Range::NON_NEGATIVE,
+                "decay rate of an error against the profile; 0: 20 / deadline",
+                |b| &mut b.rate,
+            ),
+            row(
+                "stay_rate",
+                "1/s",
+                Range::NON_NEGATIVE,
+                "rate of the constraint that keeps it inside; 0: as rate",
+                |b| &mut b.stay_rate,
+            ),
+            row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| {
+                b.margin.get_or_insert(0.0)
             }),
-            row("stay_rate", "1/s", Range::POSITIVE, "rate of the constraint that keeps it inside", |b| {
-                b.stay_rate.get_or_insert(0.0)
-            }),
-            row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| &mut b.margin),
             row("centre[1]", "m", Range::FINITE, "centre along x", |b| &mut b.centre[0]),
             row("centre[2]", "m", Range::FINITE, "centre along y", |b| &mut b.centre[1]),
             row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius),
@@ -124,8 +139,8 @@ impl BarrierSection {
             rows.push(row(
                 "smoothing",
                 "m",
-                Range::POSITIVE,
-                "rounding of the distance at the centre",
+                Range::NON_NEGATIVE,
+                "rounding of the distance at the centre; 0: the radius",
                 |b| b.smoothing.get_or_insert(0.0),
             ));
         }
@@ -133,15 +148,17 @@ impl BarrierSection {
     }
 
     fn settings(&self) -> BarrierSettings {
+        let default = |value: f64, default: f64| if value == 0.0 { default } else { value };
+        let rate = default(self.rate, BarrierSettings::within(self.deadline).rate);
         BarrierSettings {
             deadline: self.deadline,
             method: match self.method {
                 MethodName::ReferenceProfile => Method::ReferenceProfile,
                 MethodName::RepeatedRoot => Method::RepeatedRoot,
             },
-            rate: self.rate.unwrap_or(f64::NAN),
-            stay_rate: self.stay_rate.unwrap_or(f64::NAN),
-            margin: self.margin,
+            rate,
+            stay_rate: default(self.stay_rate, rate),
+            margin: self.margin.unwrap_or(0.0),
         }
     }
 }
@@ -235,7 +252,7 @@ impl FilterConfiguration {
 
     /// The numbers that are parameters of the FMU.
     pub fn parameters(&self) -> Vec<Parameter<Self>> {
-        let range = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED), above_min: false };
+        let range = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
         let mut rows = Vec::new();
         for (side, prefix, word) in [(0, "u_min", "smallest"), (1, "u_max", "largest")] {
             for input in self.plant.model.inputs() {
@@ -268,7 +285,7 @@ impl FilterConfiguration {
             };
             builder = match section.shape {
                 ShapeName::Disc => {
-                    let smoothing = section.smoothing.unwrap_or(f64::NAN);
+                    let smoothing = section.smoothing.filter(|s| *s != 0.0).unwrap_or(section.radius);
                     let disc = DistanceDisc::new(section.centre, section.radius, smoothing).map_err(core)?;
                     self.add(builder, i, disc)?
                 }
@@ -282,7 +299,10 @@ impl FilterConfiguration {
         for input in inputs {
             let [low, high] = self.bounds.get(input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
             if low > high {
-                let message = format!("is [{low}, {high}], must be [min, max] with min <= max");
+                let message = format!(
+                    "is [{low}, {high}], must be [min, max] with min <= max (in an FMU: u_min.{name}, u_max.{name})",
+                    name = input.name
+                );
                 return Err(ConfigurationError::new(format!("bounds.{}", input.name), message));
             }
             min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });

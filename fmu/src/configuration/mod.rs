@@ -47,9 +47,18 @@ impl Configuration {
         // Reading in two steps keeps the path of a field in the message, which an enum would lose.
         #[derive(Deserialize)]
         struct Head {
-            kind: Kind,
+            kind: Option<Kind>,
+            component: Option<serde::de::IgnoredAny>,
         }
-        Ok(match read_toml::<Head>(text)?.kind {
+        let head = read_toml::<Head>(text)?;
+        let Some(kind) = head.kind else {
+            let message = match head.component {
+                Some(_) => "missing: this is a system file, which `punctual run` takes",
+                None => "missing, must be \"filter\" or \"plant\"",
+            };
+            return Err(ConfigurationError::new("kind", message));
+        };
+        Ok(match kind {
             Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed()?),
             Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed()?),
         })
@@ -127,3 +136,6 @@ fn check_identifier(field: &str, name: &str) -> Result<(), ConfigurationError> {
         format!("is {name:?}, must be letters, digits and underscores, not starting with a digit (1 to 64)");
     Err(ConfigurationError::new(field, message))
 }
+
+#[cfg(test)]
+mod tests;

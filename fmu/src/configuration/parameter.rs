@@ -9,32 +9,30 @@ pub struct Range {
     pub min: Option<f64>,
     /// Largest value, if there is one.
     pub max: Option<f64>,
-    /// Whether `min` itself is excluded.
-    pub above_min: bool,
 }
 
 impl Range {
     /// Any finite number.
-    pub const FINITE: Self = Self { min: None, max: None, above_min: false };
-    /// Finite and > 0.
-    pub const POSITIVE: Self = Self { min: Some(0.0), max: None, above_min: true };
+    pub const FINITE: Self = Self { min: None, max: None };
+    /// Finite and positive: at least 1e-9 of the unit. A model description knows inclusive bounds only.
+    pub const POSITIVE: Self = Self { min: Some(1e-9), max: None };
     /// Finite and ≥ 0.
-    pub const NON_NEGATIVE: Self = Self { min: Some(0.0), max: None, above_min: false };
+    pub const NON_NEGATIVE: Self = Self { min: Some(0.0), max: None };
 
     /// Whether `value` is finite and within the range.
     pub fn contains(&self, value: f64) -> bool {
-        let low = self.min.is_none_or(|min| value > min || (!self.above_min && value == min));
-        value.is_finite() && low && self.max.is_none_or(|max| value <= max)
+        value.is_finite()
+            && self.min.is_none_or(|min| value >= min)
+            && self.max.is_none_or(|max| value <= max)
     }
 
-    /// The range in words, e.g. "finite and > 0".
+    /// The range in words, e.g. "finite and >= 0".
     pub fn describe(&self) -> String {
         let mut words = "finite".to_owned();
-        if let Some(min) = self.min {
-            words += &format!(" and {} {min}", if self.above_min { ">" } else { ">=" });
-        }
-        if let Some(max) = self.max {
-            words += &format!(" and <= {max}");
+        for (sign, bound) in [(">=", self.min), ("<=", self.max)] {
+            if let Some(bound) = bound {
+                words += &format!(" and {sign} {}", number(bound));
+            }
         }
         words
     }
@@ -48,8 +46,14 @@ impl Range {
         if self.contains(value) {
             return Ok(());
         }
-        Err(ConfigurationError::new(field, format!("is {value}, must be {}", self.describe())))
+        Err(ConfigurationError::new(field, format!("is {}, must be {}", number(value), self.describe())))
     }
+}
+
+/// A number for people: with an exponent where it would have many zeros.
+pub(super) fn number(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
 }
 
 /// How a parameter's number is reached in a completed configuration of type `C`.

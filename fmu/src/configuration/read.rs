@@ -54,7 +54,9 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, ConfigurationErro
     serde_path_to_error::deserialize(de).map_err(|e| {
         let path = e.path().to_string();
         let path = if path == "." { String::new() } else { path };
-        ConfigurationError::new(path, e.inner().to_string().trim_end().to_owned())
+        // The file is TOML; what is wrong at that place follows.
+        let text = e.inner().to_string().replacen("TOML parse error at ", "at ", 1);
+        ConfigurationError::new(path, text.trim_end())
     })
 }
 

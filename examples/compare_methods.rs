@@ -1,0 +1,82 @@
+//! Two ways to keep the same deadline, side by side: the paper's repeated root on its quadratic disc,
+//! and the reference profile on a distance-shaped one. Same set, same start, same deadline; what
+//! differs is the effort and whether the deadline survives sampling.
+//!
+//! Run with `cargo run --example compare_methods`.
+#![expect(clippy::print_stdout, reason = "an example shows its result")]
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
+use punctual_core::filter::{BarrierSettings, Method, SafetyFilter};
+use punctual_core::nalgebra::{self, Vector2, Vector4, vector};
+use punctual_core::plants::Unicycle;
+use punctual_core::simulation::{Schedule, closed_loop};
+
+const CENTRE: [f64; 2] = [45.0, 45.0]; // m
+const RADIUS: f64 = 2.0; // m
+const DEADLINE: f64 = 10.0; // s
+const STEP: f64 = 0.001; // s
+
+/// What a run until twice the deadline came to.
+struct Run {
+    /// First sample inside, in s.
+    arrival: f64,
+    /// Largest distance from the disc from the deadline on, in m; 0 inside.
+    outside: f64,
+    /// Largest acceleration (m/s²) and turning rate (rad/s) before arrival.
+    peak: Vector2<f64>,
+}
+
+/// Runs the unicycle from rest in the origin.
+fn run(
+    barrier: impl Barrier<4> + Send + 'static,
+    settings: BarrierSettings,
+    nominal: fn(&Vector4<f64>) -> Vector2<f64>,
+) -> Result<Run, punctual_core::Error> {
+    let mut filter = SafetyFilter::builder(4, 2).barrier("goal", Unicycle, barrier, settings)?.build()?;
+    let schedule = Schedule { step: STEP, steps: (2.0 * DEADLINE / STEP).round() as usize, substeps: 1 };
+    let mut run = Run { arrival: f64::INFINITY, outside: 0.0, peak: Vector2::zeros() };
+    closed_loop(
+        &mut filter,
+        &Unicycle,
+        Vector4::zeros(),
+        schedule,
+        |_, x| nominal(x),
+        |t, x, u, report| {
+            if let Some(arrival) = report.barriers[0].arrival_time {
+                run.arrival = arrival;
+            } else {
+                run.peak = run.peak.sup(&u.abs());
+            }
+            if t >= DEADLINE {
+                let distance = (x[0] - CENTRE[0]).hypot(x[1] - CENTRE[1]);
+                run.outside = run.outside.max(distance - RADIUS);
+            }
+        },
+    )?;
+    Ok(run)
+}
+
+fn main() -> Result<(), punctual_core::Error> {
+    let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(DEADLINE) };
+    let paper = run(QuadraticDisc::new(CENTRE, RADIUS)?, root, |_| Vector2::zeros())?;
+
+    // The margin is what the held input may cost between samples; damping keeps the arrival gentle.
+    let profile = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let ours = run(DistanceDisc::new(CENTRE, RADIUS, RADIUS)?, profile, |x| vector![-x[3], 0.0])?;
+
+    println!("method              arrival  outside after deadline  peak acceleration  peak turning rate");
+    for (name, run) in [("repeated root", &paper), ("reference profile", &ours)] {
+        let Run { arrival, outside, peak } = run;
+        println!(
+            "{name:<18} {arrival:>6.3} s {outside:>21.3} m {:>13.1} m/s² {:>12.1} rad/s",
+            peak[0], peak[1]
+        );
+    }
+
+    assert!(paper.arrival > DEADLINE, "sampling costs the repeated root its deadline");
+    assert!(ours.arrival <= DEADLINE && ours.outside == 0.0, "the reference profile keeps it");
+    assert!(ours.peak[0] < 10.0, "with what a car can do");
+    assert!(paper.peak[0] > 100.0 * ours.peak[0], "at a hundredth of the effort");
+    Ok(())
+}

@@ -1,0 +1,220 @@
+//! Every defect of a configuration with its message, and the canonical form.
+
+use std::collections::BTreeSet;
+
+use super::*;
+
+const FILTER: &str = r#"
+kind = "filter"
+plant = { model = "unicycle" }
+bounds = { a = [-9.0, 8.0] }
+[[barrier]]
+name = "goal"
+centre = [45.0, 44.0]
+radius = 2.0
+deadline = 10.0
+"#;
+
+const PLANT: &str = r#"
+kind = "plant"
+plant = { model = "bicycle", l_r = 3.0 }
+x0 = { v = 1.5 }
+[integration]
+inner_step = 0.01
+"#;
+
+/// What the defective file is refused with; `from` stands exactly once in `valid`.
+fn refusal(valid: &str, from: &str, to: &str) -> String {
+    assert_eq!(valid.matches(from).count(), 1, "{from:?} in {valid}");
+    Configuration::parse(valid).expect("the file without the defect");
+    match Configuration::parse(&valid.replace(from, to)) {
+        Ok(configuration) => panic!("{to:?} was taken: {configuration:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+macro_rules! defects {
+    ($($test:ident: $valid:ident, $from:literal => $to:literal, $message:literal;)*) => {$(
+        #[test]
+        fn $test() {
+            assert_eq!(refusal($valid, $from, $to), $message);
+        }
+    )*};
+}
+
+defects! {
+    negative_deadline: FILTER, "deadline = 10.0" => "deadline = -1.0",
+        "barrier[0].deadline: is -1, must be finite and >= 1e-9";
+    zero_deadline: FILTER, "deadline = 10.0" => "deadline = 0.0",
+        "barrier[0].deadline: is 0, must be finite and >= 1e-9";
+    nan_deadline: FILTER, "deadline = 10.0" => "deadline = nan",
+        "barrier[0].deadline: is NaN, must be finite and >= 1e-9";
+    radius_zero: FILTER, "radius = 2.0" => "radius = 0.0", "barrier[0].radius: is 0, must be finite and >= 1e-9";
+    negative_margin: FILTER, "radius = 2.0" => "radius = 2.0\nmargin = -0.1",
+        "barrier[0].margin: is -0.1, must be finite and >= 0";
+    negative_rate: FILTER, "radius = 2.0" => "radius = 2.0\nrate = -1.0",
+        "barrier[0].rate: is -1, must be finite and >= 0";
+    negative_stay_rate: FILTER, "radius = 2.0" => "radius = 2.0\nstay_rate = -1.0",
+        "barrier[0].stay_rate: is -1, must be finite and >= 0";
+    negative_smoothing: FILTER, "radius = 2.0" => "radius = 2.0\nsmoothing = -1.0",
+        "barrier[0].smoothing: is -1, must be finite and >= 0";
+    infinite_centre: FILTER, "[45.0, 44.0]" => "[45.0, inf]", "barrier[0].centre[2]: is inf, must be finite";
+    smoothing_of_a_quadratic_disc: FILTER,
+        "radius = 2.0" => "radius = 2.0\nshape = \"quadratic_disc\"\nsmoothing = 1.0",
+        "barrier[0].smoothing: belongs to the shape disc; quadratic_disc has none";
+    unknown_input: FILTER, "a = [-9.0, 8.0]" => "b = [-9.0, 8.0]",
+        "bounds.b: unknown input, must be one of a, omega";
+    nan_bound: FILTER, "[-9.0, 8.0]" => "[nan, 8.0]",
+        "bounds.a: is NaN, must be finite and >= -1e30 and <= 1e30";
+    inverted_bounds: FILTER, "[-9.0, 8.0]" => "[9.0, 8.0]",
+        "bounds.a: is [9, 8], must be [min, max] with min <= max (in an FMU: u_min.a, u_max.a)";
+    lower_bound_plus_infinity: FILTER, "[-9.0, 8.0]" => "[inf, inf]",
+        "bounds.a: is inf, must be finite and >= -1e30 and <= 1e30";
+    zero_correction_limit: FILTER, "kind = \"filter\"" => "kind = \"filter\"\ncorrection_limit = 0.0",
+        "correction_limit: is 0, must be finite and > 0";
+    name_with_a_blank: FILTER, "kind = \"filter\"" => "kind = \"filter\"\nname = \"my filter\"",
+        "name: is \"my filter\", must be letters, digits and underscores, not starting with a digit (1 to 64)";
+    reserved_barrier_name: FILTER, "\"goal\"" => "\"u_ref\"",
+        "barrier[0].name: is \"u_ref\", which is already the name of something else";
+    empty_barrier_name: FILTER, "\"goal\"" => "\"\"",
+        "barrier[0].name: is \"\", must be letters, digits and underscores, not starting with a digit (1 to 64)";
+    constant_of_another_model: FILTER, "\"unicycle\" }" => "\"unicycle\", l_r = 1.0 }",
+        "plant.l_r: is a constant of the bicycle; this model has none";
+    step_size_zero: FILTER, "[[barrier]]" => "[experiment]\nstep_size = 0.0\n[[barrier]]",
+        "experiment.step_size: is 0, must be finite and >= 1e-9";
+    stop_before_start: FILTER, "[[barrier]]" => "[experiment]\nstart_time = 20.0\n[[barrier]]",
+        "experiment.stop_time: is 10, must be > start_time = 20";
+    nan_start_value: PLANT, "v = 1.5" => "v = nan", "x0.v: is NaN, must be finite";
+    unknown_state: PLANT, "v = 1.5" => "w = 1.5", "x0.w: unknown state, must be one of x_p, y_p, theta, v";
+    zero_length: PLANT, "l_r = 3.0" => "l_r = 0.0", "plant.l_r: is 0, must be finite and >= 1e-9";
+    zero_inner_step: PLANT, "0.01" => "0.0", "integration.inner_step: is 0, must be finite and >= 1e-9";
+}
+
+#[test]
+fn duplicate_barrier_name() {
+    let barrier = &FILTER[FILTER.find("[[barrier]]").unwrap()..];
+    let error = Configuration::parse(&format!("{FILTER}{barrier}")).unwrap_err().to_string();
+    assert_eq!(error, "barrier[1].name: is \"goal\", which is already the name of something else");
+}
+
+#[test]
+fn no_barrier() {
+    let text = "kind = \"filter\"\nbarrier = []\nplant = { model = \"unicycle\" }";
+    let error = Configuration::parse(text).unwrap_err().to_string();
+    assert_eq!(error, "barrier: is empty, must have at least 1");
+}
+
+/// Messages that serde or TOML words: the field and the culprit must be named.
+#[test]
+fn unknown_and_missing_keys_and_wrong_types() {
+    for (valid, from, to, wanted) in [
+        (FILTER, "radius = 2.0", "radius = 2.0\nradus = 1.0", ["barrier[0]", "unknown field `radus`"]),
+        (FILTER, "[[barrier]]", "[experiment]\nstep = 1.0\n[[barrier]]", ["experiment", "`step_size`"]),
+        (FILTER, "kind = \"filter\"", "kind = \"filter\"\nkey = 1", ["unknown field `key`", "`bounds`"]),
+        (FILTER, "radius = 2.0", "", ["barrier[0]", "missing field `radius`"]),
+        (FILTER, "radius = 2.0", "radius = \"2\"", ["barrier[0].radius", "expected f64"]),
+        (FILTER, "[45.0, 44.0]", "[45.0]", ["barrier[0].centre", "length 2"]),
+        (FILTER, "\"unicycle\"", "\"bike\"", ["plant.model", "`bicycle`"]),
+        (FILTER, "radius = 2.0", "radius = 2.0\nshape = \"box\"", ["barrier[0].shape", "`quadratic_disc`"]),
+        (FILTER, "radius = 2.0", "radius = 2.0\nmethod = \"x\"", ["barrier[0].method", "`repeated_root`"]),
+        (FILTER, "\"filter\"", "\"filters\"", ["kind", "`plant`"]),
+        (FILTER, "radius = 2.0", "radius = = 2.0", ["line 8", "radius"]),
+        (PLANT, "inner_step", "inner", ["integration", "`inner_step`"]),
+        (PLANT, "kind", "knd", ["kind: missing, must be \"filter\" or \"plant\"", ""]),
+    ] {
+        let message = refusal(valid, from, to);
+        assert!(wanted.iter().all(|w| message.contains(w)), "{to:?} gives {message:?}, wanted {wanted:?}");
+    }
+}
+
+/// Valid configurations of every kind: models × shapes × methods, and some with everything stated.
+fn every_kind() -> Vec<String> {
+    let mut texts = vec![FILTER.to_owned(), PLANT.to_owned()];
+    for model in ["point_mass", "unicycle", "bicycle"] {
+        texts.push(format!("kind = \"plant\"\nname = \"p\"\nplant.model = \"{model}\"\nx0.x_p = 1e-300"));
+        for shape in ["disc", "quadratic_disc"] {
+            for method in ["reference_profile", "repeated_root"] {
+                texts.push(format!(
+                    "kind = \"filter\"\ndirect_feedthrough = false\nplant.model = \"{model}\"\n\
+                     [[barrier]]\nname = \"a\"\nshape = \"{shape}\"\nmethod = \"{method}\"\n\
+                     centre = [0.1, -3e20]\nradius = 0.3\ndeadline = 7.0\nmargin = 0.05\n\
+                     [[barrier]]\nname = \"b\"\nshape = \"{shape}\"\ncentre = [1, 2]\nradius = 1\n\
+                     deadline = 3\nrate = 0.7\nstay_rate = 0.9\n"
+                ));
+            }
+        }
+    }
+    texts
+}
+
+#[test]
+fn the_canonical_form_is_the_same_configuration() {
+    for text in every_kind() {
+        let configuration = Configuration::parse(&text).unwrap_or_else(|e| panic!("{e} in {text}"));
+        let canonical = configuration.canonical().unwrap();
+        let again = Configuration::parse(&canonical).unwrap_or_else(|e| panic!("{e} in {canonical}"));
+        assert_eq!(again, configuration, "{canonical}");
+        assert_eq!(again.canonical().unwrap(), canonical);
+    }
+}
+
+#[test]
+fn infinite_bounds_become_the_number_that_means_none() {
+    let text = FILTER.replace("[-9.0, 8.0]", "[-inf, inf]");
+    let Configuration::Filter(c) = Configuration::parse(&text).unwrap() else { panic!("not a filter") };
+    assert_eq!(c.bounds["a"], [-UNBOUNDED, UNBOUNDED]);
+    assert_eq!(c.bounds["omega"], [-UNBOUNDED, UNBOUNDED], "an input without bounds");
+}
+
+#[test]
+fn defaults_are_those_of_the_documentation() {
+    let Configuration::Filter(c) = Configuration::parse(FILTER).unwrap() else { panic!("not a filter") };
+    let barrier = &c.barrier[0];
+    assert_eq!((barrier.rate, barrier.stay_rate, barrier.smoothing), (0.0, 0.0, Some(0.0)), "by default");
+    assert_eq!(barrier.margin, Some(0.02), "a hundredth of the radius");
+    assert_eq!((c.name.as_str(), c.direct_feedthrough, c.correction_limit), ("filter", true, 1e6));
+    let Configuration::Plant(c) =
+        Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle\"").unwrap()
+    else {
+        panic!("not a plant")
+    };
+    assert_eq!((c.name.as_str(), c.plant.l_r, c.integration.inner_step), ("bicycle", Some(10.0), 0.001));
+    assert_eq!(c.x0.values().copied().collect::<Vec<_>>(), [0.0; 4]);
+}
+
+#[test]
+fn parameter_rows_have_own_names_and_reach_their_own_number() {
+    for text in every_kind() {
+        fn walk<C: Clone>(configuration: &C, rows: &[Parameter<C>]) {
+            let names: BTreeSet<_> = rows.iter().map(|r| r.name.as_str()).collect();
+            assert_eq!(names.len(), rows.len(), "{names:?}");
+            let mut values: Vec<_> = rows.iter().map(|r| r.get(&mut configuration.clone())).collect();
+            for (i, row) in rows.iter().enumerate() {
+                values[i] += 0.125 + i as f64;
+                let mut changed = updated(configuration, rows, &values).unwrap();
+                assert_eq!(row.get(&mut changed), values[i], "{}", row.name);
+                let error = {
+                    let mut bad = values.clone();
+                    bad[i] = f64::NAN;
+                    updated(configuration, rows, &bad).err().unwrap().to_string()
+                };
+                assert_eq!(error, format!("{}: is NaN, must be {}", row.name, row.range.describe()));
+            }
+        }
+        match Configuration::parse(&text).unwrap() {
+            Configuration::Filter(c) => walk(&c, &c.parameters()),
+            Configuration::Plant(c) => walk(&c, &c.parameters()),
+        }
+    }
+}
+
+#[test]
+fn names_are_c_identifiers() {
+    let long = "a".repeat(64);
+    for good in ["a", "_", "A9_b", &long] {
+        assert_eq!(check_identifier("name", good), Ok(()), "{good}");
+    }
+    for bad in ["", "9a", "a-b", "a b", "\u{e4}", "a.b", "a/b", &format!("{long}a")] {
+        assert!(check_identifier("name", bad).is_err(), "{bad}");
+    }
+}

@@ -1,0 +1,201 @@
+//! The variable table, the model description and the GUID of every kind of configuration.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::*;
+
+const BARRIER: &str = "[[barrier]]\nname = \"goal\"\ncentre = [45.0, 44.0]\nradius = 2.0\ndeadline = 10.0\n";
+
+fn product(text: &str) -> Product {
+    let configuration = Configuration::parse(text).unwrap_or_else(|e| panic!("{e} in {text}"));
+    Product::new(configuration).unwrap()
+}
+
+/// Every model, as plant and as filter with either shape, method and feedthrough.
+fn every_product() -> Vec<Product> {
+    let mut products = Vec::new();
+    for model in ["point_mass", "unicycle", "bicycle"] {
+        products.push(product(&format!("kind = \"plant\"\nplant.model = \"{model}\"")));
+        for shape in ["disc", "quadratic_disc"] {
+            for method in ["reference_profile", "repeated_root"] {
+                for feedthrough in [true, false] {
+                    products.push(product(&format!(
+                        "kind = \"filter\"\ndirect_feedthrough = {feedthrough}\nplant.model = \"{model}\"\n\
+                         {BARRIER}shape = \"{shape}\"\nmethod = \"{method}\"\n{}",
+                        BARRIER.replace("goal", "other")
+                    )));
+                }
+            }
+        }
+    }
+    products
+}
+
+#[test]
+fn every_product_has_a_valid_model_description() {
+    for product in every_product() {
+        let name = product.configuration.name();
+        let xml = product.model_description().to_xml().unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(xml.contains(&product.guid), "{name}: {xml}");
+        assert!(!xml.contains("canGetAndSetFMUstate=\"true\""), "{name} promises what it refuses");
+    }
+}
+
+#[test]
+fn every_unit_has_its_exponents() {
+    let mut seen = BTreeSet::new();
+    for product in every_product() {
+        let units: BTreeMap<_, _> = units(&product.variables).into_iter().map(|u| (u.name, u.base)).collect();
+        for variable in &product.variables {
+            if let VariableKind::Real { unit, .. } = &variable.kind {
+                let unit = unit.as_deref().unwrap_or_else(|| panic!("{} has no unit", variable.name));
+                assert!(units.contains_key(unit), "{} is in {unit}, which is not declared", variable.name);
+                seen.insert(unit.to_owned());
+            }
+        }
+        assert_eq!(product.model_description().units.len(), units.len());
+    }
+    let si = |m, s, rad| Some(BaseUnit { m, s, rad, ..BaseUnit::default() });
+    let table = [
+        ("1/s", si(0, -1, 0)),
+        ("m", si(1, 0, 0)),
+        ("m/s", si(1, -1, 0)),
+        ("m/s2", si(1, -2, 0)),
+        ("m2", si(2, 0, 0)),
+        ("m2/s2", si(2, -2, 0)),
+        ("rad", si(0, 0, 1)),
+        ("rad/s", si(0, -1, 1)),
+        ("s", si(0, 1, 0)),
+    ];
+    assert_eq!(seen.iter().map(String::as_str).collect::<Vec<_>>(), table.map(|(name, _)| name));
+    for (name, wanted) in table {
+        assert_eq!(base_unit(name), wanted, "{name}");
+    }
+    for unknown in ["", "km", "2", "m/", "m2x", "kg", "m/s/s", "m99999999999"] {
+        assert_eq!(base_unit(unknown), None, "{unknown}");
+    }
+}
+
+#[test]
+fn value_references_are_indices_and_names_are_unique() {
+    for product in every_product() {
+        let names: BTreeSet<_> = product.variables.iter().map(|v| v.name.as_str()).collect();
+        assert_eq!(names.len(), product.variables.len(), "{names:?}");
+        for (i, variable) in product.variables.iter().enumerate() {
+            assert_eq!(variable.value_reference as usize, i, "{}", variable.name);
+        }
+        let Layout { outputs, parameters, end, .. } = product.layout;
+        assert_eq!(end, product.variables.len());
+        assert_eq!(product.ranges.len(), end - parameters);
+        for (i, variable) in product.variables.iter().enumerate() {
+            let wanted = match i {
+                i if i < outputs => Causality::Input,
+                i if i < parameters => Causality::Output,
+                _ => Causality::Parameter,
+            };
+            assert_eq!(variable.causality, wanted, "{}", variable.name);
+            assert!(!variable.description.is_empty(), "{}", variable.name);
+        }
+    }
+}
+
+#[test]
+fn inputs_and_parameters_start_within_their_range() {
+    for product in every_product() {
+        for (i, variable) in product.variables.iter().enumerate() {
+            let start = match &variable.kind {
+                VariableKind::Real { start, .. } => *start,
+                VariableKind::Boolean { start } => start.map(f64::from),
+                _ => None,
+            };
+            let output = variable.causality == Causality::Output;
+            assert_eq!(start.is_none(), output, "{} starts at {start:?}", variable.name);
+            if let (Some(start), Some(i)) = (start, i.checked_sub(product.layout.parameters)) {
+                product.ranges[i].check(&variable.name, start).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn dependencies_say_whether_outputs_follow_inputs_at_once() {
+    for product in every_product() {
+        let all: Vec<u32> = (0..product.layout.outputs as u32).collect();
+        let wanted = match &product.configuration {
+            Configuration::Filter(c) if c.direct_feedthrough => all,
+            _ => Vec::new(),
+        };
+        for output in &product.variables[product.layout.outputs..product.layout.parameters] {
+            assert_eq!(output.dependencies.as_ref(), Some(&wanted), "{}", output.name);
+        }
+    }
+}
+
+#[test]
+fn enumerations_cover_every_status_and_phase() {
+    let values = |t: EnumerationType| t.items.iter().map(|i| i.value).collect::<Vec<_>>();
+    assert_eq!(values(status_type()), Status::ALL.map(|s| s as i32));
+    assert_eq!(values(phase_type()), [0, 1, 2, 3, 4]);
+    let names = status_type().items.into_iter().map(|i| i.name).collect::<BTreeSet<_>>();
+    assert_eq!(names.len(), Status::ALL.len(), "{names:?}");
+}
+
+/// One valid change per field; each gives another GUID, and no two the same.
+#[test]
+fn the_guid_differs_when_any_field_differs() {
+    let filter = format!("kind = \"filter\"\nplant.model = \"bicycle\"\n{BARRIER}");
+    let plant = "kind = \"plant\"\nplant.model = \"bicycle\"\n";
+    let mut texts = vec![filter.clone(), plant.to_owned()];
+    for (from, to) in [
+        ("\"goal\"", "\"gaol\""),
+        ("45.0", "45.000000000000007"),
+        ("44.0", "44.5"),
+        ("radius = 2.0", "radius = 2.5"),
+        ("deadline = 10.0", "deadline = 10.5"),
+        ("radius", "shape = \"quadratic_disc\"\nradius"),
+        ("radius", "smoothing = 1.0\nradius"),
+        ("radius", "method = \"repeated_root\"\nradius"),
+        ("radius", "rate = 3.0\nradius"),
+        ("radius", "stay_rate = 3.0\nradius"),
+        ("radius", "margin = 0.5\nradius"),
+        ("\"bicycle\"", "\"bicycle\"\nplant.l_r = 11.0"),
+        ("\"bicycle\"", "\"unicycle\""),
+        ("\"bicycle\"", "\"bicycle\"\nname = \"other\""),
+        ("\"bicycle\"", "\"bicycle\"\ndirect_feedthrough = false"),
+        ("\"bicycle\"", "\"bicycle\"\ncorrection_limit = 5.0"),
+        ("\"bicycle\"", "\"bicycle\"\nbounds.a = [-1.0, 1e30]"),
+        ("\"bicycle\"", "\"bicycle\"\nbounds.beta = [-1e30, 1.0]"),
+        ("\"bicycle\"", "\"bicycle\"\nexperiment.start_time = 1.0"),
+        ("\"bicycle\"", "\"bicycle\"\nexperiment.stop_time = 11.0"),
+        ("\"bicycle\"", "\"bicycle\"\nexperiment.step_size = 0.01"),
+    ] {
+        texts.push(filter.replacen(from, to, 1));
+    }
+    for line in [
+        "x0.x_p = 1.0",
+        "x0.y_p = 1.0",
+        "x0.theta = 1.0",
+        "x0.v = 1.0",
+        "plant.l_r = 11.0",
+        "integration.inner_step = 0.01",
+        "name = \"other\"",
+        "experiment.step_size = 0.01",
+    ] {
+        texts.push(format!("{plant}{line}"));
+    }
+    let mut seen = BTreeMap::new();
+    for text in texts {
+        let guid = product(&text).guid;
+        assert!(guid.starts_with('{') && guid.ends_with('}') && guid.len() == 38, "{guid}");
+        if let Some(other) = seen.insert(guid.clone(), text.clone()) {
+            panic!("{guid} is the GUID of both\n{other}\nand\n{text}");
+        }
+    }
+}
+
+#[test]
+fn the_guid_does_not_depend_on_the_spelling() {
+    let short = product(&format!("kind = \"filter\"\nplant.model = \"bicycle\"\n{BARRIER}"));
+    let stated = product(&short.configuration.canonical().unwrap());
+    assert_eq!(short.guid, stated.guid);
+}

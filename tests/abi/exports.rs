@@ -1,0 +1,87 @@
+//! Symbols, version, and NULL components.
+
+use std::collections::BTreeSet;
+use std::ffi::CStr;
+use std::process::Command;
+use std::ptr::{null, null_mut};
+
+use crate::api::{API, ERROR, SYMBOLS, library_path};
+
+#[test]
+fn all_34_functions_resolve() {
+    let unique: BTreeSet<_> = SYMBOLS.iter().collect();
+    assert_eq!(unique.len(), 34, "{SYMBOLS:?}");
+    // Loading resolves each.
+    let _ = &*API;
+}
+
+#[test]
+fn nothing_else_is_exported() {
+    let output = match Command::new("nm").args(["-D", "--defined-only"]).arg(library_path()).output() {
+        Ok(output) if output.status.success() => output,
+        problem => panic!("this test needs nm of binutils: {problem:?}"),
+    };
+    let text = String::from_utf8(output.stdout).unwrap();
+    let found: BTreeSet<_> = text.lines().filter_map(|line| line.split_whitespace().last()).collect();
+    let wanted: BTreeSet<_> = SYMBOLS.iter().copied().collect();
+    assert_eq!(found, wanted);
+}
+
+#[test]
+fn version_and_platform() {
+    // SAFETY: static strings of the library.
+    let version = unsafe { CStr::from_ptr((API.get_version)()) };
+    // SAFETY: as above.
+    let platform = unsafe { CStr::from_ptr((API.get_types_platform)()) };
+    assert_eq!((version, platform), (c"2.0", c"default"));
+}
+
+/// Every function that takes a component, called with NULL.
+#[test]
+fn a_null_component_is_an_error_everywhere() {
+    let (c, reference, mut size, mut real, mut int) = (null_mut(), 0, 0, 1.5, 7);
+    let (refs, size, real, int) = (&raw const reference, &raw mut size, &raw mut real, &raw mut int);
+    let mut text = null();
+    let text = &raw mut text;
+    let mut state = null_mut();
+    let state = &raw mut state;
+    (API.free_instance)(c);
+    let statuses = [
+        (API.set_debug_logging)(c, 1, 0, null()),
+        (API.setup_experiment)(c, 0, 0.0, 0.0, 0, 0.0),
+        (API.enter_initialization_mode)(c),
+        (API.exit_initialization_mode)(c),
+        (API.terminate)(c),
+        (API.reset)(c),
+        (API.get_real)(c, refs, 1, real),
+        (API.get_integer)(c, refs, 1, int),
+        (API.get_boolean)(c, refs, 1, int),
+        (API.get_string)(c, refs, 1, text),
+        (API.set_real)(c, refs, 1, real),
+        (API.set_integer)(c, refs, 1, int),
+        (API.set_boolean)(c, refs, 1, int),
+        (API.set_string)(c, refs, 1, text),
+        (API.get_state)(c, state),
+        (API.set_state)(c, null_mut()),
+        (API.free_state)(c, state),
+        (API.serialized_size)(c, null_mut(), size),
+        (API.serialize)(c, null_mut(), null_mut(), 0),
+        (API.deserialize)(c, null(), 0, state),
+        (API.directional_derivative)(c, refs, 1, refs, 1, real, real),
+        (API.set_input_derivatives)(c, refs, 1, int, real),
+        (API.get_output_derivatives)(c, refs, 1, int, real),
+        (API.do_step)(c, 0.0, 0.1, 0),
+        (API.cancel_step)(c),
+        (API.get_status)(c, 0, int),
+        (API.get_real_status)(c, 2, real),
+        (API.get_integer_status)(c, 0, int),
+        (API.get_boolean_status)(c, 3, int),
+        (API.get_string_status)(c, 1, text),
+    ];
+    assert_eq!(statuses.len(), 34 - 4, "all but the two constants, fmi2Instantiate and fmi2FreeInstance");
+    assert_eq!(statuses, [ERROR; 30]);
+    // SAFETY: a local variable that still lives.
+    assert_eq!(unsafe { *real }, 1.5, "nothing was written");
+    // SAFETY: as above.
+    assert_eq!(unsafe { *int }, 7, "nothing was written");
+}

@@ -1,0 +1,73 @@
+//! FMUs as an importer has extracted them: a `resources` folder, a GUID, and names of variables.
+
+use std::path::PathBuf;
+
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, RESOURCE};
+use punctual_fmu::product::Product;
+use tempfile::TempDir;
+
+/// A filter for the point mass with input bounds.
+pub(crate) const FILTER: &str = r#"
+kind = "filter"
+plant.model = "point_mass"
+bounds = { u_x = [-50.0, 50.0], u_y = [-40.0, 40.0] }
+[[barrier]]
+name = "goal"
+centre = [45.0, 45.0]
+radius = 2.0
+deadline = 10.0
+"#;
+
+/// A unicycle that integrates with inner steps of 2⁻¹⁰ s, so that its times are exact.
+pub(crate) const PLANT: &str = r#"
+kind = "plant"
+plant.model = "unicycle"
+x0 = { theta = 0.5, v = 2.0 }
+integration.inner_step = 0.0009765625
+"#;
+
+/// An extracted FMU.
+pub(crate) struct Fmu {
+    pub(crate) product: Product,
+    pub(crate) resources: PathBuf,
+    _folder: TempDir,
+}
+
+impl Fmu {
+    pub(crate) fn new(configuration: &str) -> Self {
+        Self::below("extracted", configuration)
+    }
+
+    /// An FMU that was extracted to a folder called `name`.
+    pub(crate) fn below(name: &str, configuration: &str) -> Self {
+        let configuration = Configuration::parse(configuration).expect("a valid configuration");
+        let folder = TempDir::new().expect("a temporary folder");
+        let resources = folder.path().join(name).join("resources");
+        std::fs::create_dir_all(&resources).unwrap();
+        std::fs::write(resources.join(RESOURCE), configuration.canonical().unwrap()).unwrap();
+        Self { product: Product::new(configuration).unwrap(), resources, _folder: folder }
+    }
+
+    pub(crate) fn guid(&self) -> &str {
+        &self.product.guid
+    }
+
+    /// The resource location as most importers spell it.
+    pub(crate) fn location(&self) -> String {
+        format!("file://{}", self.resources.display())
+    }
+
+    /// The value reference of `name`.
+    pub(crate) fn reference(&self, name: &str) -> u32 {
+        let found = self.product.variables.iter().find(|v| v.name == name);
+        found.unwrap_or_else(|| panic!("no variable {name}")).value_reference
+    }
+
+    /// The configuration of a filter.
+    pub(crate) fn filter(&self) -> &FilterConfiguration {
+        match &self.product.configuration {
+            Configuration::Filter(c) => c,
+            Configuration::Plant(_) => panic!("not a filter"),
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! The shared library as an importer sees it: every function through `dlopen`, none through Rust.
+//!
+//! The oracle for numbers is `punctual-core` in process, compared bit for bit.
+//!
+//! | module | asks |
+//! |---|---|
+//! | `api`, `fmu`, `slave` | nothing: the library, an extracted FMU, an instance with its log |
+//! | `exports` | which symbols there are, and what a NULL component does |
+//! | `instantiate` | what is refused with which message, names and paths of every kind |
+//! | `legality` | every function in every mode |
+//! | `arguments` | NULL arrays, value references, ranges; that a failed call changes nothing |
+//! | `logging` | categories, what is logged, flags that exclude functions |
+//! | `outputs` | lazy outputs of a filter, anchors, re-arming |
+//! | `times` | odd communication points and steps |
+//! | `plant` | inner steps, initial states, refusals |
+//! | `lifetime` | reset, several instances, threads, unloading |
+
+mod api;
+mod arguments;
+mod exports;
+mod fmu;
+mod instantiate;
+mod legality;
+mod lifetime;
+mod logging;
+mod outputs;
+mod plant;
+mod slave;
+mod times;

@@ -1,0 +1,232 @@
+//! Lazy outputs of a filter: which inputs and which time they belong to, and what is remembered.
+//!
+//! The oracle is the filter of `punctual-core` with the same configuration.
+
+use punctual_core::filter::{Phase, SafetyFilter, Status};
+
+use crate::api::API;
+use crate::fmu::{FILTER, Fmu};
+use crate::slave::Slave;
+
+/// Inputs (state, then reference) along a plausible path.
+fn inputs(k: usize) -> [f64; 6] {
+    let s = k as f64;
+    [0.3 * s, 0.2 * s, 1.5 + 0.1 * s, 1.25 - 0.01 * s, 0.5, -0.25]
+}
+
+const ZERO: [f64; 6] = [0.0; 6];
+const NAN: [f64; 6] = [f64::NAN; 6];
+
+fn oracle(fmu: &Fmu) -> SafetyFilter {
+    fmu.filter().build().unwrap()
+}
+
+/// A sample of the oracle: remembered with `commit`; returns u.
+fn sample(filter: &mut SafetyFilter, t: f64, inputs: &[f64; 6], commit: bool) -> [f64; 2] {
+    let (x, u_ref) = inputs.split_at(4);
+    let mut u = [f64::NAN; 2];
+    let done = if commit { filter.step(t, x, u_ref, &mut u) } else { filter.peek(t, x, u_ref, &mut u) };
+    done.unwrap();
+    u
+}
+
+#[test]
+fn outputs_follow_inputs_without_a_step() {
+    let fmu = Fmu::new(FILTER);
+    let (slave, mut filter) = (Slave::ready(&fmu), oracle(&fmu));
+    let (mut t, h) = (0.0, 0.1);
+    for k in 0..30 {
+        slave.set_inputs(&inputs(k));
+        let looked = sample(&mut filter, t, &inputs(k), false);
+        slave.shows(&filter, &looked, &format!("read at {t} before the step"));
+        slave.step(t, h);
+        let u = sample(&mut filter, t, &inputs(k), true);
+        t += h;
+        slave.shows(&filter, &u, &format!("read at {t} after the step: still the sample at its start"));
+    }
+}
+
+/// A Jacobi master sets inputs, steps, reads; Gauss-Seidel reads before the step. Both see the same
+/// sample of the same inputs, only at other moments.
+#[test]
+fn the_order_of_reading_and_stepping_changes_nothing() {
+    let fmu = Fmu::new(FILTER);
+    let [early, late, both] = [(); 3].map(|()| Slave::ready(&fmu));
+    for k in 0..20 {
+        let t = k as f64 * 0.1;
+        for slave in [&early, &late, &both] {
+            slave.set_inputs(&inputs(k));
+        }
+        let read_early = early.snapshot();
+        both.snapshot();
+        both.set_inputs(&ZERO);
+        both.snapshot();
+        both.set_inputs(&inputs(k));
+        for slave in [&early, &late, &both] {
+            slave.step(t, 0.1);
+        }
+        let after = late.snapshot();
+        assert_eq!(early.snapshot(), after, "reading before the step at {t}");
+        assert_eq!(both.snapshot(), after, "reading twice and trying other inputs at {t}");
+        assert_eq!(read_early, after, "the step at {t} remembers what was shown before it");
+    }
+}
+
+#[test]
+fn reading_twice_gives_the_same() {
+    let fmu = Fmu::new(FILTER);
+    let slave = Slave::ready(&fmu);
+    slave.set_inputs(&inputs(3));
+    assert_eq!(slave.snapshot(), slave.snapshot());
+}
+
+/// Masters differ in what they feed before the first step; only the first step anchors.
+#[test]
+fn the_anchor_is_the_first_step_whatever_came_before() {
+    let fmu = Fmu::new(FILTER);
+    for garbage in [ZERO, NAN, [f64::INFINITY; 6], [1e308; 6], inputs(9)] {
+        let (slave, mut filter) = (Slave::new(&fmu), oracle(&fmu));
+        slave.set_inputs(&garbage);
+        slave.snapshot();
+        slave.ok((API.setup_experiment)(slave.component, 0, 0.0, 0.5, 0, 0.0));
+        slave.ok((API.enter_initialization_mode)(slave.component));
+        slave.set_inputs(&garbage);
+        slave.snapshot();
+        slave.ok((API.exit_initialization_mode)(slave.component));
+        slave.snapshot();
+        slave.set_inputs(&garbage);
+        slave.snapshot();
+        slave.set_inputs(&inputs(1));
+        slave.step(0.5, 0.1);
+        let u = sample(&mut filter, 0.5, &inputs(1), true);
+        slave.shows(&filter, &u, &format!("after {garbage:?}"));
+        assert_eq!(slave.real("goal.time_left"), 10.0);
+    }
+}
+
+/// Steps with invalid inputs do not anchor, and the output stays finite and within its bounds.
+#[test]
+fn inputs_that_are_not_numbers() {
+    let fmu = Fmu::new(FILTER);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for place in 0..6 {
+            let slave = Slave::ready(&fmu);
+            let mut broken = inputs(1);
+            broken[place] = bad;
+            slave.set_inputs(&broken);
+            for moment in ["before", "after"] {
+                assert_eq!(slave.integer("status"), Status::InvalidInput as i32, "{bad} at {place} {moment}");
+                assert_eq!(slave.integer("goal.phase"), Phase::Waiting as i32);
+                for (name, bound) in [("u.u_x", 50.0), ("u.u_y", 40.0)] {
+                    let u = slave.real(name);
+                    assert!(u.is_finite() && u.abs() <= bound, "{name} is {u} for {bad} at {place}");
+                }
+                if moment == "before" {
+                    slave.step(0.0, 0.1);
+                }
+            }
+            slave.set_inputs(&inputs(1));
+            slave.step(0.1, 0.1);
+            let mut filter = oracle(&fmu);
+            let u = sample(&mut filter, 0.1, &inputs(1), true);
+            slave.shows(&filter, &u, &format!("anchored after {bad} at {place}"));
+        }
+    }
+}
+
+/// In between, invalid inputs leave the promise as it was.
+#[test]
+fn a_gap_of_invalid_inputs_forgets_nothing() {
+    let fmu = Fmu::new(FILTER);
+    let (slave, mut filter) = (Slave::ready(&fmu), oracle(&fmu));
+    let mut t = 0.0;
+    for k in 0..10 {
+        let given = if (3..6).contains(&k) { NAN } else { inputs(k) };
+        slave.set_inputs(&given);
+        slave.step(t, 0.1);
+        let u = sample(&mut filter, t, &given, true);
+        slave.shows(&filter, &u, &format!("at {t}"));
+        t += 0.1;
+    }
+    let left = slave.real("goal.time_left");
+    assert!((left - 9.1).abs() < 1e-12, "{left} s are left of the deadline that the first step set");
+}
+
+#[test]
+fn without_feedthrough_only_steps_compute() {
+    let fmu = Fmu::new(&format!("direct_feedthrough = false\n{FILTER}"));
+    let (slave, mut filter) = (Slave::ready(&fmu), oracle(&fmu));
+    let mut t = 0.0;
+    for k in 0..10 {
+        let outputs = |slave: &Slave| slave.snapshot().split_off(fmu.product.layout.outputs);
+        let before = outputs(&slave);
+        slave.set_inputs(&inputs(k));
+        assert_eq!(outputs(&slave), before, "at {t}, inputs set but not stepped");
+        slave.step(t, 0.1);
+        let u = sample(&mut filter, t, &inputs(k), true);
+        slave.shows(&filter, &u, &format!("after the step from {t}"));
+        t += 0.1;
+    }
+}
+
+#[test]
+fn a_rising_edge_of_rearm_starts_the_deadline_anew() {
+    let fmu = Fmu::new(FILTER);
+    let (slave, mut filter) = (Slave::ready(&fmu), oracle(&fmu));
+    let mut before = false;
+    for (k, rearm) in [false, false, true, true, true, false, false, true, false].into_iter().enumerate() {
+        let t = k as f64;
+        slave.set_inputs(&inputs(k));
+        slave.set_flag("rearm", rearm);
+        let shown = slave.snapshot();
+        // Looking ahead over a re-arming must not re-arm: look, take it back, look again.
+        slave.set_flag("rearm", !rearm);
+        slave.snapshot();
+        slave.set_flag("rearm", rearm);
+        assert_eq!(slave.snapshot(), shown, "at {t}");
+        slave.step(t, 1.0);
+        assert_eq!(slave.snapshot(), shown, "the step at {t} remembers what was shown");
+        if rearm && !before {
+            filter.rearm();
+            assert_eq!(slave.real("goal.time_left"), 10.0, "at {t}");
+        }
+        before = rearm;
+        let u = sample(&mut filter, t, &inputs(k), true);
+        slave.shows(&filter, &u, &format!("at {t}"));
+    }
+}
+
+/// Parameters reach the filter, whenever they are set before the end of the initialization.
+#[test]
+fn parameters_in_every_mode_before_the_steps() {
+    let fmu = Fmu::new(FILTER);
+    for when in 0..3 {
+        let slave = Slave::new(&fmu);
+        let set = |now: usize| {
+            if now == when {
+                slave.set("goal.deadline", 4.0);
+                slave.set("goal.centre[2]", 30.0);
+                slave.set("u_max.u_x", 3.0);
+            }
+        };
+        set(0);
+        slave.ok((API.setup_experiment)(slave.component, 0, 0.0, 0.0, 0, 0.0));
+        set(1);
+        slave.ok((API.enter_initialization_mode)(slave.component));
+        slave.set_inputs(&inputs(2));
+        slave.snapshot();
+        set(2);
+        let mut configuration = fmu.filter().clone();
+        configuration.barrier[0].deadline = 4.0;
+        configuration.barrier[0].centre[1] = 30.0;
+        configuration.bounds.get_mut("u_x").unwrap()[1] = 3.0;
+        let mut filter = configuration.build().unwrap();
+        let u = sample(&mut filter, 0.0, &inputs(2), false);
+        slave.shows(&filter, &u, &format!("in initialization mode, set at {when}"));
+        slave.ok((API.exit_initialization_mode)(slave.component));
+        slave.shows(&filter, &u, "after it");
+        slave.step(0.0, 0.1);
+        let u = sample(&mut filter, 0.0, &inputs(2), true);
+        slave.shows(&filter, &u, "after a step");
+    }
+}

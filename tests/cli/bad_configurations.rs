@@ -1,0 +1,106 @@
+//! `punctual build` on configurations that cannot be used: the message names file, field, value and
+//! what is allowed; the code is 2; nothing is written. (Every defect of every field is tested
+//! where configurations are read; here each way into the command line.)
+
+use std::fs;
+
+use crate::workshop::{Done, Workshop, examples};
+
+/// Builds the example `stem` with one edit.
+fn build(stem: &str, from: &str, to: &str) -> Done {
+    let text = fs::read_to_string(examples().join(format!("{stem}.toml"))).expect("the example");
+    assert_eq!(text.matches(from).count(), 1, "{from:?} in {text}");
+    build_text(text.replace(from, to))
+}
+
+fn build_text(text: impl AsRef<[u8]>) -> Done {
+    let workshop = Workshop::new();
+    workshop.write("my.toml", text);
+    let done = workshop.punctual(["build", "my.toml", "-o", "my.fmu"]);
+    assert_eq!(workshop.files(), ["my.toml"]);
+    done
+}
+
+#[test]
+fn an_unknown_key() {
+    build("unicycle-filter", "margin", "margn").fails(
+        2,
+        "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
+         13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
+         unknown field `margn`, expected one of `name`, `shape`, `centre`, `radius`, `smoothing`, `deadline`, \
+         `method`, `rate`, `stay_rate`, `margin`",
+    );
+}
+
+#[test]
+fn a_negative_deadline() {
+    build("unicycle-filter", "deadline = 10.0", "deadline = -1.0")
+        .fails(2, "my.toml: barrier[0].deadline: is -1, must be finite and >= 1e-9");
+}
+
+#[test]
+fn a_radius_of_zero() {
+    build("unicycle-filter", "radius = 2.0", "radius = 0.0")
+        .fails(2, "my.toml: barrier[0].radius: is 0, must be finite and >= 1e-9");
+}
+
+#[test]
+fn a_start_value_that_is_not_a_number() {
+    build("unicycle-plant", "x_p = 0.0", "x_p = nan").fails(2, "my.toml: x0.x_p: is NaN, must be finite");
+}
+
+#[test]
+fn an_unknown_model() {
+    build("unicycle-plant", "model = \"unicycle\"", "model = \"bike\"").fails(
+        2,
+        "my.toml: plant.model: at line 6, column 9\n  |\n6 | model = \"bike\"\n  |         ^^^^^^\n\
+         unknown variant `bike`, expected one of `point_mass`, `unicycle`, `bicycle`",
+    );
+}
+
+#[test]
+fn what_is_not_toml() {
+    build_text("= what").fails_like(2, "my.toml: TOML parse error at line 1, column 1\n", &["= what"]);
+}
+
+#[test]
+fn what_is_not_even_text() {
+    build_text([0xff, 0xfe]).fails_like(2, "cannot read my.toml: ", &["UTF-8"]);
+}
+
+#[test]
+fn a_system_file_instead_of_a_configuration() {
+    let system = fs::read(examples().join("unicycle.toml")).expect("the example");
+    build_text(system).fails(2, "my.toml: kind: missing: this is a system file, which `punctual run` takes");
+}
+
+#[test]
+fn a_file_that_is_missing() {
+    let done = Workshop::new().punctual(["build", "my.toml", "-o", "my.fmu"]);
+    done.fails_like(2, "cannot read my.toml: ", &[]);
+}
+
+#[test]
+fn a_library_that_is_missing() {
+    let workshop = Workshop::new();
+    workshop.write("my.toml", fs::read(examples().join("unicycle-plant.toml")).expect("the example"));
+    let done = workshop.punctual(["build", "my.toml", "-o", "my.fmu", "--library", "my.so"]);
+    done.fails_like(2, "cannot read my.so: ", &[]);
+}
+
+#[test]
+fn a_folder_that_is_missing() {
+    let workshop = Workshop::with_library();
+    workshop.write("my.toml", fs::read(examples().join("unicycle-plant.toml")).expect("the example"));
+    let done = workshop.punctual(["build", "my.toml", "-o", "no/such/my.fmu"]);
+    done.fails_like(2, "cannot write no/such/my.fmu: ", &[]);
+}
+
+/// A file where the folder should be: refused also to those who may write everywhere.
+#[test]
+fn a_demonstration_into_a_folder_that_cannot_be_made() {
+    let workshop = Workshop::with_library();
+    workshop.write("file", "");
+    let done = workshop.punctual(["demo", "--out", "file/demo"]);
+    done.fails_like(2, "cannot create file/demo: ", &[]);
+}

@@ -1,0 +1,135 @@
+//! `punctual run` on system files that cannot be used: the message names file, field, value and what
+//! is allowed; the code is 2.
+
+use crate::running::system;
+use crate::workshop::{Done, Workshop};
+
+/// Runs the example's system with one edit.
+fn run(from: &str, to: &str) -> Done {
+    let workshop = Workshop::with_fmus();
+    workshop.write("system.toml", system(&[(from, to)]));
+    workshop.punctual(["run", "system.toml", "--out", "out"])
+}
+
+#[test]
+fn an_unknown_key() {
+    let done = run("stop_time", "stop");
+    let message = "unknown field `stop`, expected one of `start_time`, `stop_time`, `step`, `order`";
+    done.fails_like(2, "system.toml: experiment.stop: ", &["line 7", message]);
+}
+
+#[test]
+fn a_connection_from_an_unknown_variable() {
+    run("plant.x.v", "plant.x.w")
+        .fails(2, "system.toml: connection[0].from: plant (plant.fmu) has no variable \"x.w\"");
+}
+
+#[test]
+fn a_connection_to_an_unknown_variable_with_one_like_it() {
+    run("filter.u_ref.a", "filter.uref.a").fails(
+        2,
+        "system.toml: connection[0].to: filter (filter.fmu) has no variable \"uref.a\"; did you mean u_ref.a or \
+         u.a or u_min.a?",
+    );
+}
+
+#[test]
+fn a_connection_to_an_unknown_component() {
+    run("filter.u_ref.a", "controller.u_ref.a")
+        .fails(2, "system.toml: connection[0].to: no component \"controller\"; there are filter, plant");
+}
+
+#[test]
+fn a_connection_in_the_wrong_direction() {
+    run("plant.x.v", "plant.u.a")
+        .fails(2, "system.toml: connection[0].from: plant.u.a has causality input; must be output");
+}
+
+#[test]
+fn a_start_value_out_of_range() {
+    let start = "fmu = \"filter.fmu\"\nstart = { \"goal.deadline\" = -1.0 }";
+    run("fmu = \"filter.fmu\"", start)
+        .fails(2, "system.toml: component[0].start.\"goal.deadline\": is -1 s; must be ≥ 1e-9 s");
+}
+
+#[test]
+fn a_start_value_that_is_not_a_number() {
+    let start = "fmu = \"plant.fmu\"\nstart = { \"x0.v\" = nan }";
+    run("fmu = \"plant.fmu\"", start)
+        .fails(2, "system.toml: component[1].start.\"x0.v\": is NaN; must be finite");
+}
+
+#[test]
+fn a_start_value_of_an_output() {
+    let start = "fmu = \"plant.fmu\"\nstart = { \"x.v\" = 1.0 }";
+    run("fmu = \"plant.fmu\"", start).fails(
+        2,
+        "system.toml: component[1].start.\"x.v\": has causality output; only parameters and inputs can be given a \
+         start value",
+    );
+}
+
+#[test]
+fn bounds_that_contradict_each_other() {
+    let start = "fmu = \"filter.fmu\"\nstart = { \"u_min.a\" = 2.0, \"u_max.a\" = 1.0 }";
+    run("fmu = \"filter.fmu\"", start).fails_like(
+        1,
+        "fmi2ExitInitializationMode of filter (filter.fmu) at t = 0 s returned fmi2Error\n",
+        &["[2, 1]", "min <= max"],
+    );
+}
+
+#[test]
+fn an_fmu_that_is_missing() {
+    run("plant.fmu", "plants.fmu").fails(
+        2,
+        "system.toml: component[1].fmu: there is no file plants.fmu; `punctual build` makes an FMU from a configuration",
+    );
+}
+
+#[test]
+fn a_configuration_instead_of_a_system_file() {
+    let workshop = Workshop::new();
+    workshop.write("my.toml", "kind = \"plant\"\n[plant]\nmodel = \"unicycle\"\n");
+    workshop.punctual(["run", "my.toml"]).fails_like(2, "my.toml: ", &["unknown field `kind`"]);
+}
+
+#[test]
+fn what_is_not_toml() {
+    let workshop = Workshop::new();
+    workshop.write("my.toml", "[experiment\n");
+    workshop.punctual(["run", "my.toml"]).fails_like(
+        2,
+        "my.toml: TOML parse error at line 1",
+        &["[experiment"],
+    );
+}
+
+#[test]
+fn a_file_that_is_missing() {
+    Workshop::new().punctual(["run", "my.toml"]).fails_like(2, "cannot read my.toml: ", &[]);
+}
+
+/// The input of the plant overflows at once; the FMU says where.
+const OVERFLOW: (&str, &str) = (
+    "factor = -1.0",
+    "factor = -1.0\n[[connection]]\nfrom = \"filter.u.a\"\nto = \"plant.u.a\"\nfactor = 1e308",
+);
+
+#[test]
+fn a_run_that_fails_on_the_way() {
+    run(OVERFLOW.0, OVERFLOW.1).fails(
+        1,
+        "fmi2DoStep of plant (plant.fmu) at t = 0 s returned fmi2Error\n  [fmi2Error, logStatusError] fmi2DoStep: \
+         u.a is inf, must be finite for a step from t = 0",
+    );
+}
+
+/// It is told before the run, which may be long.
+#[test]
+fn an_output_folder_that_is_a_file() {
+    let workshop = Workshop::with_fmus();
+    workshop.write("system.toml", system(&[OVERFLOW]));
+    workshop.write("out", "");
+    workshop.punctual(["run", "system.toml", "--out", "out"]).fails_like(2, "cannot create out: ", &[]);
+}

@@ -1,0 +1,45 @@
+//! `--help`, `--version` and wrong usage.
+
+use crate::workshop::{Workshop, assert_golden};
+
+#[test]
+fn help_of_the_program() {
+    let workshop = Workshop::new();
+    assert_golden("help.txt", &workshop.punctual(["--help"]).success());
+}
+
+#[test]
+fn help_of_every_command() {
+    let workshop = Workshop::new();
+    for command in ["build", "demo", "inspect", "run"] {
+        assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
+    }
+}
+
+#[test]
+fn version() {
+    let version = format!("punctual {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(Workshop::new().punctual(["--version"]).success(), version);
+}
+
+#[test]
+fn no_command_shows_the_help_as_wrong_usage() {
+    let done = Workshop::new().punctual([""; 0]);
+    assert_eq!((done.code, done.stdout.as_str()), (2, ""));
+    assert!(done.stderr.contains("Usage: punctual <COMMAND>"), "{}", done.stderr);
+}
+
+#[test]
+fn a_missing_argument_is_named() {
+    let done = Workshop::new().punctual(["build", "x.toml"]);
+    done.fails_like(
+        2,
+        "the following required arguments were not provided:\n  --output <FILE>\n",
+        &["Usage: "],
+    );
+}
+
+#[test]
+fn an_unknown_command_is_named() {
+    Workshop::new().punctual(["biuld"]).fails_like(2, "unrecognized subcommand 'biuld'\n", &["'build'"]);
+}

@@ -1,0 +1,15 @@
+//! The command line as its users meet it: arguments and files in, exit code, stdout, stderr and
+//! files out. Texts that are stable are kept in `golden/`; run with `PUNCTUAL_UPDATE_GOLDEN=1` to
+//! rewrite them, and read the difference before committing it.
+
+mod bad_configurations;
+mod bad_fmus;
+mod bad_systems;
+mod building;
+mod demonstrating;
+mod help;
+mod in_process;
+mod inspecting;
+mod running;
+mod table;
+mod workshop;

@@ -1,0 +1,252 @@
+//! Who uses whom: crates by their manifests, modules by the paths in their code.
+
+use std::collections::BTreeMap;
+
+use punctual_fmu::configuration::read_toml;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use crate::lexer::Lexed;
+use crate::sources::{SOURCES, TEXTS, crates};
+
+#[derive(Deserialize)]
+#[serde(rename_all = "kebab-case")]
+struct Manifest {
+    #[serde(default)]
+    dependencies: BTreeMap<String, IgnoredAny>,
+    #[serde(default)]
+    dev_dependencies: BTreeMap<String, IgnoredAny>,
+    #[serde(default)]
+    build_dependencies: BTreeMap<String, IgnoredAny>,
+}
+
+fn manifest(path: &str) -> Manifest {
+    let text = TEXTS.iter().find(|text| text.path == path).unwrap_or_else(|| panic!("no {path}"));
+    read_toml(&text.text).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+#[test]
+fn crates_depend_on_crates_below_them_only() {
+    let edges = [
+        ("core/Cargo.toml", &[][..]),
+        ("modeldescription/Cargo.toml", &[]),
+        ("fmu/Cargo.toml", &["punctual-core", "punctual-modeldescription"]),
+        ("Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription"]),
+    ];
+    for (path, allowed) in edges {
+        let manifest = manifest(path);
+        let all = [&manifest.dependencies, &manifest.dev_dependencies, &manifest.build_dependencies];
+        let mut ours: Vec<_> =
+            all.iter().flat_map(|d| d.keys()).filter(|name| name.starts_with("punctual")).collect();
+        ours.dedup();
+        assert_eq!(ours, allowed, "{path}");
+    }
+}
+
+#[test]
+fn each_heavy_dependency_belongs_to_one_crate() {
+    let owners = [
+        ("clarabel", "core/Cargo.toml"),
+        ("quick-xml", "modeldescription/Cargo.toml"),
+        ("zip", "modeldescription/Cargo.toml"),
+        ("toml", "fmu/Cargo.toml"),
+        ("clap", "Cargo.toml"),
+        ("fmi-rs", "Cargo.toml"),
+    ];
+    for path in ["Cargo.toml", "core/Cargo.toml", "modeldescription/Cargo.toml", "fmu/Cargo.toml"] {
+        let dependencies = manifest(path).dependencies;
+        for (name, owner) in owners {
+            assert_eq!(dependencies.contains_key(name), path == owner, "{name} in {path}");
+        }
+    }
+}
+
+/// A crate's modules: each line uses only the lines above it, and none of its own line but itself.
+struct Order {
+    folder: &'static str,
+    lines: Vec<Vec<String>>,
+    /// Edges that the order would forbid, and that the documents explain.
+    excepted: &'static [(&'static str, &'static str)],
+}
+
+impl Order {
+    fn rank(&self, module: &str) -> Option<usize> {
+        self.lines.iter().position(|line| line.iter().any(|name| name == module))
+    }
+
+    fn check(&self) {
+        for source in SOURCES.iter().filter(|s| s.path.starts_with(self.folder) && !s.is_test()) {
+            let inside = source.path[self.folder.len()..].trim_end_matches(".rs");
+            let (module, nested) =
+                inside.split_once('/').map_or((inside, false), |(module, _)| (module, true));
+            if module == "lib" || module == "main" {
+                continue;
+            }
+            let rank =
+                self.rank(module).unwrap_or_else(|| panic!("{} has no place in the order", source.path));
+            for (line, used) in used_modules(&source.without_tests(), nested) {
+                // Names with a capital and functions of the crate root are re-exports and constants.
+                let Some(other) = self.rank(&used) else {
+                    assert!(
+                        used.starts_with(char::is_uppercase),
+                        "{}:{line}: {used} has no place",
+                        source.path
+                    );
+                    continue;
+                };
+                let excepted = self.excepted.contains(&(module, used.as_str()));
+                assert!(
+                    used == module || other < rank || excepted,
+                    "{}:{line}: {module} uses {used}, which does not stand above it",
+                    source.path
+                );
+            }
+        }
+    }
+}
+
+/// The first names after `crate::` and, at the top of the crate's tree, after `super::`.
+fn used_modules(code: &Lexed, nested: bool) -> Vec<(usize, String)> {
+    let tokens = code.tokens();
+    let mut used = Vec::new();
+    for (i, &(line, token)) in tokens.iter().enumerate() {
+        let path = tokens[i + 1..].iter().take(2).all(|t| t.1 == ":") && tokens.len() > i + 3;
+        let starts = token == "crate" || (token == "super" && !nested);
+        if !path || !starts {
+            continue;
+        }
+        if tokens[i + 3].1 != "{" {
+            used.push((line, tokens[i + 3].1.to_owned()));
+            continue;
+        }
+        // A group: the names that stand directly in it, after its brace or a comma.
+        let mut depth = 0;
+        for pair in tokens[i + 3..].windows(2) {
+            match pair[0].1 {
+                "{" => depth += 1,
+                "}" => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+            if depth == 1 && matches!(pair[0].1, "{" | ",") && pair[1].1 != "}" {
+                used.push((pair[1].0, pair[1].1.to_owned()));
+            }
+        }
+    }
+    used
+}
+
+fn lines(lines: &[&[&str]]) -> Vec<Vec<String>> {
+    lines.iter().map(|line| line.iter().map(|&name| name.to_owned()).collect()).collect()
+}
+
+/// The order of ARCHITECTURE.md and of the crate's own documentation.
+#[test]
+fn modules_of_the_core_use_modules_above_them() {
+    let lines = lines(&[
+        &["error"],
+        &["scalar"],
+        &["jet"],
+        &["dynamics", "barrier"],
+        &["lie"],
+        &["convergence", "qp"],
+        &["filter"],
+        &["plants", "barriers", "baselines"],
+        &["simulation"],
+    ]);
+    Order { folder: "core/src/", lines, excepted: &[] }.check();
+}
+
+/// The constraint sees derivatives as numbers, never a model; the programme knows no barrier.
+#[test]
+fn constraints_and_programmes_know_no_model() {
+    for source in SOURCES.iter().filter(|s| !s.is_test()) {
+        if ["core/src/convergence/", "core/src/qp/"].iter().any(|folder| source.path.starts_with(folder)) {
+            for (line, used) in used_modules(&source.without_tests(), true) {
+                let allowed = ["error", "convergence", "qp"].contains(&&*used) || used.starts_with("MAX_");
+                assert!(allowed, "{}:{line}: uses {used}", source.path);
+            }
+        }
+    }
+}
+
+/// The order of the table in fmu/src/lib.rs.
+#[test]
+fn modules_of_the_fmu_use_modules_above_them() {
+    let documented = documented("fmu/src/lib.rs", |line| {
+        let name = line.strip_prefix("//! | [`").or_else(|| line.strip_prefix("//! | `"))?;
+        Some(name.split('`').next()?.to_owned())
+    });
+    Order { folder: "fmu/src/", lines: documented, excepted: &[] }.check();
+}
+
+/// The order of the list in src/lib.rs.
+#[test]
+fn modules_of_the_command_line_use_modules_above_them() {
+    let mut inside = false;
+    let documented = documented("src/lib.rs", |line| {
+        let fence = line.starts_with("//! ```");
+        inside ^= fence;
+        let name = line.strip_prefix("//! ")?.split(' ').next()?;
+        (inside && !fence).then(|| name.to_owned())
+    });
+    // "`error` only names the statuses of `host`."
+    Order { folder: "src/", lines: documented, excepted: &[("error", "host")] }.check();
+}
+
+/// The modules that a crate's documentation lists, a line each; all that exist, and no other.
+fn documented(path: &str, module: impl FnMut(&str) -> Option<String>) -> Vec<Vec<String>> {
+    let root = TEXTS.iter().find(|text| text.path == path).unwrap_or_else(|| panic!("no {path}"));
+    let listed: Vec<String> = root.text.lines().filter_map(module).collect();
+    let declared = |line: &str| {
+        let name = line.strip_prefix("pub mod ").or_else(|| line.strip_prefix("mod "))?;
+        Some(name.trim_end_matches(';').to_owned())
+    };
+    let mut declared: Vec<String> = root.text.lines().filter_map(declared).collect();
+    let mut sorted = listed.clone();
+    sorted.sort();
+    declared.sort();
+    assert_eq!(sorted, declared, "{path}: what is documented, and what there is");
+    listed.into_iter().map(|name| vec![name]).collect()
+}
+
+#[test]
+fn each_dependency_is_named_in_one_place() {
+    let owners = [
+        (&["clarabel", ":", ":"][..], "core/src/qp/interior_point.rs"),
+        (&["quick_xml", ":", ":"], "modeldescription/src/"),
+        (&["zip", ":", ":"], "modeldescription/src/"),
+        (&["toml", ":", ":"], "fmu/src/configuration/"),
+        (&["clap", ":", ":"], "src/"),
+        (&["fmi_rs", ":", ":"], "src/host/"),
+        (&["libloading", ":", ":"], "src/host/"),
+        (&["plotters", ":", ":"], "src/plot/"),
+        (&["indicatif", ":", ":"], "src/output.rs"),
+    ];
+    for (tokens, owner) in owners {
+        let mut named = false;
+        for source in crates() {
+            // The archives of others are read through fmi_rs::zip.
+            let foreign: Vec<_> = [&["fmi_rs", ":", ":"], tokens].concat();
+            let foreign = source.lexed.lines_with(&foreign);
+            let mut lines = source.lexed.lines_with(tokens);
+            lines.retain(|line| !foreign.contains(line));
+            let place = source.path.starts_with(owner);
+            named |= place && !lines.is_empty();
+            let test = tokens[0] == "libloading" && source.is_test();
+            assert!(place || test || lines.is_empty(), "{}: {lines:?} name {}", source.path, tokens[0]);
+        }
+        assert!(named, "{} is not named in {owner}: the rule is out of date", tokens[0]);
+    }
+}
+
+#[test]
+fn used_modules_are_found() {
+    let code = "use crate::a::{B, c::d};\nuse crate::{e, f::{G, h}, I};\nlet x = crate::j::k(super::l());\n";
+    let lexed = crate::lexer::lex(code);
+    let names = |nested| used_modules(&lexed, nested).into_iter().map(|u| u.1).collect::<Vec<_>>();
+    assert_eq!(names(true), ["a", "e", "f", "I", "j"]);
+    assert_eq!(names(false), ["a", "e", "f", "I", "j", "l"]);
+}

@@ -1,0 +1,136 @@
+//! Examples parse, and what the documents say is what the program does.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use punctual::coupling::System;
+use punctual_fmu::configuration::Configuration;
+use punctual_fmu::product::Product;
+use punctual_modeldescription::Causality;
+
+use crate::sources::{TEXTS, root};
+
+#[test]
+fn every_example_is_a_valid_configuration_or_system() {
+    let mut seen = 0;
+    for text in TEXTS.iter().filter(|t| t.path.starts_with("examples/") && t.path.ends_with(".toml")) {
+        seen += 1;
+        let has_kind = text.text.lines().any(|line| line.starts_with("kind"));
+        if has_kind {
+            Configuration::parse(&text.text).unwrap_or_else(|e| panic!("{}: {e}", text.path));
+            continue;
+        }
+        let system = System::parse(&text.text).unwrap_or_else(|e| panic!("{}: {e}", text.path));
+        // Its own FMUs are built from the configurations of the same name beside it.
+        let folder = Path::new(&text.path).parent().expect("a folder");
+        for component in system.components() {
+            let configuration = folder.join(&component.fmu).with_extension("toml");
+            let known = TEXTS.iter().any(|t| Path::new(&t.path) == configuration);
+            assert!(known, "{}: no {}", text.path, configuration.display());
+        }
+    }
+    assert!(seen >= 3, "{seen} examples found");
+}
+
+fn text(path: &str) -> &'static str {
+    &TEXTS.iter().find(|t| t.path == path).unwrap_or_else(|| panic!("no {path}")).text
+}
+
+/// The code blocks of a language in a Markdown text.
+fn blocks<'a>(markdown: &'a str, language: &str) -> Vec<&'a str> {
+    let open = format!("```{language}\n");
+    let parts = markdown.split(open.as_str()).skip(1);
+    parts.filter_map(|part| part.split("\n```").next()).collect()
+}
+
+/// The texts in backquotes of the row of a Markdown table that begins with `| head |`.
+fn quoted_in_row(markdown: &str, head: &str) -> BTreeSet<String> {
+    let row = markdown.lines().find_map(|line| line.strip_prefix(&format!("| {head} |")));
+    let row = row.unwrap_or_else(|| panic!("no row {head}"));
+    row.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_configurations_of_the_readme_are_valid() {
+    let blocks = blocks(text("README.md"), "toml");
+    assert!(!blocks.is_empty(), "README.md shows no configuration");
+    for block in blocks {
+        Configuration::parse(block).unwrap_or_else(|e| panic!("README.md: {e} in\n{block}"));
+    }
+}
+
+/// The variables of a filter, with states and inputs by placeholder and barriers by their own part.
+fn variables(causality: Causality) -> BTreeSet<String> {
+    let configuration = "kind = \"filter\"\nplant = { model = \"bicycle\" }\n[[barrier]]\nname = \"goal\"\n\
+                         centre = [1, 2]\nradius = 1\ndeadline = 1\n";
+    let product = Configuration::parse(configuration).and_then(Product::new).expect("a filter");
+    let of_kind = product.variables.iter().filter(|v| v.causality == causality);
+    let name = |name: &str| match name.split_once('.') {
+        Some(("x", _)) => "x.<state>".to_owned(),
+        Some(("goal", part)) => part.to_owned(),
+        Some((group, _)) => format!("{group}.<input>"),
+        None => name.to_owned(),
+    };
+    of_kind.map(|v| name(&v.name)).collect()
+}
+
+#[test]
+fn the_readme_lists_the_variables_of_the_filter() {
+    let readme = text("README.md");
+    for (head, causality) in
+        [("inputs", Causality::Input), ("outputs", Causality::Output), ("parameters", Causality::Parameter)]
+    {
+        assert_eq!(quoted_in_row(readme, head), variables(causality), "README.md, {head}");
+    }
+}
+
+#[test]
+fn links_between_documents_lead_somewhere() {
+    for document in TEXTS.iter().filter(|t| t.path.ends_with(".md")) {
+        let folder = root().join(&document.path).with_file_name("");
+        for part in document.text.split("](").skip(1) {
+            let target = part.split([')', '#']).next().unwrap_or_default();
+            let elsewhere = target.is_empty() || target.contains("://");
+            assert!(elsewhere || folder.join(target).exists(), "{}: no {target}", document.path);
+        }
+    }
+}
+
+/// The subcommands that `punctual --help` shows.
+fn subcommands() -> BTreeSet<String> {
+    let help =
+        Command::new(env!("CARGO_BIN_EXE_punctual")).arg("--help").output().expect("the program starts");
+    let help = String::from_utf8(help.stdout).expect("UTF-8");
+    let listed =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    names.map(str::to_owned).collect()
+}
+
+/// The commands in the rows `| `punctual NAME …` | … |` of a Markdown table.
+fn listed(markdown: &str) -> Vec<String> {
+    let rows = markdown.lines().filter_map(|line| line.trim().strip_prefix("| `punctual "));
+    rows.map(|row| row.split(|c: char| !c.is_ascii_lowercase()).next().unwrap_or_default().to_owned())
+        .collect()
+}
+
+#[test]
+fn the_readme_has_the_two_commands_and_every_subcommand() {
+    let readme = text("README.md");
+    for command in ["cargo run --release -- demo", "tests/run"] {
+        assert!(readme.contains(command), "README.md does not say {command:?}");
+    }
+    let listed = listed(readme);
+    let unique: BTreeSet<_> = listed.iter().cloned().collect();
+    assert_eq!(unique.len(), listed.len(), "README.md lists a command twice: {listed:?}");
+    assert_eq!(unique, subcommands(), "the commands of README.md, and those of the program");
+}
+
+#[test]
+fn commands_are_found_in_help_and_table() {
+    assert!(subcommands().contains("build"), "{:?}", subcommands());
+    let table = "| command | does |\n|---|---|\n| `punctual run SYSTEM [--out DIR]` | couples |\n| `punctual demo` | x |\n";
+    assert_eq!(listed(table), ["run", "demo"]);
+}

@@ -1,0 +1,110 @@
+//! Where things stand that must stand in one place only, and what must stand nowhere.
+
+use crate::sources::{SOURCES, TEXTS, crates};
+
+#[test]
+fn every_crate_root_speaks_on_unsafe_code() {
+    let roots = [
+        ("core/src/lib.rs", "forbid"),
+        ("modeldescription/src/lib.rs", "forbid"),
+        ("fmu/src/lib.rs", "deny"),
+        ("src/lib.rs", "deny"),
+        ("src/main.rs", "deny"),
+    ];
+    for (path, word) in roots {
+        let source = crates().find(|s| s.path == path).unwrap_or_else(|| panic!("no {path}"));
+        let attribute = ["#", "!", "[", word, "(", "unsafe_code", ")", "]"];
+        assert_eq!(source.lexed.lines_with(&attribute).len(), 1, "{path}: #![{word}(unsafe_code)]");
+    }
+}
+
+#[test]
+fn unsafe_code_stands_at_the_c_interface_only() {
+    for source in SOURCES.iter().filter(|s| !s.is_test()) {
+        let place = ["fmu/src/abi/", "src/host/"].iter().any(|folder| source.path.starts_with(folder));
+        let lines = source.lexed.lines_with(&["unsafe"]);
+        assert!(place || lines.is_empty(), "{}: unsafe in lines {lines:?}", source.path);
+    }
+}
+
+#[test]
+fn only_one_module_prints() {
+    let words = [&["println", "!"][..], &["print", "!"], &["eprintln", "!"], &["eprint", "!"], &["dbg", "!"]];
+    let streams = [&["stdout", "("][..], &["stderr", "("]];
+    for source in crates().filter(|s| s.path != "src/output.rs") {
+        for tokens in words.iter().chain(&streams) {
+            let lines = source.lexed.lines_with(tokens);
+            assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens[0]);
+        }
+    }
+}
+
+/// Importers print log texts with `printf`, some with the text as its format. Messages of the core reach
+/// the log too.
+#[test]
+fn no_text_of_the_library_holds_a_percent_sign() {
+    let folders = ["fmu/src/", "core/src/"];
+    for source in SOURCES.iter().filter(|s| folders.iter().any(|f| s.path.starts_with(f)) && !s.is_test()) {
+        for (line, text) in source.without_tests().strings {
+            assert!(!text.contains('%'), "{}:{line}: {text:?}", source.path);
+        }
+    }
+}
+
+#[test]
+fn identifiers_are_ascii() {
+    for source in &*SOURCES {
+        for (number, line) in source.lexed.code.lines().enumerate() {
+            assert!(line.is_ascii(), "{}:{}: {line}", source.path, number + 1);
+        }
+    }
+}
+
+#[test]
+fn no_file_is_too_long_to_read() {
+    for text in TEXTS.iter().filter(|t| [".rs", ".py", ".c"].iter().any(|end| t.path.ends_with(end))) {
+        let lines = text.text.lines().count();
+        assert!(lines <= 600, "{} has {lines} lines, must have at most 600", text.path);
+    }
+}
+
+/// A test may be left to another one that runs it in a process of its own, and says so.
+#[test]
+fn no_test_is_ignored() {
+    for source in &*SOURCES {
+        let lines = source.lexed.lines_with(&["#", "[", "ignore"]);
+        let strings = &source.lexed.strings;
+        for line in lines {
+            let reason = strings.iter().find(|s| s.0 == line).and_then(|s| s.1.strip_prefix("started by "));
+            let starter = reason.is_some_and(|test| !source.lexed.lines_with(&["fn", test]).is_empty());
+            assert!(starter, "{}:{line}: an ignored test that no other test starts", source.path);
+        }
+    }
+}
+
+#[test]
+fn nothing_is_left_undone() {
+    for source in &*SOURCES {
+        for tokens in [["todo", "!"], ["unimplemented", "!"]] {
+            let lines = source.lexed.lines_with(&tokens);
+            assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens.concat());
+        }
+    }
+    // Put together here, so that this file does not hold them.
+    for word in [concat!("FIX", "ME"), concat!("TO", "DO"), concat!("XX", "X:")] {
+        for text in &*TEXTS {
+            assert!(!text.text.contains(word), "{} holds {word}", text.path);
+        }
+    }
+}
+
+#[test]
+fn no_file_names_a_place_on_one_machine() {
+    // Put together here, so that this file does not hold them.
+    for place in [concat!("/ro", "ot/"), concat!("/wo", "rk/"), concat!("/ho", "me/")] {
+        for text in &*TEXTS {
+            let line = text.text.lines().position(|line| line.contains(place));
+            assert!(line.is_none(), "{}:{}: {place}", text.path, line.unwrap_or_default() + 1);
+        }
+    }
+}
