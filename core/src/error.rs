@@ -1,8 +1,10 @@
 //! Misuse: the one error type of the crate. Numerical outcomes are statuses, not errors.
 
+mod degree;
+
 use std::fmt;
 
-use crate::lie::RelativeDegree;
+pub use degree::RelativeDegree;
 
 /// What kind of misuse an [`Error`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

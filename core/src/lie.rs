@@ -26,7 +26,8 @@ use crate::error::{Error, ErrorKind};
 use crate::jet::{Dual, Taylor};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
-pub use degree::{RelativeDegree, detected, relative_degree};
+pub use crate::error::RelativeDegree;
+pub use degree::{detected, relative_degree};
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.

@@ -9,15 +9,13 @@
 //! where a gradient vanishes by accident (the centre of a disc, standing still), so where an order is
 //! not the lowest found, two neighbours of the sample are asked as well.
 
-use std::fmt;
-
 use nalgebra::SVector;
 
 use super::barrier_series;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, RelativeDegree};
 use crate::jet::{Dual, Taylor};
 
 /// Number of Taylor coefficients taken: every order that is supported.
@@ -33,56 +31,7 @@ const SAMPLES: usize = 16;
 /// The largest part of samples that may have another order than the rest and be passed over: 1 in 8.
 const PASSED_OVER: usize = 8;
 
-/// The relative degree of a barrier along a plant, as found on sample states.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RelativeDegree {
-    /// n: every input that reaches h enters h⁽ⁿ⁾ first. The only case that can be filtered.
-    Uniform(usize),
-    /// No input enters any derivative up to [`MAX_RELATIVE_DEGREE`] at any sample.
-    Unreached,
-    /// Inputs enter at different orders: for each input the first derivative it enters, if any.
-    Mixed(Vec<Option<usize>>),
-    /// The order of the input that enters first differs between samples: the orders found, ascending.
-    Varying(Vec<usize>),
-    /// Model or barrier is not finite at any sample.
-    NotFinite,
-}
-
 impl RelativeDegree {
-    /// n if it is uniform.
-    pub fn uniform(&self) -> Option<usize> {
-        match self {
-            Self::Uniform(n) => Some(*n),
-            _ => None,
-        }
-    }
-
-    /// The finding as a sentence without its subject ("is …"), input i (from 0) called `name(i)`.
-    pub fn describe(&self, name: impl Fn(usize) -> String) -> String {
-        match self {
-            Self::Uniform(n) => format!("is {n}"),
-            Self::Unreached => {
-                format!("does not exist: no input enters a derivative of h up to order {MAX_RELATIVE_DEGREE}")
-            }
-            Self::Mixed(orders) => {
-                let mut entered: Vec<_> =
-                    orders.iter().enumerate().filter_map(|(i, n)| n.map(|n| (n, i))).collect();
-                entered.sort_unstable();
-                let parts: Vec<_> =
-                    entered.iter().map(|&(n, i)| format!("{} enters derivative {n}", name(i))).collect();
-                format!("is mixed: {} of h", parts.join(", "))
-            }
-            Self::Varying(orders) => {
-                let orders: Vec<_> = orders.iter().map(usize::to_string).collect();
-                format!(
-                    "differs between sample states: the first derivative of h with an input is of order {}",
-                    orders.join(" or ")
-                )
-            }
-            Self::NotFinite => "is not known: model or barrier is not finite at any sample state".to_owned(),
-        }
-    }
-
     /// n, if it is uniform and equals `declared` where that is given.
     ///
     /// # Errors
@@ -105,12 +54,6 @@ impl RelativeDegree {
         let error =
             Error::new(ErrorKind::RelativeDegree, "relative_degree", format!("{found}{declared}{advice}"));
         Err(error.with_relative_degree(self))
-    }
-}
-
-impl fmt::Display for RelativeDegree {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.describe(|i| format!("u[{}]", i + 1)))
     }
 }
 
@@ -258,14 +201,12 @@ where
     if !c.iter().all(|c| c.value.is_finite() && c.gradient.iter().all(|d| d.is_finite())) {
         return None;
     }
-    // Gradients of different orders have different units; the time in which h changes along the drift
-    // makes them comparable.
-    let size = c[0].value.abs();
-    let time = (1..K)
-        .filter(|&k| c[k].value != 0.0 && size > 0.0)
-        .map(|k| (size / c[k].value.abs()).powf(1.0 / k as f64))
-        .fold(f64::INFINITY, f64::min);
-    let time = if time.is_finite() { time.clamp(1e-6, 1e6) } else { 1.0 };
+    // Gradients of different orders have different units; the time in which the changes of h along the
+    // drift change themselves makes them comparable. (Not h itself: it may have any offset.)
+    let changes = || (1..K).filter(|&k| c[k].value != 0.0);
+    let ratio = |j: usize, k: usize| (c[j].value / c[k].value).abs().powf(1.0 / (k - j) as f64);
+    let time = changes().next().and_then(|j| changes().skip(1).map(|k| ratio(j, k)).reduce(f64::min));
+    let time = time.map_or(1.0, |time| time.clamp(1e-6, 1e6));
     let scaled = |k: usize, i: usize| c[k].gradient[i].abs() * time.powi(k as i32);
     let mut found = [None; NU];
     for (i, found) in found.iter_mut().enumerate() {
