@@ -13,4 +13,5 @@ mod in_process;
 mod inspecting;
 mod running;
 mod table;
+mod vehicles;
 mod workshop;
