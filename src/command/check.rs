@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use punctual_core::filter::{Method, Phase, SafetyFilter};
 use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfiguration};
+use punctual_fmu::product::describe;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -39,7 +40,7 @@ struct FilterReport {
     /// The start given, by state.
     start: Option<Vec<(&'static str, f64)>>,
     /// Status of the first sample from there.
-    status: Option<String>,
+    status: Option<&'static str>,
     warnings: Vec<String>,
 }
 
@@ -245,12 +246,12 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
 }
 
 /// Anchors the filter at `x0` with u_ref = 0; the status in words.
-fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) -> Result<String, Error> {
+fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) -> Result<&'static str, Error> {
     let u_ref = vec![0.0; inputs];
     let mut u = u_ref.clone();
     let report = filter.step(t, x0, &u_ref, &mut u);
     let status = report.map_err(|e| Error::configuration(e.field(), e.message()))?.status;
-    Ok(format!("{status:?}").to_lowercase())
+    Ok(describe(status).0)
 }
 
 fn plant(c: &PlantConfiguration) -> PlantReport {

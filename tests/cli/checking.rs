@@ -97,6 +97,16 @@ fn a_start_without_a_guarantee_is_code_one() {
     assert!(done.stdout.ends_with("warning: goal: nothing is guaranteed from this start\n"), "{done:#?}");
 }
 
+/// Standing still and heading across the line to the goal: no input moves h at that instant.
+#[test]
+fn a_degenerate_start_is_code_one() {
+    let across = format!("theta={}", 0.75 * std::f64::consts::PI);
+    let done = workshop(&[]).punctual(["check", "filter.toml", "--x0", &across]);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(done.stdout.contains("first step with u_ref = 0: degenerate\n"), "{done:#?}");
+    assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");
+}
+
 #[test]
 fn a_mixed_relative_degree_is_refused() {
     let workshop = workshop(&[("model = \"unicycle\"", "model = \"bicycle_small_slip\"")]);
