@@ -6,7 +6,7 @@
 //!
 //! | method | e | a | promise | when |
 //! |---|---|---|---|---|
-//! | [`repeated_root`], the paper's | h − μ | root of (R), negative from rest | h ≥ μ at T | an admissible root exists |
+//! | [`repeated_root`], the paper's | h − μ | largest root of (R), negative from rest | h ≥ μ from T on | n even; n odd: T ≥ T_min, if any |
 //! | [`hermite`], the default | h − μ − r | any a > 0 | h ≥ μ from T on | always |
 //! | [`stay`] | h − μ | any a > 0 | h ≥ μ for ever | all c_k(a) ≥ 0 |
 //!
@@ -16,6 +16,7 @@
 pub mod comparison;
 mod fixed_time;
 pub mod hermite;
+pub mod polynomial;
 pub mod repeated_root;
 pub mod stay;
 
