@@ -1,6 +1,7 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
 use super::comparison::{Stack, lower_bound, lower_terms};
+use super::first_order::Exponent;
 use super::hermite::HermiteProfile;
 use super::repeated_root::{self, NoAdmissibleRate};
 use super::stay;
@@ -16,6 +17,8 @@ pub enum Method {
     /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`] r and the configured rate.
     #[default]
     ReferenceProfile,
+    /// ė ≥ α |e|^p for e = h − μ < 0, with α such that e = 0 at T ([`Exponent`]). Relative degree 1.
+    FirstOrder(Exponent),
 }
 
 /// Settings of one barrier's promise.
@@ -51,6 +54,12 @@ impl FixedTimeSettings {
         }
         if self.method == Method::RepeatedRoot && n == 1 {
             let message = "the repeated root does not exist for relative degree 1; use the reference profile";
+            return Err(Error::new(ErrorKind::Unsupported, "method", message));
+        }
+        if matches!(self.method, Method::FirstOrder(_)) && n != 1 {
+            let message = format!(
+                "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
+            );
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
         }
         positive("deadline", self.deadline)?;
@@ -120,7 +129,7 @@ impl FixedTime {
     /// # Errors
     ///
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
-    /// repeated root with n = 1.
+    /// repeated root with n = 1, the first-order condition with n > 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
         Ok(Self { n, settings: settings.validated(n)? })
     }
@@ -193,6 +202,7 @@ impl FixedTime {
         let rate = match self.settings.method {
             Method::ReferenceProfile => Some(self.settings.rate),
             Method::RepeatedRoot => repeated_root::rate(e, self.settings.deadline).ok(),
+            Method::FirstOrder(exponent) => Some(exponent.rate(self.settings.deadline)),
         };
         FixedTimeState {
             phase: Phase::Approach,
@@ -209,6 +219,13 @@ impl FixedTime {
         let anchor = &state.anchor[..self.n];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
+            Method::FirstOrder(exponent) => {
+                let deadline = self.settings.deadline;
+                let bound = exponent.lower_bound(anchor[0], deadline, elapsed);
+                // The comparison can start at any sample that is not below the bound.
+                state.guaranteed |= elapsed < deadline && e[0] >= bound;
+                (exponent.floor(anchor[0], deadline, e[0]), bound)
+            }
             Method::ReferenceProfile => {
                 let r = HermiteProfile::new(anchor, self.settings.deadline).evaluate(elapsed);
                 let mut error = [0.0; MAX_RELATIVE_DEGREE];
