@@ -6,10 +6,11 @@ from the closed form of core/src/convergence/hermite.rs, and evaluated with its 
     python core/tests/roots/hermite.py
 
 Rows of hermite.csv: <T>,<tau>,<e_0> ... <e_{n-1}>,<r_0> ... <r_n>,<size_0> ... <size_n>; inputs are exact
-in binary, outputs are rounded to doubles; size_k is the sum of |terms| of r_k in powers
-of tau/T at tau = T, where they are largest.
+in binary, outputs are rounded to doubles; size_k is the sum of the magnitudes of the terms
+of r_k in the factored form, to which its round-off is proportional.
 """
 
+import math
 import pathlib
 import random
 from fractions import Fraction as F
@@ -35,6 +36,17 @@ def solve(a, b):
     return [row[n] for row in rows]
 
 
+def sizes(e, T, s):
+    n = len(e)
+    y = [abs(e[j]) * T**j / math.factorial(j) for j in range(n)]
+    q = [sum(y[j] * math.comb(n - 1 + k - j, k - j) for j in range(k + 1)) for k in range(n)]
+    derivative = lambda m: sum(q[i] * falling(i, m) * s ** (i - m) for i in range(m, n))
+    return [
+        sum(math.comb(k, i) * falling(n, i) * (1 - s) ** (n - i) * derivative(k - i) for i in range(k + 1)) / T**k
+        for k in range(n + 1)
+    ]
+
+
 def main():
     random.seed(7)
     lines = []
@@ -47,7 +59,7 @@ def main():
             for s in (F(0), F(3, 16), F(1, 2), F(31, 32)):
                 terms = [[p[i] * falling(i, k) * s ** (i - k) / T**k for i in range(k, 2 * n)] for k in range(n + 1)]
                 r = " ".join(repr(float(sum(row))) for row in terms)
-                size = " ".join(repr(float(sum(abs(p[i]) * falling(i, k) for i in range(k, 2 * n)) / T**k)) for k in range(n + 1))
+                size = " ".join(repr(float(v)) for v in sizes(e, T, s))
                 lines.append(f"{float(T)!r},{float(s * T)!r},{' '.join(repr(float(v)) for v in e)},{r},{size}\n")
     (pathlib.Path(__file__).parent / "hermite.csv").write_text("".join(lines))
 
