@@ -70,6 +70,28 @@ fn the_largest_root_is_the_rate() {
     }
 }
 
+/// (R) rises at its second largest root, so c_{n−1} < 0 there; the third may be admissible as well or have a
+/// later zero.
+#[test]
+fn smaller_roots_are_judged() {
+    let mut count = 0;
+    for Case { deadline, e, roots, .. } in cases().filter(|c| c.e[0] < 0.0) {
+        if let [.., second, _] = roots[..] {
+            assert_eq!(admissibility(second, &e, deadline), Admissibility::NegativeLeading, "{e:?}");
+            count += 1;
+        }
+    }
+    assert!(count > 20, "{count}");
+    // R = −s (s − 1/10) (s − 4): P = −6 + 14.2 τ − 8.6 τ² + 0.4 τ³ for s = 0 falls at 1 and returns at 19.7.
+    let e = [-6.0, 14.2, -17.2, 2.4];
+    let judged = [0.0, 0.1, 4.0].map(|s| admissibility(s, &e, 1.0));
+    assert_eq!(judged, [Admissibility::LaterZero, Admissibility::NegativeLeading, Admissibility::Admissible]);
+    // R = −s (s − 1) (s − 2): here the smallest is admissible too.
+    let e = [-6.0, 12.0, -16.0, 12.0];
+    assert_eq!(admissibility(0.0, &e, 1.0), Admissibility::Admissible);
+    assert!(rate(&e, 1.0).is_ok_and(|a| (a - 2.0).abs() < 1e-13));
+}
+
 #[test]
 fn from_rest() {
     // The real zeros of E_1, E_3, E_5, E_7 (theory; here to the digits of a double from mpmath), none else.
