@@ -186,6 +186,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         let (method, rate) = match settings.method {
             Method::ReferenceProfile => ("reference profile", Some(settings.rate)),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
+            Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(settings.deadline))),
         };
         let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
         if settings.margin == 0.0 {
@@ -206,6 +207,9 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         }
         if experiment.stop_time - experiment.start_time < settings.deadline {
             warn("the experiment stops before the deadline".to_owned());
+        }
+        if let Some(reason) = filter.no_admissible_rate(i) {
+            warn(format!("{reason}; the stay rate is used instead, without a promise"));
         }
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
             warn(format!(

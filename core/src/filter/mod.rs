@@ -12,6 +12,7 @@ pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase
 pub use builder::FilterBuilder;
 pub use report::{BarrierReport, Report, Status};
 
+use crate::convergence::repeated_root::NoAdmissibleRate;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::error::{Error, length};
 use crate::lie::{DerivativeSource, Derivatives};
@@ -211,6 +212,12 @@ impl SafetyFilter {
     /// The names of the barriers, in the order of the report.
     pub fn barrier_names(&self) -> impl Iterator<Item = &str> {
         self.channels.iter().map(|c| c.name.as_str())
+    }
+
+    /// Why the repeated root of barrier `index` has no admissible rate from its anchor, if it has none;
+    /// `None` too for another method, before the anchor and for an index that no barrier has.
+    pub fn no_admissible_rate(&self, index: usize) -> Option<NoAdmissibleRate> {
+        self.channels.get(index)?.promise.no_admissible_rate(self.state.barriers.get(index)?)
     }
 
     /// The relative degree of each barrier, in the order of the report.
