@@ -110,8 +110,8 @@ pub struct Demand {
 /// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedTime {
-    n: usize,
-    settings: FixedTimeSettings,
+    pub(super) n: usize,
+    pub(super) settings: FixedTimeSettings,
 }
 
 impl FixedTime {

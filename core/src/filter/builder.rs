@@ -1,8 +1,9 @@
 //! Building a filter: every number is checked here, so that a step cannot fail on one.
 
-use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Workspace};
+use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Sampling, Workspace};
 use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
+use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, positive};
@@ -16,6 +17,7 @@ pub struct FilterBuilder {
     channels: Vec<Channel>,
     bounds: Bounds,
     correction_limit: f64,
+    sampling: Sampling,
 }
 
 impl FilterBuilder {
@@ -29,6 +31,7 @@ impl FilterBuilder {
             channels: Vec::new(),
             bounds: Bounds::NONE,
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
+            sampling: Sampling::default(),
         }
     }
 
@@ -111,13 +114,24 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// How inputs that are held between samples are accounted for. Default:
+    /// [`Sampling::Pointwise`].
+    ///
+    /// # Errors
+    ///
+    /// A period that is not finite or ≤ 0.
+    pub fn sampling(mut self, sampling: Sampling) -> Result<Self, Error> {
+        self.sampling = sampling.validated()?;
+        Ok(self)
+    }
+
     /// The filter, not yet anchored.
     ///
     /// # Errors
     ///
     /// No barrier; no state or input, or more than [`MAX_INPUTS`] inputs.
     pub fn build(self) -> Result<SafetyFilter, Error> {
-        let Self { state_dim, input_dim, channels, bounds, correction_limit } = self;
+        let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling } = self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if channels.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
@@ -128,13 +142,24 @@ impl FilterBuilder {
         if input_dim == 0 || input_dim > MAX_INPUTS {
             return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
         }
-        let state = FilterState { barriers: vec![FixedTimeState::default(); channels.len()] };
+        let barriers = vec![FixedTimeState::default(); channels.len()];
+        let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {
             derivatives: Derivatives::ZERO,
             rows: vec![Row::ZERO; channels.len()],
+            demands: vec![SampledDemand::ZERO; channels.len()],
             next: state.clone(),
             report: Report::new(channels.len()),
         };
-        Ok(SafetyFilter { state_dim, input_dim, channels, bounds, correction_limit, state, workspace })
+        Ok(SafetyFilter {
+            state_dim,
+            input_dim,
+            channels,
+            bounds,
+            correction_limit,
+            sampling,
+            state,
+            workspace,
+        })
     }
 }
