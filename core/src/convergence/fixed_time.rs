@@ -29,6 +29,10 @@ pub struct FixedTimeSettings {
     pub stay_rate: f64,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside.
     pub margin: f64,
+    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
+    /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
+    /// ([`Phase::Left`]) and the stay constraint pulls back, without a deadline.
+    pub recovery: Option<f64>,
 }
 
 impl FixedTimeSettings {
@@ -39,7 +43,7 @@ impl FixedTimeSettings {
     /// 20/T, no margin.
     pub fn within(deadline: f64) -> Self {
         let rate = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
-        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0 }
+        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0, recovery: None }
     }
 
     fn validated(self, n: usize) -> Result<Self, Error> {
@@ -57,6 +61,9 @@ impl FixedTimeSettings {
         positive("rate", self.rate)?;
         positive("stay_rate", self.stay_rate)?;
         non_negative("margin", self.margin)?;
+        if let Some(recovery) = self.recovery {
+            positive("recovery", recovery)?;
+        }
         Ok(self)
     }
 }
@@ -74,7 +81,8 @@ pub enum Phase {
     Late = 2,
     /// Inside, under the stay constraint.
     Stay = 3,
-    /// Outside again after having been inside; the stay constraint pulls back, without a deadline.
+    /// Outside again after having been inside, with no recovery time set; the stay constraint pulls
+    /// back, without a deadline.
     Left = 4,
 }
 
@@ -85,6 +93,10 @@ pub struct FixedTimeState {
     pub phase: Phase,
     /// Time of the anchor, t₀ in s.
     pub anchor_time: f64,
+    /// T in s, counted from the anchor.
+    pub deadline: f64,
+    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
+    pub recoveries: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor.
@@ -133,18 +145,26 @@ impl FixedTime {
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
     /// returns what the constraint asks for there.
     ///
-    /// The first call anchors. Arrival is the first sample with h ≥ 0; the stay constraint takes over
+    /// The first call anchors, as [`Self::anchor`] with the configured deadline does. Arrival is the first sample with h ≥ 0; the stay constraint takes over
     /// at the first sample at which h ≥ μ *and* it is invariant from there ([`stay::is_invariant`]).
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
-        let FixedTimeSettings { deadline, stay_rate, margin, .. } = self.settings;
+        let FixedTimeSettings { stay_rate, margin, .. } = self.settings;
+        if state.phase == Phase::Waiting {
+            self.anchor(state, t, h, self.settings.deadline);
+        }
         let mut e = [0.0; MAX_RELATIVE_DEGREE];
         e[..self.n].copy_from_slice(&h[..self.n]);
         e[0] -= margin;
         let e = &e[..self.n];
 
-        if state.phase == Phase::Waiting {
-            *state = self.anchored(t, e);
+        if let Some(recovery) = self.settings.recovery
+            && state.phase == Phase::Stay
+            && h[0] < 0.0
+        {
+            self.anchor(state, t, h, recovery);
+            state.recoveries += 1;
         }
+        let deadline = state.deadline;
         let elapsed = (t - state.anchor_time).max(0.0);
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
@@ -173,22 +193,33 @@ impl FixedTime {
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
 
-    /// The state at the anchor: the approach with its rate.
-    fn anchored(&self, t: f64, e: &[f64]) -> FixedTimeState {
+    /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
+    /// be reached within `deadline` seconds from there. A deadline ≤ 0 is past already: nothing is
+    /// guaranteed, the phase of the next [`Self::advance`] is [`Phase::Late`] where h < 0, and the target
+    /// is h = μ at once, approached with the rate. The count of recoveries goes on.
+    pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64) {
         let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
-        anchor[..self.n].copy_from_slice(e);
+        anchor[..self.n].copy_from_slice(&h[..self.n]);
+        anchor[0] -= self.settings.margin;
         let rate = match self.settings.method {
+            _ if deadline <= 0.0 => None,
             Method::ReferenceProfile => Some(self.settings.rate),
-            Method::RepeatedRoot => repeated_root::rate([e[0], e[1]], self.settings.deadline),
+            Method::RepeatedRoot => repeated_root::rate([anchor[0], anchor[1]], deadline),
         };
-        FixedTimeState {
+        let fallback = match self.settings.method {
+            Method::ReferenceProfile => self.settings.rate,
+            Method::RepeatedRoot => self.settings.stay_rate,
+        };
+        *state = FixedTimeState {
             phase: Phase::Approach,
             anchor_time: t,
+            deadline,
+            recoveries: state.recoveries,
             anchor,
-            rate: rate.unwrap_or(self.settings.stay_rate),
+            rate: rate.unwrap_or(fallback),
             arrival: None,
             guaranteed: rate.is_some(),
-        }
+        };
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
@@ -197,14 +228,14 @@ impl FixedTime {
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
             Method::ReferenceProfile => {
-                let r = HermiteProfile::new(anchor, self.settings.deadline).evaluate(elapsed);
+                let r = HermiteProfile::new(anchor, state.deadline).evaluate(elapsed);
                 let mut error = [0.0; MAX_RELATIVE_DEGREE];
                 for k in 0..self.n {
                     error[k] = e[k] - r[k];
                 }
                 let error = &error[..self.n];
                 // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed |= elapsed < self.settings.deadline && stay::is_invariant(state.rate, error);
+                state.guaranteed |= elapsed < state.deadline && stay::is_invariant(state.rate, error);
                 (r[self.n] - lower_terms(state.rate, error), r[0])
             }
         }

@@ -77,7 +77,7 @@ impl FixedTime {
         let target = |elapsed: f64| {
             let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
             if follows {
-                r = HermiteProfile::new(&state.anchor[..n], self.settings.deadline).evaluate(elapsed);
+                r = HermiteProfile::new(&state.anchor[..n], state.deadline).evaluate(elapsed);
             }
             r[0] += self.settings.margin;
             r

@@ -61,6 +61,8 @@ struct Workspace {
     rows: Vec<Row>,
     demands: Vec<SampledDemand>,
     next: FilterState,
+    /// The state from which each barrier is held, one after the other.
+    predicted: Vec<f64>,
     report: Report,
 }
 
@@ -84,6 +86,7 @@ pub struct SafetyFilter {
     bounds: Bounds,
     correction_limit: f64,
     sampling: Sampling,
+    delay: f64,
     state: FilterState,
     workspace: Workspace,
 }
@@ -139,7 +142,8 @@ impl SafetyFilter {
         length("x", x.len(), self.state_dim)?;
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        let Workspace { derivatives, rows, demands, next, report } = &mut self.workspace;
+        let (begin, acting) = (t + self.delay, self.acting());
+        let Workspace { derivatives, rows, demands, next, predicted, report } = &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
         if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
@@ -150,21 +154,32 @@ impl SafetyFilter {
 
         let period = self.sampling.period(&self.state, t);
         for (i, channel) in self.channels.iter().enumerate() {
-            // Evaluate: h and its derivatives along the plant.
+            // Evaluate: h and its derivatives along the plant, where the input begins to act.
             channel.source.evaluate(t, x, derivatives);
+            let h = derivatives.drift[0];
+            let from = &mut predicted[i * x.len()..(i + 1) * x.len()];
+            from.copy_from_slice(x);
+            if self.delay > 0.0 {
+                channel.source.predict(from, &acting[..u.len()], self.delay);
+                channel.source.evaluate(begin, from, derivatives);
+            }
             let n = channel.source.relative_degree();
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
-            report_b.h = derivatives.drift[0];
+            report_b.h = h;
             if let Some(status) = defect(derivatives) {
                 report.status = status;
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
-            let demand = channel.promise.advance(promise, t, &derivatives.drift[..n]);
+            if promise.phase == Phase::Waiting {
+                let deadline = channel.promise.settings().deadline - self.delay;
+                channel.promise.anchor(promise, begin, &derivatives.drift[..n], deadline);
+            }
+            let demand = channel.promise.advance(promise, begin, &derivatives.drift[..n]);
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
             if let Some(period) = period {
-                demands[i] = channel.promise.over_period(promise, t, &derivatives.drift[..n], period);
+                demands[i] = channel.promise.over_period(promise, begin, &derivatives.drift[..n], period);
             }
             report_b.row = rows[i];
             report_b.profile = demand.profile;
@@ -184,6 +199,7 @@ impl SafetyFilter {
         let held = period.and_then(|period| {
             report.period = period;
             let (channels, bounds) = (&self.channels[..], &self.bounds);
+            let (t, x) = (begin, &predicted[..]);
             let held = Held { channels, demands, t, x, period, bounds, u_ref, correction_limit: limit };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             held.solve(rows, last, u)
@@ -220,6 +236,14 @@ impl SafetyFilter {
             }
         }
         Ok(())
+    }
+
+    /// The input that acts until that of the present step does.
+    fn acting(&self) -> [f64; MAX_INPUTS] {
+        match self.state.time {
+            Some(_) => self.state.input,
+            None => std::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
+        }
     }
 
     /// Forgets the anchors: the next sample with valid inputs starts every deadline anew.

@@ -67,6 +67,8 @@ pub struct BarrierReport {
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
+    /// How often leaving the set has re-armed the deadline (the settings' `recovery`).
+    pub recoveries: u32,
     /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ. Where the step looked
     /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
@@ -87,6 +89,7 @@ impl BarrierReport {
         arrived: false,
         arrival_time: None,
         guaranteed: false,
+        recoveries: 0,
         row: Row::ZERO,
         slack: 0.0,
         sampling_loss: 0.0,
@@ -98,6 +101,7 @@ impl BarrierReport {
         self.arrival_time = promise.arrival;
         self.arrived = promise.arrival.is_some();
         self.guaranteed = promise.guaranteed;
+        self.recoveries = promise.recoveries;
     }
 }
 

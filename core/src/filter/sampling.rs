@@ -72,6 +72,7 @@ pub(super) struct Held<'a> {
     pub(super) channels: &'a [Channel],
     pub(super) demands: &'a [SampledDemand],
     pub(super) t: f64,
+    /// The state of each barrier, one after the other.
     pub(super) x: &'a [f64],
     pub(super) period: f64,
     pub(super) bounds: &'a Bounds,
@@ -122,8 +123,9 @@ impl Held<'_> {
     fn violation(&self, u: &[f64], rows: &mut [Row]) -> Option<f64> {
         let mut worst: f64 = 0.0;
         let mut ahead = Ahead::ZERO;
-        for ((channel, demand), row) in self.channels.iter().zip(self.demands).zip(rows) {
-            let known = channel.source.ahead(self.t, self.x, u, self.period, &mut ahead);
+        let states = self.x.chunks_exact(self.x.len() / self.channels.len());
+        for (((channel, demand), x), row) in self.channels.iter().zip(self.demands).zip(states).zip(rows) {
+            let known = channel.source.ahead(self.t, x, u, self.period, &mut ahead);
             if !known || !ahead.is_finite() {
                 return None;
             }
