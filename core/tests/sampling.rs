@@ -171,6 +171,29 @@ fn fifty_milliseconds_keep_the_deadline_and_the_margin() {
     }
 }
 
+/// The pointwise constraint at 50 ms throws this unicycle off its profile, and no longer claims what it
+/// cannot keep; the sampled one keeps both.
+#[test]
+fn a_margin_that_is_used_up_is_no_guarantee() {
+    let broken = |sampling: Sampling| {
+        let mut filter = filter(Unicycle, sampling);
+        let (mut claimed_below, mut lost) = (0, 0);
+        let schedule = Schedule { step: 0.05, steps: 99, substeps: 4 };
+        closed_loop(&mut filter, &Unicycle, HARD[0].into(), schedule, speed_damping, |_, _, _, r| {
+            let b = &r.barriers[0];
+            // The profile is reported with the margin.
+            let below = b.h < b.profile - 0.02 - 1e-9;
+            claimed_below += usize::from(below && b.guaranteed);
+            lost += usize::from(!b.guaranteed);
+        })
+        .expect("valid schedule");
+        (claimed_below, lost)
+    };
+    let (claimed, lost) = broken(Sampling::Pointwise);
+    assert!(claimed == 0 && lost > 0, "{claimed} {lost}");
+    assert_eq!(broken(Sampling::Period(0.05)).0, 0);
+}
+
 /// The report names the period, and the loss is of second order in it.
 #[test]
 fn the_loss_shrinks_with_the_square_of_the_period() {

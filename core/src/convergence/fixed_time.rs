@@ -6,6 +6,9 @@ use super::{repeated_root, stay};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, non_negative, positive};
 
+/// Round-off of h − μ − r, as a part of its terms.
+const MARGIN_TOLERANCE: f64 = 1e-12;
+
 /// How the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -105,6 +108,8 @@ pub struct FixedTimeState {
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied (whoever enforces the row clears this if not).
+    /// With a margin, an approach also loses it where a sample shows that held inputs have used up the
+    /// margin (h below the profile); without one it is of the continuous-time constraint only.
     pub guaranteed: bool,
 }
 
@@ -234,6 +239,11 @@ impl FixedTime {
                     error[k] = e[k] - r[k];
                 }
                 let error = &error[..self.n];
+                // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
+                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + self.settings.margin);
+                if self.settings.margin > 0.0 && error[0] < -self.settings.margin - scale {
+                    state.guaranteed = false;
+                }
                 // The lemma can start at any sample before the deadline, also after one that was lost.
                 state.guaranteed |= elapsed < state.deadline && stay::is_invariant(state.rate, error);
                 (r[self.n] - lower_terms(state.rate, error), r[0])
