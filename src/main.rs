@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, demo, inspect, run};
+use punctual::command::{build, check, demo, inspect, run};
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple and plot.
@@ -23,6 +23,8 @@ struct Arguments {
 enum Command {
     /// Turn a filter or plant configuration into an FMU
     Build(build::Arguments),
+    /// Say what a configuration comes to: relative degree, rates, guarantee from a start, warnings
+    Check(check::Arguments),
     /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
     Demo(demo::Arguments),
     /// Couple FMUs as a system file says; write CSV and pictures
@@ -34,6 +36,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Build(arguments) => build::execute(&arguments),
+        Command::Check(arguments) => check::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),

@@ -3,7 +3,8 @@
 //! The two discs below have the same safe set and very different behaviour. The quadratic one is the
 //! paper's: far away its value grows with d², while its gradient at the boundary is only 2R, so a
 //! vehicle that follows a profile of it arrives at enormous speed. The distance-shaped one has a
-//! gradient of length ≤ 1 everywhere; it is the one to use.
+//! gradient of length ≤ 1 everywhere; it is the one to use. Both can move at a constant velocity, and
+//! [`Outside`] turns a goal into an obstacle.
 
 use nalgebra::SVector;
 
@@ -11,13 +12,42 @@ use crate::barrier::Barrier;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
-/// Squared distance of the position (the first two states) from `centre`, in m².
-fn distance_squared<S: Scalar, const NX: usize>(x: &SVector<S, NX>, centre: &[f64; 2]) -> S {
-    (x[0] - centre[0]).squared() + (x[1] - centre[1]).squared()
+/// A point that moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
+#[derive(Clone, Copy, Debug)]
+struct Centre {
+    start: [f64; 2],
+    velocity: [f64; 2],
 }
 
-fn checked_centre(centre: [f64; 2]) -> Result<[f64; 2], Error> {
-    Ok([finite("centre[1]", centre[0])?, finite("centre[2]", centre[1])?])
+impl Centre {
+    fn at_rest(centre: [f64; 2]) -> Result<Self, Error> {
+        let start = [finite("centre[1]", centre[0])?, finite("centre[2]", centre[1])?];
+        Ok(Self { start, velocity: [0.0; 2] })
+    }
+
+    fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
+        let velocity = [finite("velocity[1]", velocity[0])?, finite("velocity[2]", velocity[1])?];
+        Ok(Self { velocity, ..self })
+    }
+
+    /// Squared distance of the position (the first two states) from the point at time `t`, in m².
+    fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
+        let away = |i: usize| x[i] - (t * self.velocity[i] + self.start[i]);
+        away(0).squared() + away(1).squared()
+    }
+}
+
+/// What lies outside another barrier's set: h = −h of the inside.
+///
+/// `Outside(DistanceDisc::new(..)?)` is an obstacle: kept clear of if the start is outside, left by the
+/// deadline if not. At the centre of the disc the gradient vanishes.
+#[derive(Clone, Copy, Debug)]
+pub struct Outside<B>(pub B);
+
+impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+        -self.0.value(t, x)
+    }
 }
 
 /// Interior of a disc, the paper's form: h = R² − d², in m².
@@ -26,7 +56,7 @@ fn checked_centre(centre: [f64; 2]) -> Result<[f64; 2], Error> {
 /// cannot be influenced (the filter reports it as degenerate).
 #[derive(Clone, Copy, Debug)]
 pub struct QuadraticDisc {
-    centre: [f64; 2],
+    centre: Centre,
     radius: f64,
 }
 
@@ -37,13 +67,23 @@ impl QuadraticDisc {
     ///
     /// A coordinate that is not finite, a radius that is not finite or ≤ 0.
     pub fn new(centre: [f64; 2], radius: f64) -> Result<Self, Error> {
-        Ok(Self { centre: checked_centre(centre)?, radius: positive("radius", radius)? })
+        Ok(Self { centre: Centre::at_rest(centre)?, radius: positive("radius", radius)? })
+    }
+
+    /// The same disc with its centre moving at `velocity` (m/s): where it was given at t = 0 on the
+    /// filter's time axis, whenever the filter starts.
+    ///
+    /// # Errors
+    ///
+    /// A velocity that is not finite.
+    pub fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
+        Ok(Self { centre: self.centre.moving(velocity)?, ..self })
     }
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
-        -distance_squared(x, &self.centre) + self.radius * self.radius
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+        -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
 }
 
@@ -53,7 +93,7 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
 /// d/√(d² + ε²) < 1, and curvature at most 1/ε; it vanishes only at the centre.
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceDisc {
-    centre: [f64; 2],
+    centre: Centre,
     radius: f64,
     smoothing: f64,
 }
@@ -67,16 +107,26 @@ impl DistanceDisc {
     /// A coordinate that is not finite, a radius or smoothing that is not finite or ≤ 0.
     pub fn new(centre: [f64; 2], radius: f64, smoothing: f64) -> Result<Self, Error> {
         Ok(Self {
-            centre: checked_centre(centre)?,
+            centre: Centre::at_rest(centre)?,
             radius: positive("radius", radius)?,
             smoothing: positive("smoothing", smoothing)?,
         })
     }
+
+    /// The same disc with its centre moving at `velocity` (m/s): where it was given at t = 0 on the
+    /// filter's time axis, whenever the filter starts.
+    ///
+    /// # Errors
+    ///
+    /// A velocity that is not finite.
+    pub fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
+        Ok(Self { centre: self.centre.moving(velocity)?, ..self })
+    }
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
-        -(distance_squared(x, &self.centre) + self.smoothing * self.smoothing).sqrt()
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+        -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt()
             + self.radius.hypot(self.smoothing)
     }
 }

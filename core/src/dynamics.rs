@@ -52,6 +52,64 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     }
 }
 
+/// A plant with an integrator before one of its inputs (dynamic extension): the input becomes the last
+/// state, its rate the new input in its place.
+///
+/// An input then enters every derivative one order later, so that a barrier of mixed relative degree
+/// can get a uniform one. `NX` is the number of states of the plant inside; the extended one has
+/// `NX` + 1, which is checked at compile time.
+///
+/// ```
+/// use punctual_core::barriers::DistanceDisc;
+/// use punctual_core::dynamics::IntegratedInput;
+/// use punctual_core::lie::{RelativeDegree, detected};
+/// use punctual_core::plants::SmallSlipBicycle;
+///
+/// let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
+/// let bicycle = SmallSlipBicycle::new(10.0)?;
+/// assert_eq!(detected(&bicycle, &disc).uniform(), None);
+/// // State (x_p, y_p, θ, v, β), input (a, rate of β).
+/// let extended = IntegratedInput::<_, 4>::new(bicycle, 1);
+/// assert_eq!(detected::<_, _, 5, 2>(&extended, &disc), RelativeDegree::Uniform(2));
+/// # Ok::<(), punctual_core::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct IntegratedInput<P, const NX: usize> {
+    plant: P,
+    input: usize,
+}
+
+impl<P, const NX: usize> IntegratedInput<P, NX> {
+    /// `plant` with an integrator before input number `input`, counted from 0. A number that the plant
+    /// does not have leaves its inputs as they are, and the last state constant.
+    pub fn new(plant: P, input: usize) -> Self {
+        Self { plant, input }
+    }
+}
+
+impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<EXTENDED, NU>
+    for IntegratedInput<P, NX>
+where
+    P: ControlAffine<NX, NU>,
+{
+    fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
+        const { assert!(EXTENDED == NX + 1, "one state more than the plant inside") };
+        let inner = SVector::<S, NX>::from_fn(|i, _| x[i]);
+        let (f, g) = (self.plant.drift(&inner), self.plant.input_map(&inner));
+        let held = |i: usize| if self.input < NU { g[(i, self.input)] * x[NX] } else { S::zero() };
+        SVector::from_fn(|i, _| if i < NX { f[i] + held(i) } else { S::zero() })
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
+        let g = self.plant.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
+        SMatrix::from_fn(|i, j| match (i < NX, j == self.input) {
+            (true, false) => g[(i, j)],
+            (false, true) => S::one(),
+            _ => S::zero(),
+        })
+    }
+}
+
 /// A plant chosen at run time: [`ControlAffine`] behind slices, in plain numbers.
 pub trait DynPlant: Send + Sync {
     /// Number of states.

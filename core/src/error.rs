@@ -1,6 +1,10 @@
 //! Misuse: the one error type of the crate. Numerical outcomes are statuses, not errors.
 
+mod degree;
+
 use std::fmt;
+
+pub use degree::RelativeDegree;
 
 /// What kind of misuse an [`Error`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +26,22 @@ pub struct Error {
     kind: ErrorKind,
     field: String,
     message: String,
+    degree: Option<Box<RelativeDegree>>,
 }
 
 impl Error {
     pub(crate) fn new(kind: ErrorKind, field: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { kind, field: field.into(), message: message.into() }
+        Self { kind, field: field.into(), message: message.into(), degree: None }
+    }
+
+    pub(crate) fn with_relative_degree(mut self, found: RelativeDegree) -> Self {
+        self.degree = Some(Box::new(found));
+        self
+    }
+
+    /// The relative degree found, where that is what is wrong.
+    pub fn relative_degree(&self) -> Option<&RelativeDegree> {
+        self.degree.as_deref()
     }
 
     /// The kind of misuse.

@@ -15,10 +15,10 @@
 //! every evaluation, since an input that enters earlier invalidates every constraint built for n.
 
 mod ahead;
+mod degree;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
-use std::array::from_fn;
 use std::marker::PhantomData;
 
 use nalgebra::SVector;
@@ -28,6 +28,9 @@ use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind};
 use crate::jet::{Dual, Taylor};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+
+pub use crate::error::RelativeDegree;
+pub use degree::{detected, relative_degree};
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
@@ -160,7 +163,9 @@ where
 ///
 /// # Errors
 ///
-/// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`]; `NU` above [`MAX_INPUTS`] or zero.
+/// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`]; `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
+/// relative degree is for [`detected`] to say, and checked at every evaluation
+/// ([`Derivatives::lower_sensitivity`]).
 pub fn along<P, B, const NX: usize, const NU: usize>(
     plant: P,
     barrier: B,
@@ -190,34 +195,4 @@ where
         };
     }
     by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9)
-}
-
-/// The relative degree found on sample states: the order of the first derivative of h that an
-/// input enters at any of them, or `None` if none does up to [`MAX_RELATIVE_DEGREE`].
-///
-/// An input counts where the derivative's gradient exceeds 1e-12 of the largest gradient of any
-/// order: far above round-off, far below a real effect. States at which the model is not finite are
-/// passed over.
-pub fn relative_degree<P, B, const NX: usize, const NU: usize>(
-    plant: &P,
-    barrier: &B,
-    t: f64,
-    samples: &[SVector<f64, NX>],
-) -> Option<usize>
-where
-    P: ControlAffine<NX, NU>,
-    B: Barrier<NX>,
-{
-    const K: usize = MAX_RELATIVE_DEGREE + 1;
-    const SIGNIFICANT: f64 = 1e-12;
-    samples
-        .iter()
-        .filter_map(|x| {
-            let series: Taylor<Dual<NU>, K> = barrier_series(plant, barrier, t, x);
-            let size: [f64; K] =
-                from_fn(|k| series.derivative(k).gradient.iter().fold(0.0, |m: f64, d| m.max(d.abs())));
-            let largest = size.iter().copied().fold(0.0, f64::max);
-            size.iter().position(|&s| s > SIGNIFICANT * largest)
-        })
-        .min()
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, IntegratedInput};
 use crate::error::{Error, positive};
 use crate::scalar::Scalar;
 
@@ -25,6 +25,7 @@ const X_P: Signal = signal("x_p", "m", "position along x");
 const Y_P: Signal = signal("y_p", "m", "position along y");
 const THETA: Signal = signal("theta", "rad", "heading, counter-clockwise from the x axis");
 const V: Signal = signal("v", "m/s", "speed along the heading; negative when reversing");
+const BETA: Signal = signal("beta", "rad", "slip angle at the centre of mass");
 const A: Signal = signal("a", "m/s2", "acceleration along the heading");
 
 /// The names and units of a plant's states and inputs.
@@ -86,7 +87,7 @@ impl ControlAffine<4, 2> for Unicycle {
     }
 }
 
-/// The simplified kinematic bicycle of the paper's simulations: x = (x_p, y_p, θ, v), u = (a, β).
+/// The simplified bicycle of the paper's simulations: x = (x_p, y_p, θ, v), u = (a, β).
 ///
 /// ẋ_p = v cos θ, ẏ_p = v sin θ, θ̇ = v β / l_r, v̇ = a. The slip angle β acts on the heading only.
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +108,7 @@ impl Bicycle {
 
 impl Signals for Bicycle {
     const STATES: &'static [Signal] = &[X_P, Y_P, THETA, V];
-    const INPUTS: &'static [Signal] = &[A, signal("beta", "rad", "slip angle at the centre of mass")];
+    const INPUTS: &'static [Signal] = &[A, BETA];
 }
 
 impl ControlAffine<4, 2> for Bicycle {
@@ -119,6 +120,121 @@ impl ControlAffine<4, 2> for Bicycle {
         let mut g = SMatrix::zeros();
         g[(3, 0)] = S::one();
         g[(2, 1)] = x[3] / self.l_r;
+        g
+    }
+}
+
+/// The bicycle for small slip angles: x = (x_p, y_p, θ, v), u = (a, β).
+///
+/// ẋ_p = v cos θ − vβ sin θ, ẏ_p = v sin θ + vβ cos θ, θ̇ = v β / l_r, v̇ = a. β moves the vehicle
+/// sideways at once, so that it enters the *first* derivative of a barrier on the position and a only
+/// the second: a mixed relative degree, which the filter refuses. [`SmallSlipBicycleWithRate`] has a
+/// uniform one.
+#[derive(Clone, Copy, Debug)]
+pub struct SmallSlipBicycle {
+    l_r: f64,
+}
+
+impl SmallSlipBicycle {
+    /// A bicycle whose centre of mass lies `l_r` metres ahead of the rear axle.
+    ///
+    /// # Errors
+    ///
+    /// `l_r` not finite or ≤ 0.
+    pub fn new(l_r: f64) -> Result<Self, Error> {
+        Ok(Self { l_r: positive("l_r", l_r)? })
+    }
+
+    /// The same vehicle with the slip angle as a state and its rate as the input.
+    pub fn with_rate(self) -> SmallSlipBicycleWithRate {
+        SmallSlipBicycleWithRate(IntegratedInput::new(self, 1))
+    }
+}
+
+impl Signals for SmallSlipBicycle {
+    const STATES: &'static [Signal] = Bicycle::STATES;
+    const INPUTS: &'static [Signal] = Bicycle::INPUTS;
+}
+
+impl ControlAffine<4, 2> for SmallSlipBicycle {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        Unicycle.drift(x)
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+        let (sin, cos) = x[2].sin_cos();
+        let mut g = SMatrix::zeros();
+        g[(3, 0)] = S::one();
+        g[(0, 1)] = -x[3] * sin;
+        g[(1, 1)] = x[3] * cos;
+        g[(2, 1)] = x[3] / self.l_r;
+        g
+    }
+}
+
+/// [`SmallSlipBicycle`] with an integrator before β: x = (x_p, y_p, θ, v, β), u = (a, β̇).
+///
+/// A barrier on the position has relative degree 2 in both inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct SmallSlipBicycleWithRate(IntegratedInput<SmallSlipBicycle, 4>);
+
+impl Signals for SmallSlipBicycleWithRate {
+    const STATES: &'static [Signal] = &[X_P, Y_P, THETA, V, BETA];
+    const INPUTS: &'static [Signal] = &[A, signal("beta_rate", "rad/s", "rate of the slip angle")];
+}
+
+impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
+        self.0.drift(x)
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
+        self.0.input_map(x)
+    }
+}
+
+/// The kinematic bicycle, steered by the rate of its front wheel: x = (x_p, y_p, θ, v, δ), u = (a, δ̇).
+///
+/// ẋ_p = v cos(θ + β), ẏ_p = v sin(θ + β), θ̇ = (v/l_r) sin β with β = atan(l_r/(l_f + l_r) tan δ).
+///
+/// The model is not affine in δ, and a filter solves for inputs that enter linearly. With δ as a state
+/// it is affine, exactly, and a barrier on the position has relative degree 2 in both inputs. |δ| must
+/// stay below π/2: there the wheel stands across, and β jumps.
+#[derive(Clone, Copy, Debug)]
+pub struct KinematicBicycle {
+    l_f: f64,
+    l_r: f64,
+}
+
+impl KinematicBicycle {
+    /// A bicycle whose centre of mass lies `l_f` metres behind the front axle and `l_r` metres ahead
+    /// of the rear axle.
+    ///
+    /// # Errors
+    ///
+    /// A length that is not finite or ≤ 0.
+    pub fn new(l_f: f64, l_r: f64) -> Result<Self, Error> {
+        Ok(Self { l_f: positive("l_f", l_f)?, l_r: positive("l_r", l_r)? })
+    }
+}
+
+impl Signals for KinematicBicycle {
+    const STATES: &'static [Signal] =
+        &[X_P, Y_P, THETA, V, signal("delta", "rad", "steering angle of the front wheel")];
+    const INPUTS: &'static [Signal] = &[A, signal("delta_rate", "rad/s", "rate of the steering angle")];
+}
+
+impl ControlAffine<5, 2> for KinematicBicycle {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
+        let beta = (x[4].tan() * (self.l_r / (self.l_f + self.l_r))).atan();
+        let (sin, cos) = (x[2] + beta).sin_cos();
+        SVector::from([x[3] * cos, x[3] * sin, x[3] * beta.sin() / self.l_r, S::zero(), S::zero()])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
+        let mut g = SMatrix::zeros();
+        g[(3, 0)] = S::one();
+        g[(4, 1)] = S::one();
         g
     }
 }

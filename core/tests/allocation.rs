@@ -8,6 +8,7 @@ mod scenario;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use punctual_core::convergence::repeated_root;
 use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Sampling, Status};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::Solver;
@@ -83,6 +84,18 @@ fn filters() -> Vec<(&'static str, SafetyFilter)> {
         ("unicycle, sampled", sampled(Sampling::Period(0.005))),
         ("unicycle, measured period", sampled(Sampling::Measured)),
     ]
+}
+
+#[test]
+fn roots_of_the_highest_order_allocate_nothing() {
+    let e = [-7.0, 2.0, -1.5, 0.4, 3.0, -2.0, 0.1, 5.0];
+    for n in 1..=e.len() {
+        let found = allocations(|| {
+            let _ = std::hint::black_box(repeated_root::rate(&e[..n], 3.0));
+            let _ = std::hint::black_box(repeated_root::deadlines(&e[..n]));
+        });
+        assert_eq!(found, 0, "n = {n}");
+    }
 }
 
 /// All that a single barrier can go through: anchor, filtered and unchanged steps, infeasible rows,

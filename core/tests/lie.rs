@@ -1,4 +1,4 @@
-//! Lie derivatives against a computer-algebra system, and the relative degree found.
+//! Lie derivatives against a computer-algebra system, and degrees declared wrongly.
 //!
 //! The reference values are in `cas/values.csv`; `cas/generate.py` wrote them.
 
@@ -7,12 +7,8 @@ mod support;
 use punctual_core::ErrorKind;
 use punctual_core::filter::{BarrierSettings, SafetyFilter, Status};
 use punctual_core::lie::{self, Derivatives};
-use punctual_core::nalgebra::vector;
 use punctual_core::plants::{PointMass, Unicycle};
-use support::{
-    Cart, Chain4, Chain8, Exponential, Logarithmic, Powers, SecondState, SpeedLimit, Uncoupled, bicycle,
-    distance_disc, quadratic_disc, source,
-};
+use support::{SpeedLimit, quadratic_disc, source};
 
 const VALUES: &str = include_str!("cas/values.csv");
 
@@ -75,48 +71,6 @@ fn derivatives_equal_the_algebra() {
         assert_eq!(found.drift[sample.drift.len()..].iter().find(|v| **v != 0.0), None);
         assert_eq!(found.row[sample.input.len()..].iter().find(|v| **v != 0.0), None);
     }
-}
-
-#[test]
-fn relative_degree_of_the_plants_is_two() {
-    let states = [vector![0.0, 0.0, 0.3, 1.0], vector![50.0, 44.0, -2.0, -3.0]];
-    for n in [
-        lie::relative_degree(&PointMass, &quadratic_disc(), 0.0, &states),
-        lie::relative_degree(&PointMass, &distance_disc(), 0.0, &states),
-        lie::relative_degree(&Unicycle, &quadratic_disc(), 0.0, &states),
-        lie::relative_degree(&Unicycle, &distance_disc(), 0.0, &states),
-        lie::relative_degree(&bicycle(), &quadratic_disc(), 0.0, &states),
-        lie::relative_degree(&bicycle(), &distance_disc(), 0.0, &states),
-    ] {
-        assert_eq!(n, Some(2));
-    }
-}
-
-#[test]
-fn relative_degree_of_other_systems() {
-    let x = vector![0.25, 0.5, -1.0, 1.5];
-    assert_eq!(lie::relative_degree(&Unicycle, &SpeedLimit, 0.0, &[x]), Some(1));
-    assert_eq!(lie::relative_degree(&Chain4, &Logarithmic, 0.0, &[x]), Some(4));
-    assert_eq!(lie::relative_degree(&Cart, &Powers, 0.0, &[vector![0.5, -2.0]]), Some(2));
-    let x = vector![0.5, -0.25, 0.75, 1.0, -0.5, 0.125, -1.25, 2.0];
-    assert_eq!(lie::relative_degree(&Chain8, &Exponential, 0.0, &[x]), Some(8));
-}
-
-#[test]
-fn relative_degree_does_not_exist_where_no_input_reaches() {
-    assert_eq!(lie::relative_degree(&Uncoupled, &SecondState, 0.0, &[vector![0.3, 0.7]]), None);
-    assert_eq!(lie::relative_degree(&Cart, &Powers, 0.0, &[]), None);
-    // Not finite there: passed over.
-    assert_eq!(lie::relative_degree(&Cart, &Powers, 0.0, &[vector![f64::NAN, 0.0]]), None);
-}
-
-/// At one sample the row can vanish by accident; the others decide.
-#[test]
-fn relative_degree_survives_a_singular_sample() {
-    let centre = vector![45.0, 45.0, 0.0, 0.0];
-    let generic = vector![1.0, 2.0, 3.0, 4.0];
-    assert_eq!(lie::relative_degree(&PointMass, &quadratic_disc(), 0.0, &[centre]), None);
-    assert_eq!(lie::relative_degree(&PointMass, &quadratic_disc(), 0.0, &[centre, generic]), Some(2));
 }
 
 #[test]

@@ -89,14 +89,16 @@ fn shapes_and_models_out_of_range_are_refused() {
 }
 
 #[test]
-fn the_repeated_root_needs_relative_degree_two() {
+fn the_repeated_root_needs_relative_degree_two_or_more() {
     let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(5.0) };
-    let source = lie::along(Integrator::<3>, NonNegative, 3).expect("in range");
+    let source = lie::along(Integrator::<1>, NonNegative, 1).expect("in range");
     refused(
-        SafetyFilter::builder(3, 1).source("line", source, settings),
+        SafetyFilter::builder(1, 1).source("line", source, settings),
         ErrorKind::Unsupported,
-        "line.method: the repeated root is implemented for relative degree 2, this barrier has 3; use the reference profile",
+        "line.method: the repeated root does not exist for relative degree 1; use the reference profile",
     );
+    let source = lie::along(Integrator::<3>, NonNegative, 3).expect("in range");
+    assert!(SafetyFilter::builder(3, 1).source("line", source, settings).is_ok());
     assert!(build(settings, BOUNDS, 1e6).is_ok());
 }
 

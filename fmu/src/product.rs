@@ -180,8 +180,9 @@ fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> En
     }
 }
 
-fn status_type() -> EnumerationType {
-    let describe = |status: Status| match status {
+/// The name and meaning of a status, as importers see them.
+pub fn describe(status: Status) -> (&'static str, &'static str) {
+    match status {
         Status::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
         Status::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
         Status::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
@@ -192,7 +193,10 @@ fn status_type() -> EnumerationType {
             ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
         }
         Status::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
-    };
+    }
+}
+
+fn status_type() -> EnumerationType {
     let items = Status::ALL.map(|s| (describe(s).0, s as i32, describe(s).1));
     enumeration(STATUS, "What the filter's input means", &items)
 }

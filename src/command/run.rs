@@ -80,6 +80,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     })?;
     drop(progress);
 
+    if let Some(failure) = outcome.failure {
+        if let Some(folder) = &arguments.out {
+            let csv = csv_file(path, folder);
+            outcome.recording.save_csv(&csv)?;
+            output::note(&format!("note: what was recorded until then is in {}", csv.display()));
+        }
+        return Err(failure);
+    }
     let files = match &arguments.out {
         Some(folder) => write_files(&system, path, folder, &outcome)?,
         None => Vec::new(),
@@ -96,10 +104,19 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The name of a system file without its ending: the head of all names of files written.
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+fn csv_file(path: &Path, folder: &Path) -> PathBuf {
+    folder.join(format!("{}.csv", stem(path)))
+}
+
 /// Writes the CSV file and the pictures into `folder`, which exists; returns their paths.
 fn write_files(system: &System, path: &Path, folder: &Path, outcome: &Outcome) -> Result<Vec<String>, Error> {
-    let stem = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned());
-    let csv = folder.join(format!("{stem}.csv"));
+    let stem = stem(path);
+    let csv = csv_file(path, folder);
     outcome.recording.save_csv(&csv)?;
     let mut files = vec![csv];
     for (i, picture) in system.pictures().iter().enumerate() {

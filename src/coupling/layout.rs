@@ -71,6 +71,8 @@ impl Layout {
 pub(super) struct Recorder<'a> {
     every: u64,
     last: u64,
+    /// The last point a row was due or passed over at.
+    pub(super) reached: u64,
     slots: Vec<usize>,
     row: Vec<f64>,
     pub(super) recording: Recording,
@@ -89,11 +91,20 @@ impl<'a> Recorder<'a> {
         let mut recording = Recording::new(columns.to_vec());
         let rows = usize::try_from(last / every).unwrap_or(usize::MAX).saturating_add(2);
         recording.reserve(rows.min(ROWS_RESERVED));
-        Self { every, last, row: vec![0.0; slots.len()], slots: slots.to_vec(), recording, observer }
+        Self {
+            every,
+            last,
+            reached: 0,
+            row: vec![0.0; slots.len()],
+            slots: slots.to_vec(),
+            recording,
+            observer,
+        }
     }
 
     /// Takes the row of point `k` at `time` (s), if one is due.
     pub(super) fn row(&mut self, k: u64, time: f64, values: &[f64]) {
+        self.reached = k;
         if !k.is_multiple_of(self.every) && k != self.last {
             return;
         }

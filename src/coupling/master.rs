@@ -65,7 +65,7 @@ pub struct Simulation {
 }
 
 /// What a run gives.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Outcome {
     /// The rows recorded.
     pub recording: Recording,
@@ -73,6 +73,9 @@ pub struct Outcome {
     pub statistics: Statistics,
     /// What the user should know: signals read late, values that are not finite, warnings.
     pub notes: Vec<String>,
+    /// The FMI call that ended the run before its stop time, if one did; what was recorded until then
+    /// is kept.
+    pub failure: Option<Error>,
 }
 
 /// Numbers of a run.
@@ -210,28 +213,31 @@ impl Simulation {
     ///
     /// # Errors
     ///
-    /// An FMI call that returns neither OK nor Warning; the run ends there.
+    /// An FMI call of the initialization that returns neither OK nor Warning. One of a later step ends
+    /// the run: see [`Outcome::failure`].
     pub fn run(&mut self, mut observer: impl FnMut(f64, &[f64])) -> Result<Outcome, Error> {
         self.initialise()?;
         let mut recorder =
             Recorder::new(&self.columns, &self.slots, self.every, self.grid.steps(), &mut observer);
         let begin = Instant::now();
-        match self.order {
-            Order::GaussSeidel => self.run_gauss_seidel(&mut recorder)?,
-            Order::Jacobi => self.run_jacobi(&mut recorder)?,
-        }
+        let mut ran = match self.order {
+            Order::GaussSeidel => self.run_gauss_seidel(&mut recorder),
+            Order::Jacobi => self.run_jacobi(&mut recorder),
+        };
         let wall_time = begin.elapsed();
-        let recording = recorder.recording;
+        let (steps, recording) = (recorder.reached, recorder.recording);
         for member in &mut self.members {
-            member.slave.terminate()?;
+            if ran.is_ok() {
+                ran = member.slave.terminate();
+            }
             let count = member.slave.warnings();
             if count > 0 {
                 let last = member.slave.log().last().map(|m| format!("; last: {m}")).unwrap_or_default();
                 self.notes.push(format!("{}: {count} calls returned fmi2Warning{last}", member.slave.name()));
             }
         }
-        let statistics = Statistics { steps: self.grid.steps(), final_time: self.stop_time, wall_time };
-        Ok(Outcome { recording, statistics, notes: self.notes.clone() })
+        let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
+        Ok(Outcome { recording, statistics, notes: self.notes.clone(), failure: ran.err() })
     }
 
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {

@@ -134,7 +134,7 @@ impl<'a> Resolver<'a> {
         if found == wanted {
             return Ok(());
         }
-        let (name, found, wanted) = (self.name(port), found.name(), wanted.name());
+        let (name, found, wanted) = (self.name(port), found.as_str(), wanted.as_str());
         Err(Error::configuration(field, format!("{name} has causality {found}; must be {wanted}")))
     }
 
@@ -243,7 +243,7 @@ impl<'a> Resolver<'a> {
         })?;
         let variable = &self.descriptions[component].variables[position];
         if !matches!(variable.causality, Causality::Parameter | Causality::Input) {
-            let causality = variable.causality.name();
+            let causality = variable.causality.as_str();
             return Err(wrong(format!(
                 "has causality {causality}; only parameters and inputs can be given a start value"
             )));

@@ -48,6 +48,9 @@ pub fn run(folder: &Path, library: Option<&Path>, mut progress: impl FnMut(f64))
             let mut simulation = Simulation::new(&System::parse(&text)?, folder)?;
             let done = runs.len() as f64;
             let outcome = simulation.run(|time, _| progress((done + time / STOP) / cases))?;
+            if let Some(failure) = outcome.failure {
+                return Err(failure);
+            }
             outcome.recording.save_csv(&folder.join(format!("{stem}.csv")))?;
             let summary = Summary::new(model, &outcome.recording, outcome.statistics.steps_per_second())?;
             runs.push(Run { model, method, recording: outcome.recording, summary });

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use fmi_rs::model_description::fmi2 as xml;
+use punctual_modeldescription::{Causality, Variability};
 
 use crate::error::FmuProblem;
 
@@ -31,65 +32,6 @@ impl Kind {
             Self::Boolean => "Boolean",
             Self::String => "String",
             Self::Enumeration => "Enumeration",
-        }
-    }
-}
-
-/// The role of a variable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Causality {
-    /// Set by the user before the run (or during it, if tunable).
-    Parameter,
-    /// Computed from parameters.
-    CalculatedParameter,
-    /// Set from outside at every communication point.
-    Input,
-    /// Offered to other components.
-    Output,
-    /// Internal.
-    Local,
-    /// Time.
-    Independent,
-}
-
-impl Causality {
-    /// The word of the standard, such as `calculatedParameter`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Parameter => "parameter",
-            Self::CalculatedParameter => "calculatedParameter",
-            Self::Input => "input",
-            Self::Output => "output",
-            Self::Local => "local",
-            Self::Independent => "independent",
-        }
-    }
-}
-
-/// When a variable may change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Variability {
-    /// Never.
-    Constant,
-    /// Not after initialisation.
-    Fixed,
-    /// Between steps, by the user.
-    Tunable,
-    /// At communication points.
-    Discrete,
-    /// At any time.
-    Continuous,
-}
-
-impl Variability {
-    /// The word of the standard, such as `tunable`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Constant => "constant",
-            Self::Fixed => "fixed",
-            Self::Tunable => "tunable",
-            Self::Discrete => "discrete",
-            Self::Continuous => "continuous",
         }
     }
 }

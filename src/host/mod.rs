@@ -14,10 +14,9 @@ use std::fmt;
 use std::path::Path;
 
 pub use archive::PLATFORM;
-pub use description::{
-    Capabilities, Causality, DefaultExperiment, Description, Item, Kind, Output, Variability, Variable,
-};
+pub use description::{Capabilities, DefaultExperiment, Description, Item, Kind, Output, Variable};
 pub use logging::LogMessage;
+pub use punctual_modeldescription::{Causality, Variability};
 pub use slave::Slave;
 
 use archive::Archive;

@@ -27,8 +27,8 @@ fn an_unknown_key() {
         2,
         "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
-         unknown field `margn`, expected one of `name`, `shape`, `centre`, `radius`, `smoothing`, `deadline`, \
-         `method`, `rate`, `stay_rate`, `margin`",
+         unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `radius`, `smoothing`, \
+         `deadline`, `method`, `rate`, `stay_rate`, `margin`",
     );
 }
 
@@ -54,7 +54,8 @@ fn an_unknown_model() {
     build("unicycle-plant", "model = \"unicycle\"", "model = \"bike\"").fails(
         2,
         "my.toml: plant.model: at line 6, column 9\n  |\n6 | model = \"bike\"\n  |         ^^^^^^\n\
-         unknown variant `bike`, expected one of `point_mass`, `unicycle`, `bicycle`",
+         unknown variant `bike`, expected one of `point_mass`, `unicycle`, `bicycle`, \
+         `bicycle_small_slip`, `bicycle_small_slip_rate`, `bicycle_kinematic`",
     );
 }
 

@@ -118,11 +118,18 @@ const OVERFLOW: (&str, &str) = (
 
 #[test]
 fn a_run_that_fails_on_the_way() {
-    run(OVERFLOW.0, OVERFLOW.1).fails(
+    let workshop = Workshop::with_fmus();
+    workshop.write("system.toml", system(&[OVERFLOW]));
+    workshop.punctual(["run", "system.toml"]).fails(
         1,
         "fmi2DoStep of plant (plant.fmu) at t = 0 s returned fmi2Error\n  [fmi2Error, logStatusError] fmi2DoStep: \
          u.a is inf, must be finite for a step from t = 0",
     );
+    // What was recorded is not lost: the head and the row of t = 0.
+    let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
+    assert_eq!(done.code, 1);
+    assert!(done.stderr.contains("note: what was recorded until then is in out/system.csv"), "{done:?}");
+    assert_eq!(workshop.text("out/system.csv").lines().count(), 2);
 }
 
 /// It is told before the run, which may be long.

@@ -1,8 +1,10 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
 use super::comparison::{Stack, lower_bound, lower_terms};
+use super::first_order::Exponent;
 use super::hermite::HermiteProfile;
-use super::{repeated_root, stay};
+use super::repeated_root::{self, NoAdmissibleRate};
+use super::stay;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, non_negative, positive};
 
@@ -12,11 +14,14 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 /// How the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root`]. Relative degree 2.
+    /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root::rate`]. Relative degree 2
+    /// and above; for odd ones many anchors have no such rate ([`FixedTime::no_admissible_rate`]).
     RepeatedRoot,
     /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`] r and the configured rate.
     #[default]
     ReferenceProfile,
+    /// ė ≥ α |e|^p for e = h − μ < 0, with α such that e = 0 at T ([`Exponent`]). Relative degree 1.
+    FirstOrder(Exponent),
 }
 
 /// Settings of one barrier's promise.
@@ -54,9 +59,13 @@ impl FixedTimeSettings {
             let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
             return Err(Error::new(ErrorKind::RelativeDegree, "relative_degree", message));
         }
-        if self.method == Method::RepeatedRoot && n != 2 {
+        if self.method == Method::RepeatedRoot && n == 1 {
+            let message = "the repeated root does not exist for relative degree 1; use the reference profile";
+            return Err(Error::new(ErrorKind::Unsupported, "method", message));
+        }
+        if matches!(self.method, Method::FirstOrder(_)) && n != 1 {
             let message = format!(
-                "the repeated root is implemented for relative degree 2, this barrier has {n}; use the reference profile"
+                "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
             );
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
         }
@@ -137,7 +146,7 @@ impl FixedTime {
     /// # Errors
     ///
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
-    /// repeated root with n ≠ 2.
+    /// repeated root with n = 1, the first-order condition with n > 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
         Ok(Self { n, settings: settings.validated(n)? })
     }
@@ -198,6 +207,19 @@ impl FixedTime {
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
 
+    /// Why the approach in `state` has no guarantee from its anchor: the repeated root has no admissible
+    /// rate there. `None` for other methods, before the anchor, and where the rate exists.
+    ///
+    /// The fallback is (D + a)ⁿ (h − μ) ≥ 0 with the stay rate a > 0: from the anchor it leads towards
+    /// the set without a deadline. Such an approach is not [`FixedTimeState::guaranteed`] until the
+    /// stay constraint takes over.
+    pub fn no_admissible_rate(&self, state: &FixedTimeState) -> Option<NoAdmissibleRate> {
+        if self.settings.method != Method::RepeatedRoot || state.phase == Phase::Waiting {
+            return None;
+        }
+        repeated_root::rate(&state.anchor[..self.n], state.deadline).err()
+    }
+
     /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
     /// be reached within `deadline` seconds from there. A deadline ≤ 0 is past already: nothing is
     /// guaranteed, the phase of the next [`Self::advance`] is [`Phase::Late`] where h < 0, and the target
@@ -209,11 +231,12 @@ impl FixedTime {
         let rate = match self.settings.method {
             _ if deadline <= 0.0 => None,
             Method::ReferenceProfile => Some(self.settings.rate),
-            Method::RepeatedRoot => repeated_root::rate([anchor[0], anchor[1]], deadline),
+            Method::RepeatedRoot => repeated_root::rate(&anchor[..self.n], deadline).ok(),
+            Method::FirstOrder(exponent) => Some(exponent.rate(deadline)),
         };
         let fallback = match self.settings.method {
             Method::ReferenceProfile => self.settings.rate,
-            Method::RepeatedRoot => self.settings.stay_rate,
+            Method::RepeatedRoot | Method::FirstOrder(_) => self.settings.stay_rate,
         };
         *state = FixedTimeState {
             phase: Phase::Approach,
@@ -232,6 +255,13 @@ impl FixedTime {
         let anchor = &state.anchor[..self.n];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
+            Method::FirstOrder(exponent) => {
+                let deadline = state.deadline;
+                let bound = exponent.lower_bound(anchor[0], deadline, elapsed);
+                // The comparison can start at any sample that is not below the bound.
+                state.guaranteed |= elapsed < deadline && e[0] >= bound;
+                (exponent.floor(anchor[0], deadline, e[0]), bound)
+            }
             Method::ReferenceProfile => {
                 let r = HermiteProfile::new(anchor, state.deadline).evaluate(elapsed);
                 let mut error = [0.0; MAX_RELATIVE_DEGREE];

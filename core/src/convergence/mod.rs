@@ -2,21 +2,27 @@
 //!
 //! Nothing here knows a model. [`FixedTime`] receives h and its first n − 1 derivatives as plain
 //! numbers and answers with the least h⁽ⁿ⁾ that keeps the promise; the filter turns that into a row
-//! on u. The mathematics is one lemma ([`comparison`]) with a choice of error e and rate a:
+//! on u. The mathematics is one lemma ([`comparison`]) with a choice of error e and rate a, and for n = 1
+//! also the classical fixed-time condition:
 //!
 //! | method | e | a | promise | when |
 //! |---|---|---|---|---|
-//! | [`repeated_root`], the paper's | h − μ | root of (R), negative from rest | h ≥ μ at T | an admissible root exists |
+//! | [`repeated_root`], the paper's | h − μ | largest root of (R), negative from rest | h ≥ μ from T on | n even; n odd: T ≥ T_min, if any |
 //! | [`hermite`], the default | h − μ − r | any a > 0 | h ≥ μ from T on | always |
-//! | [`stay`] | h − μ | any a > 0 | h ≥ μ for ever | all c_k(a) ≥ 0 |
+//! | [`first_order`] | h − μ | 1/((1 − p) T) at the anchor | h ≥ μ at T | n = 1 |
+//! | [`stay`] | h − μ | a ≥ [`stay::smallest_rate`] | h ≥ μ for ever | all c_k(a) ≥ 0 |
 //!
 //! The promises hold for the continuous-time constraint. An input that is held between samples
 //! breaks the constraint by up to its change over one period, which the margin μ has to absorb;
 //! [`sampled`] is the form of the constraint for such an input, which loses far less.
 
 pub mod comparison;
+pub mod first_order;
 mod fixed_time;
 pub mod hermite;
+pub mod operator;
+pub mod polynomial;
+pub mod profile;
 pub mod repeated_root;
 pub mod sampled;
 pub mod stay;

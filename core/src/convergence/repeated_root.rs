@@ -1,58 +1,291 @@
-//! The paper's method: (D + a)ⁿ e ≥ 0 with the constant rate a for which the bound reaches zero at T.
+//! The paper's method for any order: (D + a)ⁿ e ≥ 0 with the constant rate a for which the bound
+//! reaches zero at T.
+//!
+//! # Derivation
 //!
 //! P(T) = 0 in the comparison lemma is, with y_j = e⁽ʲ⁾(0) Tʲ/j!, s = aT and E_m(s) = Σ_{i≤m} sⁱ/i!,
 //!
 //! ```text
-//! Σ_{j<n} y_j E_{n−1−j}(s) = 0.                                              (R)
+//! R(s) = Σ_{j<n} y_j E_{n−1−j}(s) = Σ_{i<n} (y_0 + … + y_{n−1−i}) sⁱ/i! = 0.          (R)
 //! ```
 //!
-//! For n = 2: s = −(e₀ + e₁T)/e₀, the paper's c = a/T = (−e₀ − e₁T)/(e₀T²). The root is admissible if
-//! T is the last zero of P and c_{n−1} ≥ 0; for n = 2 that is e₀ < 0.
+//! For n = 2: s = −(e₀ + e₁T)/e₀, the paper's c = a/T = (−e₀ − e₁T)/(e₀T²). A root is *admissible* if T
+//! is the last zero of P on τ > 0 and c_{n−1} ≥ 0, so that the bound e^{−aτ} P(τ) stays ≥ 0 after T.
 //!
-//! From rest the rate is −1/T: the error dynamics are **anti-stable**. Sampling errors grow like
-//! e^{|a|τ}, and the constraint keeps asking h to grow after T; so it overshoots the deadline by a few
-//! samples and must be followed by a stay constraint. It is here as the paper's baseline.
+//! **Theorem.** Let e₀ < 0. The largest real root of (R) is admissible; so an admissible rate exists
+//! if and only if (R) has a real root.
+//!
+//! *Proof.* Write e_a(τ) = e^{−aτ} P(τ) for the bound with rate a. Since dE_m/ds = E_{m−1}, the
+//! derivative of P by a at fixed τ is τ (P − c_{n−1} τ^{n−1}), hence
+//! ∂e_a(τ)/∂a = −τⁿ e^{−aτ} C(a) with
+//!
+//! ```text
+//! C(v) = c_{n−1}(v) = Σ_{j<n} e⁽ʲ⁾(0) v^{n−1−j} / (j! (n−1−j)!),
+//! e_a(τ) = τⁿ ∫_a^∞ e^{−vτ} C(v) dv    for τ > 0,                                     (I)
+//! ```
+//!
+//! because e_a(τ) → 0 as a → ∞. Let a be the largest root and H(v) = ∫_v^∞ e^{−wT} C(w) dw; H has the
+//! sign of (R) at v, so H(a) = 0, and H < 0 for v > a as C → −∞. For τ > T integrate (I) by parts:
+//! e_a(τ)/τⁿ = −(τ − T) ∫_a^∞ e^{−v(τ−T)} H(v) dv > 0. So P has no zero after T and is positive there,
+//! which needs c_{n−1} ≥ 0. ∎
+//!
+//! **Choice.** [`rate`] takes the largest root: the least anti-stable one, and always admissible.
+//! [`admissibility`] judges any other.
+//!
+//! **Deadlines.** For even n the degree of (R) is odd: every T > 0 has a root. For odd n, e_a(T) → −∞
+//! as a → −∞ and → 0⁻ as a → ∞; by ∂e_a/∂a its maxima over a are among the real zeros v of C, which do
+//! not depend on T. So a root exists if and only if P with the rate v is ≥ 0 at T for one of them; and
+//! if T has one, so has every longer deadline (the bound e_a is positive after T). The deadlines are a
+//! ray [T_min, ∞), T_min the first zero of those P, or none: [`deadlines`]. For n = 3,
+//! T² (e₁² − e₀e₂) ≥ e₀²; from rest v = 0, P = e₀ < 0, none. For n = 1 (R) is e₀ = 0: none.
+//!
+//! # Requirements
+//!
+//! From rest the rate is negative (s = −1, −1.59607, −2.18061 for n = 2, 4, 6): the error dynamics are
+//! **anti-stable**. Sampling errors grow like e^{|a|τ}, and the constraint keeps asking e to grow after
+//! T; so it overshoots the deadline by a few samples and must be followed by a stay constraint. It is
+//! here as the paper's method; the reference profile has none of this.
+//!
+//! (R) is solved in the dimensionless s, its coefficients divided by the largest, so scales of e and T
+//! do not matter. What remains is the condition of the root, [`uncertainty`]: sums y_0 + … + y_k that
+//! cancel, or two roots that nearly meet (T near T_min, where the root is as uncertain as √ε and its
+//! existence is undecided within round-off).
 //!
 //! # References
 //!
-//! The paper, theorem 1 and equation (14).
+//! The paper, theorem 1 and equation (14), for n = 2; the rest is this project's.
 
-/// The admissible rate a in 1/s, `None` if there is none (e₀ ≥ 0, or a rate that is not finite).
-/// `e` = (e, ė) at the anchor, `deadline` T > 0 in s.
-///
-/// Relative degree 2 only: orders above need the real roots of (R), which are not implemented yet;
-/// [`FixedTime`](super::FixedTime) refuses them.
-pub fn rate(e: [f64; 2], deadline: f64) -> Option<f64> {
-    if e[0] >= 0.0 {
-        return None;
+use std::fmt;
+
+use super::comparison::{Stack, coefficients, factorial};
+use super::polynomial::{self, Roots};
+use crate::MAX_RELATIVE_DEGREE;
+
+/// Why a repeated root has no admissible rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// n = 1: the bound e₀ e^{−aτ} reaches zero for no rate.
+    FirstOrder,
+    /// e₀ ≥ 0: there is nothing to reach.
+    Inside,
+    /// The polynomial (R) has no real root.
+    NoRealRoot,
+    /// The data, or the rate itself, are not finite numbers.
+    NotFinite,
+}
+
+/// The deadlines T > 0 for which an admissible rate exists.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deadlines {
+    /// None, however long.
+    None,
+    /// This one, in s, and every longer one.
+    From(f64),
+    /// All.
+    All,
+}
+
+/// No admissible rate exists for this anchor and deadline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoAdmissibleRate {
+    /// Why.
+    pub reason: Reason,
+    /// The deadlines that would have one from the same anchor.
+    pub deadlines: Deadlines,
+}
+
+impl fmt::Display for NoAdmissibleRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("no admissible rate: ")?;
+        f.write_str(match self.reason {
+            Reason::FirstOrder => "at relative degree 1 the bound never reaches zero",
+            Reason::Inside => "the barrier is not negative at the anchor",
+            Reason::NoRealRoot => "the polynomial of the repeated root has no real root",
+            Reason::NotFinite => "the derivatives or the rate are not finite",
+        })?;
+        match self.deadlines {
+            Deadlines::From(t) => write!(f, "; one exists for deadlines from {t} s"),
+            Deadlines::None if self.reason == Reason::NoRealRoot => f.write_str(" for any deadline"),
+            _ => Ok(()),
+        }
     }
-    let rate = -(e[0] + e[1] * deadline) / (e[0] * deadline);
-    rate.is_finite().then_some(rate)
+}
+
+impl std::error::Error for NoAdmissibleRate {}
+
+/// Whether a real root of (R) keeps its promise after the deadline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Admissibility {
+    /// T is the last zero of P and P is positive after it.
+    Admissible,
+    /// c_{n−1} < 0: P falls without bound.
+    NegativeLeading,
+    /// P has a zero after T.
+    LaterZero,
+}
+
+/// The admissible rate a in 1/s: the largest real root of (R) divided by T. `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾ at
+/// the anchor (n up to [`MAX_RELATIVE_DEGREE`]), `deadline` is T > 0 in s.
+///
+/// # Errors
+///
+/// There is none: n = 1, e₀ ≥ 0, no real root (odd n only), data or a rate that are not finite.
+///
+/// ```
+/// use punctual_core::convergence::repeated_root::{Deadlines, Reason, deadlines, rate};
+///
+/// assert_eq!(rate(&[-5.0, 0.0], 10.0), Ok(-0.1));
+/// let none = rate(&[-5.0, 0.0, 0.0], 10.0).unwrap_err();
+/// assert_eq!((none.reason, none.deadlines), (Reason::NoRealRoot, Deadlines::None));
+/// // T² (e₁² − e₀e₂) ≥ e₀²: from T = 2 on.
+/// assert_eq!(deadlines(&[-4.0, 2.0, 0.0]), Deadlines::From(2.0));
+/// ```
+pub fn rate(e: &[f64], deadline: f64) -> Result<f64, NoAdmissibleRate> {
+    let none = |reason| NoAdmissibleRate { reason, deadlines: deadlines(e) };
+    let rate = match e {
+        _ if !e.iter().all(|v| v.is_finite()) => return Err(none(Reason::NotFinite)),
+        [_] => return Err(none(Reason::FirstOrder)),
+        _ if e[0] >= 0.0 => return Err(none(Reason::Inside)),
+        [e0, e1] => -(e0 + e1 * deadline) / (e0 * deadline),
+        _ => {
+            let roots = scaled_roots(e, deadline).ok_or(none(Reason::NotFinite))?;
+            roots.largest().ok_or(none(Reason::NoRealRoot))? / deadline
+        }
+    };
+    if rate.is_finite() { Ok(rate) } else { Err(none(Reason::NotFinite)) }
+}
+
+/// All real roots s = aT of (R) in rising order, whatever the sign of e₀; `None` if the data are not
+/// finite.
+pub fn scaled_roots(e: &[f64], deadline: f64) -> Option<Roots> {
+    let y = scaled(e, deadline)?;
+    let n = e.len();
+    let mut r = [0.0; MAX_RELATIVE_DEGREE];
+    let mut sum = 0.0;
+    for j in 0..n {
+        sum += y[j];
+        r[n - 1 - j] = sum / factorial(n - 1 - j);
+    }
+    Some(polynomial::real_roots(&r[..n]))
+}
+
+/// Judges a root of (R): `rate` in 1/s, `e` and `deadline` as for [`rate`].
+///
+/// The zeros of P after T are those of its Taylor expansion at T, divided by τ − T.
+pub fn admissibility(rate: f64, e: &[f64], deadline: f64) -> Admissibility {
+    let (n, s) = (e.len(), rate * deadline);
+    let y = scaled(e, deadline).unwrap_or([f64::NAN; MAX_RELATIVE_DEGREE]);
+    // P in σ = τ/T, then in z = σ − 1 by repeated synthetic division.
+    let mut p = [0.0; MAX_RELATIVE_DEGREE];
+    for (k, pk) in p[..n].iter_mut().enumerate() {
+        *pk = (0..=k).map(|j| y[j] * s.powi((k - j) as i32) / factorial(k - j)).sum();
+    }
+    for start in 0..n {
+        for k in (start..n - 1).rev() {
+            p[k] += p[k + 1];
+        }
+    }
+    if !p[..n].iter().rfind(|&&c| c != 0.0).is_some_and(|&c| c > 0.0) {
+        return Admissibility::NegativeLeading;
+    }
+    let later = polynomial::real_roots(&p[1..n]).largest().is_some_and(|z| z > 0.0);
+    if later { Admissibility::LaterZero } else { Admissibility::Admissible }
+}
+
+/// The deadlines for which [`rate`] has an answer at the anchor `e`.
+pub fn deadlines(e: &[f64]) -> Deadlines {
+    let n = e.len();
+    if n < 2 || !e.iter().all(|v| v.is_finite()) || e[0] >= 0.0 {
+        return Deadlines::None;
+    }
+    if n.is_multiple_of(2) {
+        return Deadlines::All;
+    }
+    let mut c = [0.0; MAX_RELATIVE_DEGREE];
+    for j in 0..n {
+        c[n - 1 - j] = e[j] / (factorial(j) * factorial(n - 1 - j));
+    }
+    let mut shortest = f64::INFINITY;
+    for &v in polynomial::real_roots(&c[..n]).as_slice() {
+        // c_{n−1} = 0 at v; leaving it out removes a root that round-off would put near infinity.
+        let p = coefficients(v, e);
+        let first = polynomial::real_roots(&p[..n - 1]).as_slice().iter().copied().find(|&t| t > 0.0);
+        shortest = first.map_or(shortest, |t| shortest.min(t));
+    }
+    if shortest.is_finite() { Deadlines::From(shortest) } else { Deadlines::None }
+}
+
+/// First-order bound on the error of `rate` that round-off causes, in 1/s:
+/// 4nε Σ |y_j| E_{n−1−j}(|s|) / (|R'(s)| T). Infinite at a double root; also if the data are not finite.
+///
+/// The data, y_j, their partial sums and the value of R each contribute up to about n roundings, of
+/// half ε each.
+pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
+    let (n, s) = (e.len(), rate * deadline);
+    let Some(y) = scaled(e, deadline) else { return f64::INFINITY };
+    let power = |x: f64, k: usize| x.powi(k as i32) / factorial(k);
+    let size: f64 = (0..n).map(|j| y[j].abs() * (0..n - j).map(|i| power(s.abs(), i)).sum::<f64>()).sum();
+    // R' = R − c_{n−1} T^{n−1}, and R = 0.
+    let slope: f64 = (0..n).map(|j| y[j] * power(s, n - 1 - j)).sum();
+    4.0 * n as f64 * f64::EPSILON * size / (slope.abs() * deadline)
+}
+
+/// y_j = e⁽ʲ⁾ Tʲ/j!, divided by the largest of them; `None` if that is 0 or not finite.
+fn scaled(e: &[f64], deadline: f64) -> Option<Stack> {
+    let mut y = [0.0; MAX_RELATIVE_DEGREE];
+    for (j, yj) in y[..e.len()].iter_mut().enumerate() {
+        *yj = e[j] * deadline.powi(j as i32) / factorial(j);
+    }
+    let largest = y.iter().fold(0.0, |m: f64, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) });
+    (largest.is_finite() && largest > 0.0).then(|| y.map(|v| v / largest))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::comparison::{coefficients, lower_bound};
+    use super::super::comparison::lower_bound;
     use super::*;
 
     #[test]
     fn bound_vanishes_at_the_deadline_and_grows_after() {
         for (e, t) in [([-4046.0, 0.0], 10.0), ([-3.0, 8.0], 2.0), ([-1e-3, -40.0], 0.5)] {
-            let a = rate(e, t).expect("admissible below zero");
+            let a = rate(&e, t).expect("admissible below zero");
             let size = e[0].abs() + e[1].abs() * t;
+            // A handful of operations on numbers of that size.
             assert!(lower_bound(a, &e, t).abs() <= 1e-12 * size * (-a * t).exp(), "{e:?}");
             assert!(coefficients(a, &e)[1] > 0.0);
         }
     }
 
     #[test]
-    fn from_rest_the_rate_is_minus_one_over_the_deadline() {
-        assert_eq!(rate([-5.0, 0.0], 10.0), Some(-0.1));
+    fn the_closed_form_of_order_two_is_the_root_of_the_polynomial() {
+        for (e, t) in [([-4046.0, 0.0], 10.0), ([-3.0, 8.0], 2.0), ([-1e-3, -40.0], 0.5)] {
+            let a = rate(&e, t).expect("admissible below zero");
+            let roots = scaled_roots(&e, t).expect("finite");
+            assert_eq!(roots.as_slice().len(), 1);
+            assert!((roots.as_slice()[0] / t - a).abs() <= uncertainty(a, &e, t), "{e:?}");
+        }
     }
 
     #[test]
-    fn there_is_none_inside() {
-        assert_eq!(rate([0.0, 1.0], 10.0), None);
-        assert_eq!(rate([3.0, -1.0], 10.0), None);
+    fn reasons() {
+        let reason = |e: &[f64], t| rate(e, t).map_err(|none| none.reason);
+        assert_eq!(reason(&[-5.0, 0.0], 10.0), Ok(-0.1));
+        assert_eq!(reason(&[-5.0], 10.0), Err(Reason::FirstOrder));
+        assert_eq!(reason(&[0.0, 1.0], 10.0), Err(Reason::Inside));
+        assert_eq!(reason(&[3.0, -1.0, 2.0], 10.0), Err(Reason::Inside));
+        assert_eq!(reason(&[-3.0, 0.0, 0.0], 10.0), Err(Reason::NoRealRoot));
+        assert_eq!(reason(&[-3.0, f64::NAN], 10.0), Err(Reason::NotFinite));
+        assert_eq!(reason(&[-3.0, 0.0, 1e300], 1e100), Err(Reason::NotFinite));
+        assert_eq!(reason(&[-5e-324, 1e300], 10.0), Err(Reason::NotFinite));
+        assert_eq!(
+            rate(&[-4.0, 2.0, 0.0], 1.0).unwrap_err().to_string(),
+            "no admissible rate: the polynomial of the repeated root has no real root; \
+             one exists for deadlines from 2 s"
+        );
+        assert_eq!(
+            rate(&[-4.0, 0.0, 0.0], 1.0).unwrap_err().to_string(),
+            "no admissible rate: the polynomial of the repeated root has no real root for any deadline"
+        );
     }
 }

@@ -63,10 +63,18 @@ impl SampledDemand {
 impl FixedTime {
     /// (S) from the sample at `t` (s), which `state` has been moved to with
     /// [`advance`](Self::advance) and where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds.
-    pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> SampledDemand {
+    /// `None` on the approach of the first-order condition, which is not linear in e.
+    pub fn over_period(
+        &self,
+        state: &FixedTimeState,
+        t: f64,
+        h: &[f64],
+        period: f64,
+    ) -> Option<SampledDemand> {
         let n = self.n;
         let (rate, follows) = match state.phase {
             Phase::Stay | Phase::Left => (self.settings.stay_rate, false),
+            _ if matches!(self.settings.method, Method::FirstOrder(_)) => return None,
             _ => (state.rate, self.settings.method == Method::ReferenceProfile),
         };
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
@@ -86,7 +94,7 @@ impl FixedTime {
         let (now, then) = (target(elapsed), target(elapsed + period));
         let decay = (-rate * period).exp();
         let floor = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
-        SampledDemand { weights, floor, rate }
+        Some(SampledDemand { weights, floor, rate })
     }
 }
 
@@ -107,7 +115,7 @@ mod tests {
             let moved = [-1.0, 1.0, 0.25, 3.0];
             let demand = promise.advance(&mut state, 0.5, &moved[..n]);
             let period = 1e-6;
-            let sampled = promise.over_period(&state, 0.5, &moved[..n], period);
+            let sampled = promise.over_period(&state, 0.5, &moved[..n], period).expect("linear");
             // Moving along h⁽ⁿ⁾ = floor, Σ weights h⁽ᵏ⁾ grows by Σ weights h⁽ᵏ⁺¹⁾ δ.
             let next = |k: usize| if k + 1 < n { moved[k + 1] } else { demand.floor };
             let reached: f64 = (0..n).map(|k| sampled.weights[k] * (moved[k] + period * next(k))).sum();

@@ -1,5 +1,7 @@
 //! Building a filter: every number is checked here, so that a step cannot fail on one.
 
+use nalgebra::SVector;
+
 use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Sampling, Workspace};
 use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
@@ -37,11 +39,31 @@ impl FilterBuilder {
         }
     }
 
-    /// Adds a barrier of relative degree 2 along `plant`; `name` is for messages and reports.
+    /// Adds a barrier along `plant`; `name` is for messages and reports. Its relative degree is found
+    /// on built-in sample states ([`lie::detected`]).
     ///
     /// # Errors
     ///
-    /// A plant whose dimensions are not the filter's; settings outside their ranges.
+    /// A relative degree that does not exist or is not uniform ([`Error::relative_degree`] has the
+    /// finding); a plant whose dimensions are not the filter's; settings outside their ranges.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::SmallSlipBicycle};
+    /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
+    /// let refused = SafetyFilter::builder(4, 2)
+    ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
+    ///     .err()
+    ///     .map(|error| error.to_string());
+    /// assert_eq!(
+    ///     refused.as_deref(),
+    ///     Some(
+    ///         "goal.relative_degree: is mixed: u[2] enters derivative 1, u[1] enters derivative 2 of h; one \
+    ///          constraint cannot use both, so put an integrator before the input that enters first \
+    ///          (dynamics::IntegratedInput)"
+    ///     )
+    /// );
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
     pub fn barrier<P, B, const NX: usize, const NU: usize>(
         self,
         name: &str,
@@ -53,7 +75,34 @@ impl FilterBuilder {
         P: ControlAffine<NX, NU> + Send + 'static,
         B: Barrier<NX> + Send + 'static,
     {
-        self.source(name, lie::along(plant, barrier, 2)?, settings)
+        let n = lie::detected(&plant, &barrier).require(None).map_err(|e| e.within(name))?;
+        self.source(name, lie::along(plant, barrier, n)?, settings)
+    }
+
+    /// Adds a barrier of the declared relative degree `n`, which is compared with the one found at the
+    /// states `samples` at t = 0: for a plant or barrier whose domain the built-in samples miss.
+    ///
+    /// To use a barrier against that finding, make its source with [`lie::along`] and add it with
+    /// [`Self::source`], which checks at run time only.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::barrier`]; a relative degree found that is not `n`.
+    pub fn barrier_of_degree<P, B, const NX: usize, const NU: usize>(
+        self,
+        name: &str,
+        plant: P,
+        barrier: B,
+        (n, samples): (usize, &[SVector<f64, NX>]),
+        settings: BarrierSettings,
+    ) -> Result<Self, Error>
+    where
+        P: ControlAffine<NX, NU> + Send + 'static,
+        B: Barrier<NX> + Send + 'static,
+    {
+        let found = lie::relative_degree(&plant, &barrier, 0.0, samples);
+        let n = found.require(Some(n)).map_err(|e| e.within(name))?;
+        self.source(name, lie::along(plant, barrier, n)?, settings)
     }
 
     /// Adds a barrier of any relative degree, from whatever supplies its derivatives (such as

@@ -153,6 +153,7 @@ impl SafetyFilter {
         }
 
         let period = self.sampling.period(&self.state, t);
+        let mut sampled = period;
         for (i, channel) in self.channels.iter().enumerate() {
             // Evaluate: h and its derivatives along the plant, where the input begins to act.
             channel.source.evaluate(t, x, derivatives);
@@ -179,7 +180,10 @@ impl SafetyFilter {
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
             if let Some(period) = period {
-                demands[i] = channel.promise.over_period(promise, begin, &derivatives.drift[..n], period);
+                match channel.promise.over_period(promise, begin, &derivatives.drift[..n], period) {
+                    Some(demand) => demands[i] = demand,
+                    None => sampled = None,
+                }
             }
             report_b.row = rows[i];
             report_b.profile = demand.profile;
@@ -196,7 +200,7 @@ impl SafetyFilter {
 
         // Solve, and report what came of it.
         let limit = self.correction_limit;
-        let held = period.and_then(|period| {
+        let held = sampled.and_then(|period| {
             report.period = period;
             let (channels, bounds) = (&self.channels[..], &self.bounds);
             let (t, x) = (begin, &predicted[..]);

@@ -1,5 +1,7 @@
 //! Systems for the tests of derivatives, one for each case of `cas/generate.py`.
 
+#![allow(dead_code, reason = "each test binary uses its part")]
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;

@@ -10,10 +10,6 @@ use crate::product::Layout;
 /// look like a hang.
 const MOST_SUBSTEPS: f64 = 1e8;
 
-/// Part of an inner step by which a communication step may be longer than a multiple of it: round-off
-/// in the importer's time, not a reason for another inner step.
-const STEP_ROUND_OFF: f64 = 1e-6;
-
 pub(super) struct PlantBlock {
     configuration: PlantConfiguration,
     parameters: Vec<Parameter<PlantConfiguration>>,
@@ -53,8 +49,7 @@ impl Block for PlantBlock {
             let name = self.configuration.plant.model.inputs()[i].name;
             return Err(format!("u.{name} is {}, must be finite for a step from t = {t}", u[i]));
         }
-        let wanted = h / self.configuration.integration.inner_step;
-        let substeps = (wanted * (1.0 - STEP_ROUND_OFF)).ceil();
+        let substeps = self.configuration.integration.substeps(h);
         if substeps > MOST_SUBSTEPS {
             return Err(format!(
                 "the step of {h} s needs {substeps} inner steps of {} s, must be at most {MOST_SUBSTEPS}",

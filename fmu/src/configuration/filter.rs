@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use punctual_core::barrier::Barrier;
-use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
+use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter};
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,23 @@ pub enum ShapeName {
     Disc,
     /// [`QuadraticDisc`]: interior of a disc in the paper's form R² − d².
     QuadraticDisc,
+    /// [`Outside`] of a [`DistanceDisc`]: to be kept clear of, or left by the deadline.
+    Obstacle,
+}
+
+impl ShapeName {
+    /// Its name in a configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Disc => "disc",
+            Self::QuadraticDisc => "quadratic_disc",
+            Self::Obstacle => "obstacle",
+        }
+    }
+
+    fn is_distance_shaped(self) -> bool {
+        self != Self::QuadraticDisc
+    }
 }
 
 /// How the deadline is met.
@@ -49,11 +66,14 @@ pub struct BarrierSection {
     /// The shape. Default `disc`.
     #[serde(default)]
     pub shape: ShapeName,
-    /// Centre in m.
+    /// Centre in m; of a moving disc where it is at time 0 of the simulation, whenever that starts.
     pub centre: [f64; 2],
+    /// Velocity of the centre in m/s. Default 0.
+    #[serde(default)]
+    pub velocity: [f64; 2],
     /// Radius in m, > 0.
     pub radius: f64,
-    /// `disc` only: ε in m, ≥ 0. Default 0: the radius.
+    /// `disc` and `obstacle` only: ε in m, ≥ 0. Default 0: the radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub smoothing: Option<f64>,
     /// Deadline T in s after the first step, > 0.
@@ -67,7 +87,7 @@ pub struct BarrierSection {
     /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`.
     #[serde(default)]
     pub stay_rate: f64,
-    /// Margin μ in the unit of h, ≥ 0. Default: a hundredth of the radius for `disc`, none for
+    /// Margin μ in the unit of h, ≥ 0. Default: a hundredth of the radius, none for
     /// `quadratic_disc`.
     #[serde(default)]
     pub margin: Option<f64>,
@@ -77,12 +97,12 @@ impl BarrierSection {
     fn complete(&mut self, path: &str) -> Result<(), ConfigurationError> {
         check_identifier(&format!("{path}.name"), &self.name)?;
         match self.shape {
-            ShapeName::Disc => {
+            ShapeName::Disc | ShapeName::Obstacle => {
                 self.smoothing.get_or_insert(0.0);
                 self.margin.get_or_insert(MARGIN_OF_RADIUS * self.radius);
             }
             ShapeName::QuadraticDisc if self.smoothing.is_some() => {
-                let message = "belongs to the shape disc; quadratic_disc has none";
+                let message = "belongs to the shapes disc and obstacle; quadratic_disc has none";
                 return Err(ConfigurationError::new(format!("{path}.smoothing"), message));
             }
             ShapeName::QuadraticDisc => {
@@ -95,7 +115,7 @@ impl BarrierSection {
     /// The unit of h and that of its second derivative.
     pub fn units(&self) -> (&'static str, &'static str) {
         match self.shape {
-            ShapeName::Disc => ("m", "m/s2"),
+            ShapeName::Disc | ShapeName::Obstacle => ("m", "m/s2"),
             ShapeName::QuadraticDisc => ("m2", "m2/s2"),
         }
     }
@@ -131,11 +151,17 @@ impl BarrierSection {
             row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| {
                 b.margin.get_or_insert(0.0)
             }),
-            row("centre[1]", "m", Range::FINITE, "centre along x", |b| &mut b.centre[0]),
-            row("centre[2]", "m", Range::FINITE, "centre along y", |b| &mut b.centre[1]),
+            row("centre[1]", "m", Range::FINITE, "centre along x, at time 0", |b| &mut b.centre[0]),
+            row("centre[2]", "m", Range::FINITE, "centre along y, at time 0", |b| &mut b.centre[1]),
+            row("velocity[1]", "m/s", Range::FINITE, "velocity of the centre along x", |b| {
+                &mut b.velocity[0]
+            }),
+            row("velocity[2]", "m/s", Range::FINITE, "velocity of the centre along y", |b| {
+                &mut b.velocity[1]
+            }),
             row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius),
         ];
-        if self.shape == ShapeName::Disc {
+        if self.shape.is_distance_shaped() {
             rows.push(row(
                 "smoothing",
                 "m",
@@ -147,7 +173,8 @@ impl BarrierSection {
         rows
     }
 
-    fn settings(&self) -> BarrierSettings {
+    /// The settings of its promise, with every 0 that means "as the others say" replaced.
+    pub fn settings(&self) -> BarrierSettings {
         let default = |value: f64, default: f64| if value == 0.0 { default } else { value };
         let rate = default(self.rate, BarrierSettings::within(self.deadline).rate);
         BarrierSettings {
@@ -220,7 +247,8 @@ impl FilterConfiguration {
             self.barrier[i].complete(&format!("barrier[{i}]"))?;
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
-            let reserved = ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r"].contains(&&*name);
+            let reserved =
+                ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f"].contains(&&*name);
             if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
                 let message = format!("is {name:?}, which is already the name of something else");
                 return Err(ConfigurationError::new(format!("barrier[{i}].name"), message));
@@ -284,15 +312,16 @@ impl FilterConfiguration {
             let core = |e: punctual_core::Error| {
                 ConfigurationError::new(format!("{path}.{}", e.field()), e.message())
             };
+            let smoothing = section.smoothing.filter(|s| *s != 0.0).unwrap_or(section.radius);
+            let (centre, radius) = (section.centre, section.radius);
+            let distance_disc =
+                || DistanceDisc::new(centre, radius, smoothing).and_then(|d| d.moving(section.velocity));
             builder = match section.shape {
-                ShapeName::Disc => {
-                    let smoothing = section.smoothing.filter(|s| *s != 0.0).unwrap_or(section.radius);
-                    let disc = DistanceDisc::new(section.centre, section.radius, smoothing).map_err(core)?;
-                    self.add(builder, i, disc)?
-                }
+                ShapeName::Disc => self.add(builder, i, distance_disc().map_err(core)?)?,
+                ShapeName::Obstacle => self.add(builder, i, Outside(distance_disc().map_err(core)?))?,
                 ShapeName::QuadraticDisc => {
-                    let disc = QuadraticDisc::new(section.centre, section.radius).map_err(core)?;
-                    self.add(builder, i, disc)?
+                    let disc = QuadraticDisc::new(centre, radius).and_then(|d| d.moving(section.velocity));
+                    self.add(builder, i, disc.map_err(core)?)?
                 }
             };
         }
@@ -323,7 +352,7 @@ impl FilterConfiguration {
         barrier: B,
     ) -> Result<FilterBuilder, ConfigurationError>
     where
-        B: Barrier<4> + Send + 'static,
+        B: Barrier<4> + Barrier<5> + Send + 'static,
     {
         let section = &self.barrier[index];
         let (name, settings) = (&section.name, section.settings());
@@ -331,10 +360,31 @@ impl FilterConfiguration {
             ModelName::PointMass => builder.barrier(name, PointMass, barrier, settings),
             ModelName::Unicycle => builder.barrier(name, Unicycle, barrier, settings),
             ModelName::Bicycle => builder.barrier(name, self.plant.bicycle()?, barrier, settings),
+            ModelName::BicycleSmallSlip => builder.barrier(name, self.plant.small_slip()?, barrier, settings),
+            ModelName::BicycleSmallSlipRate => {
+                builder.barrier(name, self.plant.small_slip()?.with_rate(), barrier, settings)
+            }
+            ModelName::BicycleKinematic => builder.barrier(name, self.plant.kinematic()?, barrier, settings),
         }
-        .map_err(|e| {
-            let field = e.field().split_once('.').map_or(e.field(), |(_, field)| field);
-            ConfigurationError::new(format!("barrier[{index}].{field}"), e.message())
-        })
+        .map_err(|e| self.refused(index, &e))
+    }
+
+    /// The core's refusal of barrier `index` in the words of the configuration.
+    fn refused(&self, index: usize, error: &punctual_core::Error) -> ConfigurationError {
+        if let Some(found) = error.relative_degree() {
+            let inputs = self.plant.model.inputs();
+            let found = found.describe(|i| inputs.get(i).map_or("u", |s| s.name).to_owned());
+            let advice = match self.plant.model {
+                ModelName::BicycleSmallSlip => {
+                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic"
+                }
+                _ => "",
+            };
+            let model = self.plant.model.name();
+            let message = format!("its relative degree along {model} {found}{advice}");
+            return ConfigurationError::new(format!("barrier[{index}]"), message);
+        }
+        let field = error.field().split_once('.').map_or(error.field(), |(_, field)| field);
+        ConfigurationError::new(format!("barrier[{index}].{field}"), error.message())
     }
 }

@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_core::plants::{Bicycle, PointMass, Signal, Signals, Unicycle};
+use punctual_core::plants::{
+    Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
+    Unicycle,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{ConfigurationError, ExperimentSection, Parameter, Range, check_identifier};
@@ -18,6 +21,12 @@ pub enum ModelName {
     Unicycle,
     /// [`Bicycle`], simplified.
     Bicycle,
+    /// [`SmallSlipBicycle`]: as a plant only, since position barriers have a mixed relative degree.
+    BicycleSmallSlip,
+    /// [`SmallSlipBicycleWithRate`]: the same with the rate of the slip angle as its input.
+    BicycleSmallSlipRate,
+    /// [`KinematicBicycle`], steered by the rate of its front wheel.
+    BicycleKinematic,
 }
 
 impl ModelName {
@@ -27,6 +36,9 @@ impl ModelName {
             Self::PointMass => PointMass::STATES,
             Self::Unicycle => Unicycle::STATES,
             Self::Bicycle => Bicycle::STATES,
+            Self::BicycleSmallSlip => SmallSlipBicycle::STATES,
+            Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::STATES,
+            Self::BicycleKinematic => KinematicBicycle::STATES,
         }
     }
 
@@ -36,6 +48,9 @@ impl ModelName {
             Self::PointMass => PointMass::INPUTS,
             Self::Unicycle => Unicycle::INPUTS,
             Self::Bicycle => Bicycle::INPUTS,
+            Self::BicycleSmallSlip => SmallSlipBicycle::INPUTS,
+            Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::INPUTS,
+            Self::BicycleKinematic => KinematicBicycle::INPUTS,
         }
     }
 
@@ -45,7 +60,30 @@ impl ModelName {
             Self::PointMass => "point mass in the plane",
             Self::Unicycle => "unicycle",
             Self::Bicycle => "kinematic bicycle (simplified)",
+            Self::BicycleSmallSlip => "bicycle with small slip angle",
+            Self::BicycleSmallSlipRate => "bicycle with small slip angle, steered by its rate",
+            Self::BicycleKinematic => "kinematic bicycle, steered by the rate of its front wheel",
         }
+    }
+
+    /// Its name in a configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PointMass => "point_mass",
+            Self::Unicycle => "unicycle",
+            Self::Bicycle => "bicycle",
+            Self::BicycleSmallSlip => "bicycle_small_slip",
+            Self::BicycleSmallSlipRate => "bicycle_small_slip_rate",
+            Self::BicycleKinematic => "bicycle_kinematic",
+        }
+    }
+
+    fn has_l_r(self) -> bool {
+        !matches!(self, Self::PointMass | Self::Unicycle)
+    }
+
+    fn has_l_f(self) -> bool {
+        self == Self::BicycleKinematic
     }
 }
 
@@ -55,38 +93,48 @@ impl ModelName {
 pub struct PlantSection {
     /// Which plant.
     pub model: ModelName,
-    /// Bicycle only: distance from the rear axle to the centre of mass in m, > 0. Default 10.
+    /// Bicycles only: distance from the rear axle to the centre of mass in m, > 0. Default 10.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub l_r: Option<f64>,
+    /// `bicycle_kinematic` only: distance from the centre of mass to the front axle in m, > 0.
+    /// Default 10.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub l_f: Option<f64>,
 }
+
+/// Default of the lengths of a bicycle in m: the paper's.
+const LENGTH: f64 = 10.0;
 
 impl PlantSection {
     pub(super) fn complete(&mut self) -> Result<(), ConfigurationError> {
-        match (self.model, self.l_r) {
-            (ModelName::Bicycle, None) => self.l_r = Some(10.0),
-            (ModelName::PointMass | ModelName::Unicycle, Some(_)) => {
-                let message = "is a constant of the bicycle; this model has none";
-                return Err(ConfigurationError::new("plant.l_r", message));
+        for (field, value, has, owner) in [
+            ("l_r", &mut self.l_r, self.model.has_l_r(), "the bicycle"),
+            ("l_f", &mut self.l_f, self.model.has_l_f(), "bicycle_kinematic"),
+        ] {
+            if has {
+                value.get_or_insert(LENGTH);
+            } else if value.is_some() {
+                let message = format!("is a constant of {owner}; this model has none");
+                return Err(ConfigurationError::new(format!("plant.{field}"), message));
             }
-            _ => {}
         }
         Ok(())
     }
 
     /// The parameters of the model, reached through `section` in a configuration of type `C`.
-    pub(super) fn parameters<C: 'static>(
-        self,
-        section: impl Fn(&mut C) -> &mut Self + Send + 'static,
-    ) -> Option<Parameter<C>> {
-        self.l_r?;
-        let names = ("l_r".to_owned(), "plant.l_r".to_owned());
-        Some(Parameter::new(
-            names,
-            "m",
-            Range::POSITIVE,
-            "distance from the rear axle to the centre of mass",
-            move |c| section(c).l_r.get_or_insert(0.0),
-        ))
+    pub(super) fn parameters<C: 'static>(self, section: fn(&mut C) -> &mut Self) -> Vec<Parameter<C>> {
+        let mut rows = Vec::new();
+        let mut row = |field: &str, description: &str, access: fn(&mut Self) -> &mut f64| {
+            let names = (field.to_owned(), format!("plant.{field}"));
+            rows.push(Parameter::new(names, "m", Range::POSITIVE, description, move |c| access(section(c))));
+        };
+        if self.l_r.is_some() {
+            row("l_r", "distance from the rear axle to the centre of mass", |s| s.l_r.get_or_insert(LENGTH));
+        }
+        if self.l_f.is_some() {
+            row("l_f", "distance from the centre of mass to the front axle", |s| s.l_f.get_or_insert(LENGTH));
+        }
+        rows
     }
 
     /// The bicycle of this section.
@@ -95,9 +143,24 @@ impl PlantSection {
     ///
     /// A constant outside its range.
     pub(crate) fn bicycle(&self) -> Result<Bicycle, ConfigurationError> {
-        let l_r = self.l_r.unwrap_or(f64::NAN);
-        Bicycle::new(l_r).map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
+        Bicycle::new(self.l_r.unwrap_or(LENGTH)).map_err(constant)
     }
+
+    /// The small-slip bicycle of this section; errors as for [`Self::bicycle`].
+    pub(crate) fn small_slip(&self) -> Result<SmallSlipBicycle, ConfigurationError> {
+        SmallSlipBicycle::new(self.l_r.unwrap_or(LENGTH)).map_err(constant)
+    }
+
+    /// The kinematic bicycle of this section; errors as for [`Self::bicycle`].
+    pub(crate) fn kinematic(&self) -> Result<KinematicBicycle, ConfigurationError> {
+        KinematicBicycle::new(self.l_f.unwrap_or(LENGTH), self.l_r.unwrap_or(LENGTH)).map_err(constant)
+    }
+}
+
+/// An error about a constant of the plant, with its path.
+#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
+fn constant(error: punctual_core::Error) -> ConfigurationError {
+    ConfigurationError::new(format!("plant.{}", error.field()), error.message())
 }
 
 /// `[integration]`: how the plant moves between communication points.
@@ -112,6 +175,17 @@ pub struct IntegrationSection {
 impl Default for IntegrationSection {
     fn default() -> Self {
         Self { inner_step: 0.001 }
+    }
+}
+
+/// Part of an inner step by which a communication step may be longer than a multiple of it: round-off
+/// in the importer's time, not a reason for another inner step.
+const STEP_ROUND_OFF: f64 = 1e-6;
+
+impl IntegrationSection {
+    /// Number of Runge-Kutta steps for a communication step of `h` s; a whole number, 0 for h = 0.
+    pub fn substeps(&self, h: f64) -> f64 {
+        (h / self.inner_step * (1.0 - STEP_ROUND_OFF)).ceil()
     }
 }
 
@@ -145,12 +219,7 @@ pub struct PlantConfiguration {
 impl PlantConfiguration {
     pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
         if self.name.is_empty() {
-            self.name = match self.plant.model {
-                ModelName::PointMass => "point_mass",
-                ModelName::Unicycle => "unicycle",
-                ModelName::Bicycle => "bicycle",
-            }
-            .to_owned();
+            self.name = self.plant.model.name().to_owned();
         }
         check_identifier("name", &self.name)?;
         self.plant.complete()?;
@@ -205,6 +274,9 @@ impl PlantConfiguration {
             ModelName::PointMass => Box::new(Erased(PointMass)),
             ModelName::Unicycle => Box::new(Erased(Unicycle)),
             ModelName::Bicycle => Box::new(Erased(self.plant.bicycle()?)),
+            ModelName::BicycleSmallSlip => Box::new(Erased(self.plant.small_slip()?)),
+            ModelName::BicycleSmallSlipRate => Box::new(Erased(self.plant.small_slip()?.with_rate())),
+            ModelName::BicycleKinematic => Box::new(Erased(self.plant.kinematic()?)),
         })
     }
 }

@@ -58,10 +58,18 @@ defects! {
         "barrier[0].stay_rate: is -1, must be finite and >= 0";
     negative_smoothing: FILTER, "radius = 2.0" => "radius = 2.0\nsmoothing = -1.0",
         "barrier[0].smoothing: is -1, must be finite and >= 0";
+    infinite_velocity: FILTER, "radius = 2.0" => "radius = 2.0\nvelocity = [0.0, -inf]",
+        "barrier[0].velocity[2]: is -inf, must be finite";
+    mixed_relative_degree: FILTER, "model = \"unicycle\"" => "model = \"bicycle_small_slip\"",
+        "barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, a enters \
+         derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
+         bicycle_kinematic";
+    front_length_of_another_model: PLANT, "l_r = 3.0" => "l_f = 3.0",
+        "plant.l_f: is a constant of bicycle_kinematic; this model has none";
     infinite_centre: FILTER, "[45.0, 44.0]" => "[45.0, inf]", "barrier[0].centre[2]: is inf, must be finite";
     smoothing_of_a_quadratic_disc: FILTER,
         "radius = 2.0" => "radius = 2.0\nshape = \"quadratic_disc\"\nsmoothing = 1.0",
-        "barrier[0].smoothing: belongs to the shape disc; quadratic_disc has none";
+        "barrier[0].smoothing: belongs to the shapes disc and obstacle; quadratic_disc has none";
     unknown_input: FILTER, "a = [-9.0, 8.0]" => "b = [-9.0, 8.0]",
         "bounds.b: unknown input, must be one of a, omega";
     nan_bound: FILTER, "[-9.0, 8.0]" => "[nan, 8.0]",
@@ -127,17 +135,30 @@ fn unknown_and_missing_keys_and_wrong_types() {
     }
 }
 
+/// Every model.
+const MODELS: [&str; 6] = [
+    "point_mass",
+    "unicycle",
+    "bicycle",
+    "bicycle_small_slip",
+    "bicycle_small_slip_rate",
+    "bicycle_kinematic",
+];
+
 /// Valid configurations of every kind: models × shapes × methods, and some with everything stated.
 fn every_kind() -> Vec<String> {
     let mut texts = vec![FILTER.to_owned(), PLANT.to_owned()];
-    for model in ["point_mass", "unicycle", "bicycle"] {
+    for model in MODELS {
         texts.push(format!("kind = \"plant\"\nname = \"p\"\nplant.model = \"{model}\"\nx0.x_p = 1e-300"));
-        for shape in ["disc", "quadratic_disc"] {
+        if model == "bicycle_small_slip" {
+            continue;
+        }
+        for shape in ["disc", "quadratic_disc", "obstacle"] {
             for method in ["reference_profile", "repeated_root"] {
                 texts.push(format!(
                     "kind = \"filter\"\ndirect_feedthrough = false\nplant.model = \"{model}\"\n\
                      [[barrier]]\nname = \"a\"\nshape = \"{shape}\"\nmethod = \"{method}\"\n\
-                     centre = [0.1, -3e20]\nradius = 0.3\ndeadline = 7.0\nmargin = 0.05\n\
+                     centre = [0.1, -3e20]\nvelocity = [-2.0, 0.3]\nradius = 0.3\ndeadline = 7.0\nmargin = 0.05\n\
                      [[barrier]]\nname = \"b\"\nshape = \"{shape}\"\ncentre = [1, 2]\nradius = 1\n\
                      deadline = 3\nrate = 0.7\nstay_rate = 0.9\n"
                 ));
@@ -167,11 +188,31 @@ fn infinite_bounds_become_the_number_that_means_none() {
 }
 
 #[test]
+fn models_and_shapes_are_named_as_in_the_file() {
+    for text in every_kind() {
+        let canonical = Configuration::parse(&text).and_then(|c| c.canonical()).unwrap();
+        match Configuration::parse(&text).unwrap() {
+            Configuration::Filter(c) => {
+                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.model.name())), "{canonical}");
+                assert!(
+                    canonical.contains(&format!("shape = \"{}\"", c.barrier[0].shape.name())),
+                    "{canonical}"
+                );
+            }
+            Configuration::Plant(c) => {
+                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.model.name())), "{canonical}");
+            }
+        }
+    }
+}
+
+#[test]
 fn defaults_are_those_of_the_documentation() {
     let Configuration::Filter(c) = Configuration::parse(FILTER).unwrap() else { panic!("not a filter") };
     let barrier = &c.barrier[0];
     assert_eq!((barrier.rate, barrier.stay_rate, barrier.smoothing), (0.0, 0.0, Some(0.0)), "by default");
     assert_eq!(barrier.margin, Some(0.02), "a hundredth of the radius");
+    assert_eq!(barrier.velocity, [0.0; 2], "at rest");
     assert_eq!((c.name.as_str(), c.direct_feedthrough, c.correction_limit), ("filter", true, 1e6));
     let Configuration::Plant(c) =
         Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle\"").unwrap()
@@ -179,6 +220,9 @@ fn defaults_are_those_of_the_documentation() {
         panic!("not a plant")
     };
     assert_eq!((c.name.as_str(), c.plant.l_r, c.integration.inner_step), ("bicycle", Some(10.0), 0.001));
+    let kinematic = Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle_kinematic\"").unwrap();
+    let Configuration::Plant(kinematic) = kinematic else { panic!("not a plant") };
+    assert_eq!((kinematic.plant.l_f, kinematic.plant.l_r), (Some(10.0), Some(10.0)));
     assert_eq!(c.x0.values().copied().collect::<Vec<_>>(), [0.0; 4]);
 }
 

@@ -14,9 +14,10 @@ fn product(text: &str) -> Product {
 /// Every model, as plant and as filter with either shape, method and feedthrough.
 fn every_product() -> Vec<Product> {
     let mut products = Vec::new();
-    for model in ["point_mass", "unicycle", "bicycle"] {
+    products.push(product("kind = \"plant\"\nplant.model = \"bicycle_small_slip\""));
+    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip_rate", "bicycle_kinematic"] {
         products.push(product(&format!("kind = \"plant\"\nplant.model = \"{model}\"")));
-        for shape in ["disc", "quadratic_disc"] {
+        for shape in ["disc", "quadratic_disc", "obstacle"] {
             for method in ["reference_profile", "repeated_root"] {
                 for feedthrough in [true, false] {
                     products.push(product(&format!(
@@ -158,6 +159,12 @@ fn the_guid_differs_when_any_field_differs() {
         ("radius", "rate = 3.0\nradius"),
         ("radius", "stay_rate = 3.0\nradius"),
         ("radius", "margin = 0.5\nradius"),
+        ("radius", "velocity = [0.5, 0.0]\nradius"),
+        ("radius", "velocity = [0.0, 0.5]\nradius"),
+        ("radius", "shape = \"obstacle\"\nradius"),
+        ("\"bicycle\"", "\"bicycle_kinematic\""),
+        ("\"bicycle\"", "\"bicycle_kinematic\"\nplant.l_f = 11.0"),
+        ("\"bicycle\"", "\"bicycle_small_slip_rate\""),
         ("\"bicycle\"", "\"bicycle\"\nplant.l_r = 11.0"),
         ("\"bicycle\"", "\"unicycle\""),
         ("\"bicycle\"", "\"bicycle\"\nname = \"other\""),

@@ -1,0 +1,218 @@
+//! Reference profiles of one's own, checked before they are trusted.
+//!
+//! # Derivation
+//!
+//! Let r ∈ Cⁿ⁻¹ with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and r ≥ 0 from T on. Enforcing
+//!
+//! ```text
+//! Π (D + a_i) (e − r) ≥ 0,   a_i > 0                                                    (P)
+//! ```
+//!
+//! starts from a zero error, so e ≥ r for ever ([`super::operator`]): e(T) ≥ 0 and e ≥ 0 after it.
+//! [`HermiteProfile`] is one such r; another may leave faster, arrive inside, or wait.
+//!
+//! **The check.** Whether a function is the derivative of another is decided by the fundamental
+//! theorem, independently of how either was written: r⁽ᵏ⁻¹⁾(b) − r⁽ᵏ⁻¹⁾(a) against ∫ r⁽ᵏ⁾ by Gauss' rule
+//! with five nodes (exact to degree 9). The rule on the two halves tells its own error, which is allowed
+//! tenfold; so a kink inside a panel is not mistaken for a contradiction.
+//!
+//! # Requirements
+//!
+//! The check samples: a violation narrower than a panel (T/64, until 3T) may pass. Its tolerance is
+//! [`TOLERANCE`] of the largest r⁽ᵏ⁾ met, in units of the panel.
+
+use std::fmt;
+
+use super::comparison::Stack;
+use super::hermite::HermiteProfile;
+use super::operator::Operator;
+use crate::MAX_RELATIVE_DEGREE;
+
+/// r and its derivatives, `[e]`/s^k; entries above the order in use are ignored.
+pub type Derivatives = [f64; MAX_RELATIVE_DEGREE + 1];
+
+/// A function of time since the anchor that leaves from the anchor and is ≥ 0 from the deadline on.
+pub trait Profile {
+    /// r⁽⁰⁾ … r⁽ⁿ⁾ at `elapsed` = τ ≥ 0 in s; at a jump of r⁽ⁿ⁾, its value after it.
+    fn evaluate(&self, elapsed: f64) -> Derivatives;
+}
+
+impl Profile for HermiteProfile {
+    fn evaluate(&self, elapsed: f64) -> Derivatives {
+        HermiteProfile::evaluate(self, elapsed)
+    }
+}
+
+/// Relative tolerance of the check: far above round-off of a formula of a hundred operations, far below
+/// any mistake in one.
+pub const TOLERANCE: f64 = 1e-9;
+
+/// What is wrong with a profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ProfileError {
+    /// r⁽ᵏ⁾ is not finite at `elapsed`.
+    NotFinite {
+        /// k.
+        order: usize,
+        /// τ in s.
+        elapsed: f64,
+    },
+    /// r⁽ᵏ⁾(0) is not e⁽ᵏ⁾(0).
+    Anchor {
+        /// k.
+        order: usize,
+        /// r⁽ᵏ⁾(0).
+        found: f64,
+        /// e⁽ᵏ⁾(0).
+        wanted: f64,
+    },
+    /// r < 0 at or after the deadline.
+    BelowZero {
+        /// τ in s.
+        elapsed: f64,
+        /// r(τ).
+        value: f64,
+    },
+    /// r⁽ᵏ⁾ is not the derivative of r⁽ᵏ⁻¹⁾.
+    Inconsistent {
+        /// k.
+        order: usize,
+        /// The middle of the panel, τ in s.
+        elapsed: f64,
+        /// Mean of r⁽ᵏ⁾ over the panel.
+        found: f64,
+        /// Difference quotient of r⁽ᵏ⁻¹⁾ over it.
+        wanted: f64,
+    },
+}
+
+impl fmt::Display for ProfileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite { order, elapsed } => {
+                write!(f, "derivative {order} of the profile is not finite at {elapsed} s")
+            }
+            Self::Anchor { order, found, wanted } => {
+                write!(f, "derivative {order} of the profile starts at {found}, the anchor has {wanted}")
+            }
+            Self::BelowZero { elapsed, value } => {
+                write!(f, "the profile is {value} at {elapsed} s, must be >= 0 from the deadline on")
+            }
+            Self::Inconsistent { order, elapsed, found, wanted } => write!(
+                f,
+                "derivative {order} of the profile is {found} on average about {elapsed} s, \
+                 the derivative before it changes by {wanted} per second"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ProfileError {}
+
+/// Checks that `profile` leaves from `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), that its derivatives up to r⁽ⁿ⁾ are each
+/// other's, and that it is ≥ 0 from `deadline` = T > 0 s on, until 3T.
+///
+/// # Errors
+///
+/// The first [`ProfileError`] met, in the order of time.
+pub fn check(profile: &impl Profile, anchor: &[f64], deadline: f64) -> Result<(), ProfileError> {
+    let n = anchor.len();
+    let panel = deadline / 64.0;
+    let start = finite(profile, n, 0.0)?;
+    // Sizes of r⁽ᵏ⁾ Tᵏ decide what is round-off: a derivative that should vanish has no size of its own.
+    let size = |r: &Derivatives| {
+        (0..=n).fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * deadline.powi(k as i32)).abs()))
+    };
+    let mut largest = size(&start);
+    for (order, (&found, &wanted)) in start.iter().zip(anchor).enumerate() {
+        if (found - wanted).abs() * deadline.powi(order as i32) > TOLERANCE * largest {
+            return Err(ProfileError::Anchor { order, found, wanted });
+        }
+    }
+    let mut left = start;
+    for i in 0..3 * 64 {
+        // The panels meet at T exactly, where r⁽ⁿ⁾ may jump.
+        let (a, b) = (panel * f64::from(i), panel * f64::from(i + 1));
+        let right = finite(profile, n, b)?;
+        largest = largest.max(size(&right));
+        let whole = mean(profile, n, a, b)?;
+        let middle = a + (b - a) / 2.0;
+        let (first, second) = (mean(profile, n, a, middle)?, mean(profile, n, middle, b)?);
+        for order in 1..=n {
+            let found = first[order] / 2.0 + second[order] / 2.0;
+            let wanted = (right[order - 1] - left[order - 1]) / (b - a);
+            let round_off = TOLERANCE * largest / (deadline.powi(order as i32 - 1) * (b - a));
+            if (found - wanted).abs() > 10.0 * (found - whole[order]).abs() + round_off {
+                return Err(ProfileError::Inconsistent { order, elapsed: middle, found, wanted });
+            }
+        }
+        if b >= deadline && right[0] < -TOLERANCE * largest {
+            return Err(ProfileError::BelowZero { elapsed: b, value: right[0] });
+        }
+        left = right;
+    }
+    Ok(())
+}
+
+fn finite(profile: &impl Profile, n: usize, elapsed: f64) -> Result<Derivatives, ProfileError> {
+    let r = profile.evaluate(elapsed);
+    match r[..=n].iter().position(|v| !v.is_finite()) {
+        Some(order) => Err(ProfileError::NotFinite { order, elapsed }),
+        None => Ok(r),
+    }
+}
+
+/// The mean of every derivative over [a, b] by Gauss' rule with five nodes.
+fn mean(profile: &impl Profile, n: usize, a: f64, b: f64) -> Result<Derivatives, ProfileError> {
+    /// Nodes on [−1, 1] and half the weights.
+    const RULE: [(f64, f64); 5] = [
+        (-0.906_179_845_938_664, 0.118_463_442_528_094_54),
+        (-0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
+        (0.0, 0.284_444_444_444_444_44),
+        (0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
+        (0.906_179_845_938_664, 0.118_463_442_528_094_54),
+    ];
+    let mut sum = [0.0; MAX_RELATIVE_DEGREE + 1];
+    for (node, weight) in RULE {
+        let r = finite(profile, n, a + (b - a) * (0.5 + 0.5 * node))?;
+        for k in 0..=n {
+            sum[k] += weight * r[k];
+        }
+    }
+    Ok(sum)
+}
+
+/// The constraint (P) for a checked profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracking<P> {
+    profile: P,
+    operator: Operator,
+}
+
+impl<P: Profile> Tracking<P> {
+    /// The constraint that keeps e above `profile`, from `anchor`, with the rates of `operator`.
+    ///
+    /// # Panics
+    ///
+    /// An anchor of another length than the operator's order.
+    ///
+    /// # Errors
+    ///
+    /// As for [`check`].
+    pub fn new(profile: P, operator: Operator, anchor: &[f64], deadline: f64) -> Result<Self, ProfileError> {
+        assert_eq!(anchor.len(), operator.order(), "the anchor needs one derivative for each rate");
+        check(&profile, anchor, deadline)?;
+        Ok(Self { profile, operator })
+    }
+
+    /// The least e⁽ⁿ⁾ allowed at `elapsed` = τ with the derivatives `e` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), and r there.
+    pub fn floor(&self, elapsed: f64, e: &[f64]) -> (f64, f64) {
+        let (n, r) = (self.operator.order(), self.profile.evaluate(elapsed));
+        let mut error: Stack = [0.0; MAX_RELATIVE_DEGREE];
+        for k in 0..n {
+            error[k] = e[k] - r[k];
+        }
+        (r[n] - self.operator.lower_terms(&error[..n]), r[0])
+    }
+}

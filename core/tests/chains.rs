@@ -1,0 +1,85 @@
+//! Chains of n = 1 … 8 integrators from random anchors: on time, and never outside until 3T.
+//!
+//! h is the first state, so the floor under h⁽ⁿ⁾ is the floor under the input; the held input moves a
+//! chain along a polynomial, which is evaluated exactly. The promise alone is on trial here: no plant,
+//! no jets, no programme.
+
+use punctual_core::convergence::comparison::factorial;
+use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
+
+/// Margin as a part of the largest |h⁽ʲ⁾(0)| Tʲ/j!: what input held over T/100 costs (theory: M δ/aⁿ) is
+/// below it for every order. Without it n = 1 ends a hair below 0, as its profile does in the limit.
+const MARGIN: f64 = 0.01;
+
+/// Round-off of a time that is a sum of steps, against the deadline.
+const SAME_TIME: f64 = 1e-12;
+
+/// Uniform numbers in [0, 1) from a fixed seed (xorshift).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Moves the chain by `dt` under the held input.
+fn advance(x: &mut [f64], input: f64, dt: f64) {
+    let n = x.len();
+    for i in 0..n {
+        let tail: f64 = (i..n).map(|j| x[j] * dt.powi((j - i) as i32) / factorial(j - i)).sum();
+        x[i] = tail + input * dt.powi((n - i) as i32) / factorial(n - i);
+    }
+}
+
+/// Whether the promise is kept from the anchor `x` with deadline `t` and steps of `dt`.
+fn kept(x: &[f64], t: f64, dt: f64) -> bool {
+    let n = x.len();
+    let size = (0..n).map(|j| (x[j] * t.powi(j as i32) / factorial(j)).abs()).fold(0.0, f64::max);
+    let settings = FixedTimeSettings { margin: MARGIN * size, ..FixedTimeSettings::within(t) };
+    let promise = FixedTime::new(n, settings).expect("valid settings");
+    let mut state = FixedTimeState::default();
+    let mut x = x.to_vec();
+    for k in 0..=(3.0 * t / dt).ceil() as usize {
+        let now = k as f64 * dt;
+        let demand = promise.advance(&mut state, now, &x);
+        if now >= t - SAME_TIME && x[0] < 0.0 {
+            return false;
+        }
+        // u_ref = 0.
+        advance(&mut x, demand.floor.max(0.0), dt);
+    }
+    state.arrival.is_some_and(|arrival| arrival <= t + SAME_TIME)
+}
+
+/// Anchors outside the set with derivatives of one size in units of the deadline, T log-uniform in
+/// [0.1, 20] s; the number of broken promises for n = 1 … 8.
+fn failures(anchors: usize, step: impl Fn(f64) -> f64) -> [usize; 8] {
+    std::array::from_fn(|order| {
+        let n = order + 1;
+        let mut numbers = Numbers(12_345 + n as u64);
+        (0..anchors)
+            .filter(|_| {
+                let t = 0.1 * 200_f64.powf(numbers.next());
+                let mut x: Vec<f64> = (0..n)
+                    .map(|j| (20.0 * numbers.next() - 10.0) * factorial(j) / t.powi(j as i32))
+                    .collect();
+                x[0] = -x[0].abs();
+                !kept(&x, t, step(t))
+            })
+            .count()
+    })
+}
+
+#[test]
+fn steps_of_a_hundredth_of_the_deadline() {
+    assert_eq!(failures(1000, |t| t / 100.0), [0; 8]);
+}
+
+#[test]
+fn steps_of_a_millisecond() {
+    assert_eq!(failures(60, |_| 1e-3), [0; 8]);
+}

@@ -1,0 +1,104 @@
+//! Profiles of one's own: the check accepts what is right and names what is not; distinct rates.
+
+use punctual_core::convergence::comparison::factorial;
+use punctual_core::convergence::hermite::HermiteProfile;
+use punctual_core::convergence::operator::Operator;
+use punctual_core::convergence::profile::{Derivatives, Profile, ProfileError, Tracking, check};
+
+/// The Hermite profile with one derivative changed from a time on.
+struct Broken {
+    right: HermiteProfile,
+    order: usize,
+    from: f64,
+    by: f64,
+}
+
+impl Profile for Broken {
+    fn evaluate(&self, elapsed: f64) -> Derivatives {
+        let mut r = self.right.evaluate(elapsed);
+        if elapsed >= self.from {
+            r[self.order] += self.by;
+        }
+        r
+    }
+}
+
+/// r = A − (A − e₀) e^{−bτ}: leaves with ė₀ = b (A − e₀), reaches zero at ln((A − e₀)/A)/b.
+struct Exponential {
+    aim: f64,
+    start: f64,
+    rate: f64,
+}
+
+impl Profile for Exponential {
+    fn evaluate(&self, elapsed: f64) -> Derivatives {
+        let decay = (self.start - self.aim) * (-self.rate * elapsed).exp();
+        let mut r: Derivatives = std::array::from_fn(|k| decay * (-self.rate).powi(k as i32));
+        r[0] += self.aim;
+        r
+    }
+}
+
+const ANCHOR: [f64; 8] = [-7.0, 2.0, -1.5, 0.4, 3.0, -2.0, 0.1, 5.0];
+
+#[test]
+fn the_hermite_profile_passes_for_every_order_and_scale() {
+    for n in 1..=8 {
+        for (deadline, size) in [(1.0, 1.0), (1e-3, 1e9), (1e4, 1e-6), (20.0, 1.0)] {
+            let anchor: Vec<f64> = ANCHOR[..n].iter().map(|v| v * size).collect();
+            let profile = HermiteProfile::new(&anchor, deadline);
+            assert_eq!(check(&profile, &anchor, deadline), Ok(()), "n = {n}, T = {deadline}");
+        }
+    }
+}
+
+#[test]
+fn each_defect_is_named() {
+    let (n, deadline) = (3, 2.0);
+    let anchor = &ANCHOR[..n];
+    let broken = |order, from, by| {
+        check(&Broken { right: HermiteProfile::new(anchor, deadline), order, from, by }, anchor, deadline)
+    };
+    assert_eq!(broken(0, 10.0, 1.0), Ok(()));
+    assert_eq!(broken(1, 0.0, 0.5), Err(ProfileError::Anchor { order: 1, found: 2.5, wanted: 2.0 }));
+    // A constant more in any derivative contradicts the one before it, in the highest at once.
+    assert!(matches!(broken(3, 0.0, 0.01), Err(ProfileError::Inconsistent { order: 3, .. })));
+    // A jump of r itself contradicts r' where it is, whatever it jumps to.
+    assert!(
+        matches!(broken(0, 1.0, 1e-3), Err(ProfileError::Inconsistent { order: 1, elapsed, .. }) if elapsed <= 1.0)
+    );
+    assert!(
+        matches!(broken(2, 1.5, f64::NAN), Err(ProfileError::NotFinite { order: 2, elapsed }) if elapsed >= 1.5)
+    );
+    let late = Exponential { aim: 1.0, start: -20.0, rate: 1.0 };
+    let found = check(&late, &[-20.0, 21.0], deadline).unwrap_err();
+    assert!(matches!(found, ProfileError::BelowZero { elapsed: 2.0, value } if value < 0.0), "{found}");
+    assert!(found.to_string().ends_with("at 2 s, must be >= 0 from the deadline on"), "{found}");
+}
+
+/// n distinct rates and an exponential profile that lands inside: h stays above it and arrives, with the
+/// floor held over each step.
+#[test]
+fn distinct_rates_track_a_profile_of_ones_own() {
+    const STEP: f64 = 1e-3;
+    for rates in [&[2.0][..], &[1.0, 4.0], &[0.5, 2.0, 8.0], &[1.0, 2.0, 3.0, 4.0]] {
+        let n = rates.len();
+        let profile = Exponential { aim: 1.0, start: -20.0, rate: 1.0 };
+        let mut h = profile.evaluate(0.0)[..n].to_vec();
+        let operator = Operator::new(rates).expect("valid rates");
+        let tracking = Tracking::new(profile, operator, &h.clone(), 4.0).expect("ln 21 < 4");
+        for k in 0..8000 {
+            let t = f64::from(k) * STEP;
+            let (floor, r) = tracking.floor(t, &h);
+            // The held floor is taken at the left end of the step, wrong by its slope, at most Π a_i + 1
+            // times 21, times the step, and divided by Π a_i in the steady state.
+            let product: f64 = rates.iter().product();
+            assert!(h[0] >= r - 21.0 * STEP * (1.0 + 1.0 / product), "n = {n} at {t}: {} under {r}", h[0]);
+            assert!(t < 4.0 || h[0] >= 0.0, "n = {n} at {t}: {}", h[0]);
+            for j in 0..n {
+                h[j] = (j..n).map(|i| h[i] * STEP.powi((i - j) as i32) / factorial(i - j)).sum::<f64>()
+                    + floor * STEP.powi((n - j) as i32) / factorial(n - j);
+            }
+        }
+    }
+}

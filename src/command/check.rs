@@ -1,0 +1,337 @@
+//! `punctual check`: what a configuration comes to, before anything is built.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use punctual_core::filter::{Method, Phase, SafetyFilter};
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfiguration};
+use punctual_fmu::product::describe;
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::output::{self, number};
+use crate::package;
+
+/// Arguments of `punctual check`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The configuration file (TOML): `kind = "filter"` or `kind = "plant"`
+    configuration: PathBuf,
+    /// Also check a filter from the start of this plant configuration
+    #[arg(long, value_name = "FILE", conflicts_with = "x0")]
+    plant: Option<PathBuf>,
+    /// Also check a filter from this start, such as "x_p=1,v=-2"; states not named are 0
+    #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
+    x0: Option<String>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `check` tells about a filter.
+#[derive(Serialize)]
+struct FilterReport {
+    kind: &'static str,
+    name: String,
+    model: &'static str,
+    /// Communication step in s.
+    step: f64,
+    barriers: Vec<BarrierReport>,
+    /// The start given, by state.
+    start: Option<Vec<(&'static str, f64)>>,
+    /// Status of the first sample from there.
+    status: Option<&'static str>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct BarrierReport {
+    name: String,
+    shape: &'static str,
+    /// Unit of h.
+    unit: &'static str,
+    relative_degree: usize,
+    method: &'static str,
+    /// In s.
+    deadline: f64,
+    /// In 1/s; `null` for the repeated root without a start, where it is chosen.
+    rate: Option<f64>,
+    rate_times_deadline: Option<f64>,
+    /// In 1/s.
+    stay_rate: f64,
+    margin: f64,
+    start: Option<StartReport>,
+}
+
+#[derive(Serialize)]
+struct StartReport {
+    h: f64,
+    inside: bool,
+    /// Whether the theorem applies from there.
+    guaranteed: bool,
+}
+
+/// What `check` tells about a plant.
+#[derive(Serialize)]
+struct PlantReport {
+    kind: &'static str,
+    name: String,
+    model: &'static str,
+    states: Vec<SignalReport>,
+    inputs: Vec<SignalReport>,
+    /// Communication step in s.
+    step: f64,
+    /// Runge-Kutta steps in it.
+    substeps: u64,
+    /// Their length in s.
+    inner_step: f64,
+}
+
+#[derive(Serialize)]
+struct SignalReport {
+    name: &'static str,
+    unit: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    start: Option<f64>,
+    description: &'static str,
+}
+
+/// Checks the configuration. From a start, the code is 1 where the filter gives no guarantee.
+///
+/// # Errors
+///
+/// A configuration or start that cannot be used.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let file = &arguments.configuration;
+    match package::read_configuration(file)? {
+        Configuration::Filter(configuration) => {
+            let start = start(arguments, &configuration)?;
+            let report = filter(&configuration, start).map_err(|e| e.in_file(file))?;
+            if arguments.json {
+                output::json(&report);
+            } else {
+                output::result(&filter_text(&report));
+            }
+            let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
+            let promised = starts.all(|start| start.guaranteed);
+            Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        }
+        Configuration::Plant(configuration) => {
+            if arguments.plant.is_some() || arguments.x0.is_some() {
+                let message = "is a plant; --plant and --x0 give a start to a filter";
+                return Err(Error::configuration("kind", message).in_file(file));
+            }
+            let report = plant(&configuration);
+            if arguments.json {
+                output::json(&report);
+            } else {
+                output::result(&plant_text(&report));
+            }
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+/// The start that the arguments give, in the order of the filter's states.
+fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<Option<Vec<f64>>, Error> {
+    let states = configuration.plant.model.states();
+    if let Some(file) = &arguments.plant {
+        let Configuration::Plant(plant) = package::read_configuration(file)? else {
+            return Err(Error::configuration("kind", "is \"filter\", must be \"plant\"").in_file(file));
+        };
+        let missing = states.iter().find(|s| !plant.x0.contains_key(s.name));
+        return match missing {
+            Some(state) => {
+                let message = format!("has no state {}, which the filter measures", state.name);
+                Err(Error::configuration("plant.model", message).in_file(file))
+            }
+            None => Ok(Some(states.iter().map(|s| plant.x0[s.name]).collect())),
+        };
+    }
+    let Some(text) = &arguments.x0 else { return Ok(None) };
+    let refuse = |message: String| Error::configuration("--x0", message);
+    let mut x0 = vec![0.0; states.len()];
+    for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        let (name, value) =
+            part.split_once('=').ok_or_else(|| refuse(format!("is {part:?}, must be like {:?}", "v=1.5")))?;
+        let Some(index) = states.iter().position(|s| s.name == name.trim()) else {
+            let names: Vec<_> = states.iter().map(|s| s.name).collect();
+            return Err(refuse(format!(
+                "{:?} is no state, must be one of {}",
+                name.trim(),
+                names.join(", ")
+            )));
+        };
+        let value = value.trim().parse().ok().filter(|v: &f64| v.is_finite());
+        x0[index] = value.ok_or_else(|| refuse(format!("is {part:?}, must be a finite number")))?;
+    }
+    Ok(Some(x0))
+}
+
+fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterReport, Error> {
+    let mut filter = c.build()?;
+    let inputs = c.plant.model.inputs().len();
+    let status = match start.as_deref() {
+        Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
+        None => None,
+    };
+    let (step, experiment) = (c.experiment.step_size, c.experiment);
+    let mut warnings = Vec::new();
+    let degrees: Vec<usize> = filter.relative_degrees().collect();
+    let mut barriers = Vec::new();
+    for (i, section) in c.barrier.iter().enumerate() {
+        let (settings, name, unit) = (section.settings(), &section.name, section.units().0);
+        let begun = start.is_some();
+        let approaching = begun && filter.report().barriers[i].phase == Phase::Approach;
+        let (method, rate) = match settings.method {
+            Method::ReferenceProfile => ("reference profile", Some(settings.rate)),
+            Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
+        };
+        let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
+        if settings.margin == 0.0 {
+            warn(format!(
+                "the margin is 0, so that an input held over {} s can cost the deadline",
+                number(step)
+            ));
+        }
+        for (which, rate) in [("rate", rate), ("stay_rate", Some(settings.stay_rate))] {
+            let Some(rate) = rate.filter(|rate| rate * step > 1.0) else { continue };
+            warn(format!(
+                "{which} times step is {}, more than 1: the error changes faster than the input",
+                number(rate * step)
+            ));
+        }
+        if settings.deadline < step {
+            warn(format!("the deadline is shorter than the step of {} s", number(step)));
+        }
+        if experiment.stop_time - experiment.start_time < settings.deadline {
+            warn("the experiment stops before the deadline".to_owned());
+        }
+        if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
+            warn(format!(
+                "the repeated root is negative: errors grow by a factor of {} until the deadline",
+                number((-rate * settings.deadline).exp())
+            ));
+        }
+        let report = begun.then(|| filter.report().barriers[i]);
+        let start = report.map(|b| StartReport { h: b.h, inside: b.h >= 0.0, guaranteed: b.guaranteed });
+        if start.as_ref().is_some_and(|s| !s.guaranteed) {
+            warn("nothing is guaranteed from this start".to_owned());
+        }
+        barriers.push(BarrierReport {
+            name: name.clone(),
+            shape: section.shape.name(),
+            unit,
+            relative_degree: degrees[i],
+            method,
+            deadline: settings.deadline,
+            rate,
+            rate_times_deadline: rate.map(|rate| rate * settings.deadline),
+            stay_rate: settings.stay_rate,
+            margin: settings.margin,
+            start,
+        });
+    }
+    let states = c.plant.model.states();
+    Ok(FilterReport {
+        kind: "filter",
+        name: c.name.clone(),
+        model: c.plant.model.name(),
+        step,
+        barriers,
+        start: start.map(|x0| states.iter().map(|s| s.name).zip(x0).collect()),
+        status,
+        warnings,
+    })
+}
+
+/// Anchors the filter at `x0` with u_ref = 0; the status in words.
+fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) -> Result<&'static str, Error> {
+    let u_ref = vec![0.0; inputs];
+    let mut u = u_ref.clone();
+    let report = filter.step(t, x0, &u_ref, &mut u);
+    let status = report.map_err(|e| Error::configuration(e.field(), e.message()))?.status;
+    Ok(describe(status).0)
+}
+
+fn plant(c: &PlantConfiguration) -> PlantReport {
+    let model = c.plant.model;
+    let signal = |s: &punctual_core::plants::Signal, start| SignalReport {
+        name: s.name,
+        unit: s.unit,
+        start,
+        description: s.description,
+    };
+    let step = c.experiment.step_size;
+    let substeps = c.integration.substeps(step);
+    PlantReport {
+        kind: "plant",
+        name: c.name.clone(),
+        model: model.name(),
+        states: model.states().iter().map(|s| signal(s, c.x0.get(s.name).copied())).collect(),
+        inputs: model.inputs().iter().map(|s| signal(s, None)).collect(),
+        step,
+        substeps: substeps as u64,
+        inner_step: step / substeps,
+    }
+}
+
+fn filter_text(report: &FilterReport) -> String {
+    let mut lines =
+        vec![format!("{}: filter for {}, steps of {} s", report.name, report.model, number(report.step))];
+    if let Some(start) = &report.start {
+        let state: Vec<_> =
+            start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();
+        lines.push(format!("start: {}", state.join(", ")));
+    }
+    if let Some(status) = &report.status {
+        lines.push(format!("first step with u_ref = 0: {status}"));
+    }
+    for b in &report.barriers {
+        lines.push(format!("\n{} ({})", b.name, b.shape));
+        let rate = match (b.rate, b.rate_times_deadline) {
+            (Some(rate), Some(product)) => {
+                format!("{} 1/s, times the deadline {}", number(rate), number(product))
+            }
+            _ => "chosen at the start".to_owned(),
+        };
+        let mut rows = vec![
+            ("relative degree", b.relative_degree.to_string()),
+            ("method", b.method.to_owned()),
+            ("deadline", format!("{} s", number(b.deadline))),
+            ("rate", rate),
+            ("stay rate", format!("{} 1/s", number(b.stay_rate))),
+            ("margin", format!("{} {}", number(b.margin), b.unit)),
+        ];
+        if let Some(start) = &b.start {
+            let side = if start.inside { "inside" } else { "outside" };
+            let promise = if start.guaranteed { "guaranteed" } else { "not guaranteed" };
+            rows.push(("start", format!("{side}, h = {} {}; {promise}", number(start.h), b.unit)));
+        }
+        lines.extend(rows.into_iter().map(|(name, value)| format!("  {name:<16} {value}")));
+    }
+    if !report.warnings.is_empty() {
+        lines.push(String::new());
+        lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
+    }
+    lines.join("\n")
+}
+
+fn plant_text(report: &PlantReport) -> String {
+    let mut rows = vec![["signal", "start", "unit", "meaning"].map(str::to_owned).to_vec()];
+    for (prefix, signals) in [("x", &report.states), ("u", &report.inputs)] {
+        rows.extend(signals.iter().map(|s| {
+            let start = s.start.map(number).unwrap_or_default();
+            vec![format!("{prefix}.{}", s.name), start, s.unit.to_owned(), s.description.to_owned()]
+        }));
+    }
+    format!(
+        "{}: plant, {}\n\n{}\n\nsteps of {} s; Runge-Kutta steps in each: {}, of {} s",
+        report.name,
+        report.model,
+        output::table(&rows, &[false, true]),
+        number(report.step),
+        report.substeps,
+        number(report.inner_step)
+    )
+}

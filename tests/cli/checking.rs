@@ -1,0 +1,142 @@
+//! `punctual check`: what it says of filters and plants, its warnings and its codes.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::workshop::{Workshop, assert_golden, examples};
+
+/// The example's filter and plant, the filter with edits.
+fn workshop(edits: &[(&str, &str)]) -> Workshop {
+    let workshop = Workshop::new();
+    let mut filter = fs::read_to_string(examples().join("unicycle-filter.toml")).expect("the example");
+    for (from, to) in edits {
+        assert_eq!(filter.matches(from).count(), 1, "{from:?} in {filter}");
+        filter = filter.replace(from, to);
+    }
+    workshop.write("filter.toml", filter);
+    workshop.write("plant.toml", fs::read(examples().join("unicycle-plant.toml")).expect("the example"));
+    workshop
+}
+
+fn warnings(workshop: &Workshop, arguments: &[&str]) -> Vec<String> {
+    let done = workshop.punctual(["check", "filter.toml", "--json"].iter().chain(arguments));
+    let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+    let warnings = report["warnings"].as_array().expect("a list").iter();
+    warnings.map(|w| w.as_str().expect("text").to_owned()).collect()
+}
+
+#[test]
+fn the_text_of_filter_and_plant() {
+    let workshop = workshop(&[]);
+    assert_golden("check-filter.txt", &workshop.punctual(["check", "filter.toml"]).success());
+    assert_golden("check-plant.txt", &workshop.punctual(["check", "plant.toml"]).success());
+    let from_plant = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]).success();
+    assert_golden("check-start.txt", &from_plant);
+}
+
+#[test]
+fn the_repeated_root_from_a_start() {
+    let root = ("margin = 0.02 ", "margin = 0.0\nmethod = \"repeated_root\"\nshape = \"quadratic_disc\"");
+    let workshop = workshop(&[root]);
+    let text = workshop.punctual(["check", "filter.toml", "--x0", "theta=0.5"]).success();
+    assert_golden("check-repeated-root.txt", &text);
+}
+
+#[test]
+fn the_json_tells_the_same() {
+    let workshop = workshop(&[]);
+    let text =
+        workshop.punctual(["check", "filter.toml", "--json", "--x0", "x_p=44, y_p = 45,v=-0.5"]).success();
+    let report: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&report["kind"], &report["model"]), (&"filter".into(), &"unicycle".into()));
+    assert_eq!(
+        report["start"],
+        serde_json::json!([["x_p", 44.0], ["y_p", 45.0], ["theta", 0.0], ["v", -0.5]])
+    );
+    assert_eq!(report["warnings"], Value::Array(vec![]));
+    let barrier = &report["barriers"][0];
+    assert_eq!((&barrier["relative_degree"], &barrier["rate_times_deadline"]), (&2.into(), &20.0.into()));
+    assert_eq!((&barrier["start"]["inside"], &barrier["start"]["guaranteed"]), (&true.into(), &true.into()));
+
+    let text = workshop.punctual(["check", "plant.toml", "--json"]).success();
+    let report: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&report["kind"], &report["substeps"]), (&"plant".into(), &1.into()));
+    assert_eq!((&report["states"][3]["name"], &report["states"][3]["unit"]), (&"v".into(), &"m/s".into()));
+}
+
+#[test]
+fn warnings_name_what_does_not_fit_the_step() {
+    let none: [String; 0] = [];
+    assert_eq!(warnings(&workshop(&[]), &[]), none);
+    let zero = workshop(&[("margin = 0.02 ", "margin = 0.0")]);
+    assert_eq!(
+        warnings(&zero, &[]),
+        ["goal: the margin is 0, so that an input held over 0.001 s can cost the deadline"]
+    );
+    let long = workshop(&[("step_size = 0.001", "step_size = 2.0"), ("deadline = 10.0", "deadline = 1.0")]);
+    assert_eq!(
+        warnings(&long, &[]),
+        [
+            "goal: rate times step is 40, more than 1: the error changes faster than the input",
+            "goal: stay_rate times step is 40, more than 1: the error changes faster than the input",
+            "goal: the deadline is shorter than the step of 2 s",
+        ]
+    );
+    let short = workshop(&[("stop_time = 20.0", "stop_time = 9.0")]);
+    assert_eq!(warnings(&short, &[]), ["goal: the experiment stops before the deadline"]);
+}
+
+/// Bounds that the start asks too much of: the promise cannot be given, and the code says so.
+#[test]
+fn a_start_without_a_guarantee_is_code_one() {
+    let workshop = workshop(&[("[experiment]", "[bounds]\na = [-0.01, 0.01]\n[experiment]")]);
+    let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(done.stdout.contains("first step with u_ref = 0: infeasible"), "{done:#?}");
+    assert!(done.stdout.ends_with("warning: goal: nothing is guaranteed from this start\n"), "{done:#?}");
+}
+
+/// Standing still and heading across the line to the goal: no input moves h at that instant.
+#[test]
+fn a_degenerate_start_is_code_one() {
+    let across = format!("theta={}", 0.75 * std::f64::consts::PI);
+    let done = workshop(&[]).punctual(["check", "filter.toml", "--x0", &across]);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(done.stdout.contains("first step with u_ref = 0: degenerate\n"), "{done:#?}");
+    assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");
+}
+
+#[test]
+fn a_mixed_relative_degree_is_refused() {
+    let workshop = workshop(&[("model = \"unicycle\"", "model = \"bicycle_small_slip\"")]);
+    workshop.punctual(["check", "filter.toml"]).fails(
+        2,
+        "filter.toml: barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, \
+         a enters derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
+         bicycle_kinematic",
+    );
+}
+
+#[test]
+fn starts_that_cannot_be_used() {
+    let workshop = workshop(&[]);
+    for (x0, message) in [
+        ("w=1", "--x0: \"w\" is no state, must be one of x_p, y_p, theta, v"),
+        ("v", "--x0: is \"v\", must be like \"v=1.5\""),
+        ("v=nan", "--x0: is \"v=nan\", must be a finite number"),
+    ] {
+        workshop.punctual(["check", "filter.toml", "--x0", x0]).fails(2, message);
+    }
+    workshop
+        .punctual(["check", "filter.toml", "--plant", "filter.toml"])
+        .fails(2, "filter.toml: kind: is \"filter\", must be \"plant\"");
+    workshop
+        .punctual(["check", "plant.toml", "--x0", "v=1"])
+        .fails(2, "plant.toml: kind: is a plant; --plant and --x0 give a start to a filter");
+    let point_mass = "kind = \"plant\"\nplant.model = \"point_mass\"\n";
+    workshop.write("other.toml", point_mass);
+    workshop
+        .punctual(["check", "filter.toml", "--plant", "other.toml"])
+        .fails(2, "other.toml: plant.model: has no state theta, which the filter measures");
+}

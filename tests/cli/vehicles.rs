@@ -1,0 +1,81 @@
+//! Goals that move, obstacles, and the finer bicycles, from configuration to CSV.
+
+use crate::table::Table;
+use crate::workshop::Workshop;
+
+const DEADLINE: f64 = 5.0;
+
+/// Builds filter and plant, couples them for 10 s with u_ref as in `connections`, returns the CSV.
+fn coupled(model: &str, barriers: &str, x0: &str, connections: &str) -> Table {
+    let workshop = Workshop::with_library();
+    let experiment = "[experiment]\nstop_time = 10.0\n";
+    workshop.write("f.toml", format!("kind = \"filter\"\nplant.model = \"{model}\"\n{barriers}{experiment}"));
+    workshop.write("p.toml", format!("kind = \"plant\"\nplant.model = \"{model}\"\nx0 = {x0}\n{experiment}"));
+    for name in ["f", "p"] {
+        workshop.punctual(["build", &format!("{name}.toml"), "-o", &format!("{name}.fmu")]).success();
+    }
+    let system = "[experiment]\nstop_time = 10.0\nstep = 0.001\n[[component]]\nname = \"f\"\nfmu = \"f.fmu\"\n\
+                  [[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n[[connect_by_name]]\ncomponents = [\"f\", \"p\"]\n";
+    workshop.write("s.toml", format!("{system}{connections}"));
+    workshop.punctual(["run", "s.toml", "--out", "out"]).success();
+    Table::parse(&workshop.text("out/s.csv"))
+}
+
+fn damping(from: &str, to: &str) -> String {
+    format!("[[connection]]\nfrom = \"p.x.{from}\"\nto = \"f.u_ref.{to}\"\nfactor = -1.0\n")
+}
+
+#[track_caller]
+fn every_step_is_satisfied(table: &Table) {
+    assert!(table.column("f.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
+}
+
+/// Where the disc is follows from the time, not from the filter's word for it.
+#[test]
+fn a_point_mass_meets_a_moving_disc_and_rides_along() {
+    let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 5.0]\nvelocity = [3.0, 1.0]\nradius = 2.0\n\
+                deadline = 5.0\n";
+    let damping = damping("v_x", "u_x") + &damping("v_y", "u_y");
+    let table = coupled("point_mass", goal, "{ v_x = -2.0, v_y = 1.0 }", &damping);
+    every_step_is_satisfied(&table);
+    let (time, x, y) = (table.column("time"), table.column("p.x.x_p"), table.column("p.x.y_p"));
+    for k in 0..time.len() {
+        let t = time[k];
+        let distance = (x[k] - 20.0 - 3.0 * t).hypot(y[k] - 5.0 - t);
+        assert!(t < DEADLINE || distance <= 2.0, "{distance} m from the centre at {t} s");
+    }
+}
+
+/// Without the rock the way to the goal leads through it.
+#[test]
+fn a_goal_behind_an_obstacle_that_comes_closer() {
+    let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 1.0]\nradius = 2.0\ndeadline = 5.0\n";
+    let rock = "[[barrier]]\nname = \"rock\"\nshape = \"obstacle\"\ncentre = [12.0, 0.0]\n\
+                velocity = [-0.5, 0.05]\nradius = 1.0\ndeadline = 5.0\n";
+    let damping = damping("v_x", "u_x") + &damping("v_y", "u_y");
+    let mut closest = [f64::INFINITY; 2];
+    for (closest, barriers) in closest.iter_mut().zip([goal.to_owned(), goal.to_owned() + rock]) {
+        let table = coupled("point_mass", &barriers, "{ v_x = 1.0 }", &damping);
+        every_step_is_satisfied(&table);
+        let (time, h) = (table.column("time"), table.column("f.goal.h"));
+        assert!((0..time.len()).all(|k| time[k] < DEADLINE || h[k] >= 0.0), "late, or left again");
+        let (x, y) = (table.column("p.x.x_p"), table.column("p.x.y_p"));
+        for k in 0..time.len() {
+            let distance = (x[k] - 12.0 + 0.5 * time[k]).hypot(y[k] - 0.05 * time[k]);
+            *closest = closest.min(distance);
+        }
+    }
+    assert!(closest[0] < 0.5 && closest[1] >= 1.0, "without and with the rock {closest:?} m from its centre");
+}
+
+#[test]
+fn bicycles_steered_by_rates_keep_the_deadline() {
+    for (model, angle) in [("bicycle_kinematic", "delta"), ("bicycle_small_slip_rate", "beta")] {
+        let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 10.0]\nradius = 2.0\ndeadline = 5.0\n";
+        let damping = damping("v", "a") + &damping(angle, &format!("{angle}_rate"));
+        let table = coupled(model, goal, "{ theta = 0.4, v = 3.0 }", &damping);
+        every_step_is_satisfied(&table);
+        let (time, h) = (table.column("time"), table.column("f.goal.h"));
+        assert!((0..time.len()).all(|k| time[k] < DEADLINE || h[k] >= 0.0), "{model}: late, or left again");
+    }
+}
