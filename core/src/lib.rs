@@ -44,7 +44,7 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`filter`];
-//! [`plants`], [`barriers`] and [`simulation`] are reference material beside it.
+//! [`plants`], [`barriers`], [`nominal`] and [`simulation`] are reference material beside it.
 //!
 //! # References
 //!
@@ -62,6 +62,7 @@ mod error;
 pub mod filter;
 pub mod jet;
 pub mod lie;
+pub mod nominal;
 pub mod plants;
 pub mod qp;
 pub mod scalar;

@@ -14,7 +14,10 @@
 //! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off; (3) is checked at
 //! every evaluation, since an input that enters earlier invalidates every constraint built for n.
 
+mod ahead;
 mod degree;
+
+pub use ahead::{Ahead, SUBSTEPS, flow};
 
 use std::marker::PhantomData;
 
@@ -89,6 +92,18 @@ pub trait DerivativeSource: Send {
 
     /// Writes the derivatives at time `t` (s) and state `x` (of [`Self::state_dim`] components).
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives);
+
+    /// Moves `x` by `duration` seconds under the held input `u`, if the source knows the plant. The
+    /// default does not: it leaves `x` alone and returns false.
+    fn predict(&self, _x: &mut [f64], _u: &[f64], _duration: f64) -> bool {
+        false
+    }
+
+    /// Writes the derivatives of h `duration` seconds after `t` and `x` along the held input `u`, if the
+    /// source knows the plant; at time `t + duration`. The default does not: it returns false.
+    fn ahead(&self, _t: f64, _x: &[f64], _u: &[f64], _duration: f64, _out: &mut Ahead) -> bool {
+        false
+    }
 }
 
 /// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken.
@@ -129,6 +144,18 @@ where
                 out.lower_sensitivity += derivative.gradient.iter().map(|d| d.abs()).sum::<f64>();
             }
         }
+    }
+
+    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
+        let (from, held) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
+        x.copy_from_slice(flow(&self.plant, &from, &held, duration, SUBSTEPS).as_slice());
+        true
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
+        let x = SVector::from_column_slice(x);
+        ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
+        true
     }
 }
 

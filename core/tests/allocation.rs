@@ -9,7 +9,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use punctual_core::convergence::repeated_root;
-use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Sampling, Status};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::Solver;
 use scenario::{distance_disc, one, quadratic_disc};
@@ -68,12 +68,21 @@ fn filters() -> Vec<(&'static str, SafetyFilter)> {
         .and_then(|b| b.bounds(&[-5.0, -5.0], &[5.0, 5.0]))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");
+    let sampled = |sampling: Sampling| {
+        SafetyFilter::builder(4, 2)
+            .barrier("goal", Unicycle, distance_disc(), settings)
+            .and_then(|b| b.sampling(sampling))
+            .and_then(punctual_core::filter::FilterBuilder::build)
+            .expect("valid filter")
+    };
     let bicycle = Bicycle::new(10.0).expect("valid bicycle");
     vec![
         ("point mass", one(PointMass, distance_disc(), settings)),
         ("unicycle", one(Unicycle, distance_disc(), settings)),
         ("bicycle, repeated root", one(bicycle, quadratic_disc(), repeated)),
         ("point mass, bounded", bounded),
+        ("unicycle, sampled", sampled(Sampling::Period(0.005))),
+        ("unicycle, measured period", sampled(Sampling::Measured)),
     ]
 }
 

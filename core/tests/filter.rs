@@ -123,7 +123,10 @@ fn anchoring_waits_for_the_first_valid_sample() {
             assert_eq!(report.barriers[0].phase, Phase::Waiting);
             // The admissible input nearest 0.
             assert_eq!(u, [1.0, 0.0], "{bad} at {place}");
-            assert_eq!(*filter.state(), FilterState { barriers: vec![Default::default()] });
+            assert_eq!(
+                *filter.state(),
+                FilterState { barriers: vec![Default::default()], ..Default::default() }
+            );
         }
     }
     step(&mut filter, 17.0, &good);

@@ -155,11 +155,11 @@ fn wrong_dimensions_are_refused_at_the_step_and_leave_everything_as_it_was() {
     refused(filter.peek(0.0, &x, &r, &mut u).cloned(), dimension, "u: has 3 components, must have 2");
     assert_eq!(u, [7.0; 3]);
     refused(
-        filter.restore(&FilterState { barriers: vec![Default::default(); 2] }),
+        filter.restore(&FilterState { barriers: vec![Default::default(); 2], ..Default::default() }),
         dimension,
         "barriers: has 2 components, must have 1",
     );
-    assert_eq!(*filter.state(), FilterState { barriers: vec![Default::default()] });
+    assert_eq!(*filter.state(), FilterState { barriers: vec![Default::default()], ..Default::default() });
 }
 
 #[test]

@@ -5,12 +5,13 @@
 //! bands are those of the figures, far above what another platform's round-off changes.
 
 mod chains;
+mod sampling;
 mod starts;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{self, SVector, vector};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::simulation::{Schedule, closed_loop};
@@ -78,8 +79,41 @@ where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
     B: Barrier<4> + Send + 'static,
 {
+    run_as(Scheme::default(), plant, barrier, settings, nominal, step, x0)
+}
+
+/// What the filter is built with beside its barrier.
+#[derive(Clone, Copy, Debug)]
+struct Scheme {
+    sampling: Sampling,
+    /// Bounds on |u_1| and |u_2|.
+    bounds: [f64; 2],
+}
+
+impl Default for Scheme {
+    fn default() -> Self {
+        Self { sampling: Sampling::Pointwise, bounds: [f64::INFINITY; 2] }
+    }
+}
+
+/// As [`run`], by this scheme.
+fn run_as<P, B>(
+    scheme: Scheme,
+    plant: &P,
+    barrier: B,
+    settings: BarrierSettings,
+    nominal: Nominal,
+    step: f64,
+    x0: [f64; 4],
+) -> Run
+where
+    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    B: Barrier<4> + Send + 'static,
+{
     let mut filter = SafetyFilter::builder(4, 2)
         .barrier("goal", plant.clone(), barrier, settings)
+        .and_then(|b| b.sampling(scheme.sampling))
+        .and_then(|b| b.bounds(&scheme.bounds.map(|v| -v), &scheme.bounds))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut run =

@@ -9,10 +9,10 @@ use super::{Nominal, Run, bicycle, coast, damp_speed, damp_velocity, distance, q
 /// Uniform in [0, 20] × [0, 20] × [−10, 10] × [−10, 10], in the order of each model's states.
 const STARTS: &str = include_str!("../data/starts100.csv");
 
-const DEADLINE: f64 = 5.0;
+pub(super) const DEADLINE: f64 = 5.0;
 const STEP: f64 = 1e-3;
 
-fn starts() -> Vec<[f64; 4]> {
+pub(super) fn starts() -> Vec<[f64; 4]> {
     let rows = STARTS.lines().skip(1).map(|line| {
         let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
         numbers.try_into().expect("four numbers")
@@ -21,7 +21,7 @@ fn starts() -> Vec<[f64; 4]> {
 }
 
 /// Starts from the same box, drawn here: the figures must not hang on one file.
-fn drawn(count: usize) -> Vec<[f64; 4]> {
+pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
     let mut state = 2507_13888_u64;
     // SplitMix64 (Steele, Lea and Flood, 2014), its upper 53 bits as a number in [0, 1).
     let mut uniform = move || {
@@ -45,13 +45,13 @@ where
 }
 
 /// The value at `part` of the sorted peaks.
-fn quantile(runs: &[Run], part: f64) -> f64 {
+pub(super) fn quantile(runs: &[Run], part: f64) -> f64 {
     let mut peaks: Vec<f64> = runs.iter().map(|r| r.peak).collect();
     peaks.sort_by(f64::total_cmp);
     peaks[((peaks.len() - 1) as f64 * part).round() as usize]
 }
 
-fn assert_all_keep_the_deadline(name: &str, runs: &[Run], starts: &[[f64; 4]]) {
+pub(super) fn assert_all_keep_the_deadline(name: &str, runs: &[Run], starts: &[[f64; 4]]) {
     let on_time = runs.iter().filter(|r| r.on_time(DEADLINE)).count();
     let inside = runs.iter().filter(|r| r.least_after >= 0.0).count();
     let lost = runs.iter().zip(starts).find(|(r, _)| !r.on_time(DEADLINE) || r.least_after < 0.0);

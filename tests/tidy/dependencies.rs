@@ -153,7 +153,7 @@ fn modules_of_the_core_use_modules_above_them() {
         &["lie"],
         &["convergence", "qp"],
         &["filter"],
-        &["plants", "barriers", "baselines"],
+        &["plants", "barriers", "baselines", "nominal"],
         &["simulation"],
     ]);
     Order { folder: "core/src/", lines, excepted: &[] }.check();

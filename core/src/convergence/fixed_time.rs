@@ -8,6 +8,9 @@ use super::stay;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, non_negative, positive};
 
+/// Round-off of h − μ − r, as a part of its terms.
+const MARGIN_TOLERANCE: f64 = 1e-12;
+
 /// How the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -34,6 +37,10 @@ pub struct FixedTimeSettings {
     pub stay_rate: f64,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside.
     pub margin: f64,
+    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
+    /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
+    /// ([`Phase::Left`]) and the stay constraint pulls back, without a deadline.
+    pub recovery: Option<f64>,
 }
 
 impl FixedTimeSettings {
@@ -44,7 +51,7 @@ impl FixedTimeSettings {
     /// 20/T, no margin.
     pub fn within(deadline: f64) -> Self {
         let rate = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
-        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0 }
+        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0, recovery: None }
     }
 
     fn validated(self, n: usize) -> Result<Self, Error> {
@@ -66,6 +73,9 @@ impl FixedTimeSettings {
         positive("rate", self.rate)?;
         positive("stay_rate", self.stay_rate)?;
         non_negative("margin", self.margin)?;
+        if let Some(recovery) = self.recovery {
+            positive("recovery", recovery)?;
+        }
         Ok(self)
     }
 }
@@ -83,7 +93,8 @@ pub enum Phase {
     Late = 2,
     /// Inside, under the stay constraint.
     Stay = 3,
-    /// Outside again after having been inside; the stay constraint pulls back, without a deadline.
+    /// Outside again after having been inside, with no recovery time set; the stay constraint pulls
+    /// back, without a deadline.
     Left = 4,
 }
 
@@ -94,6 +105,10 @@ pub struct FixedTimeState {
     pub phase: Phase,
     /// Time of the anchor, t₀ in s.
     pub anchor_time: f64,
+    /// T in s, counted from the anchor.
+    pub deadline: f64,
+    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
+    pub recoveries: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor.
@@ -102,6 +117,8 @@ pub struct FixedTimeState {
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied (whoever enforces the row clears this if not).
+    /// With a margin, an approach also loses it where a sample shows that held inputs have used up the
+    /// margin (h below the profile); without one it is of the continuous-time constraint only.
     pub guaranteed: bool,
 }
 
@@ -119,8 +136,8 @@ pub struct Demand {
 /// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedTime {
-    n: usize,
-    settings: FixedTimeSettings,
+    pub(super) n: usize,
+    pub(super) settings: FixedTimeSettings,
 }
 
 impl FixedTime {
@@ -142,18 +159,26 @@ impl FixedTime {
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
     /// returns what the constraint asks for there.
     ///
-    /// The first call anchors. Arrival is the first sample with h ≥ 0; the stay constraint takes over
+    /// The first call anchors, as [`Self::anchor`] with the configured deadline does. Arrival is the first sample with h ≥ 0; the stay constraint takes over
     /// at the first sample at which h ≥ μ *and* it is invariant from there ([`stay::is_invariant`]).
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
-        let FixedTimeSettings { deadline, stay_rate, margin, .. } = self.settings;
+        let FixedTimeSettings { stay_rate, margin, .. } = self.settings;
+        if state.phase == Phase::Waiting {
+            self.anchor(state, t, h, self.settings.deadline);
+        }
         let mut e = [0.0; MAX_RELATIVE_DEGREE];
         e[..self.n].copy_from_slice(&h[..self.n]);
         e[0] -= margin;
         let e = &e[..self.n];
 
-        if state.phase == Phase::Waiting {
-            *state = self.anchored(t, e);
+        if let Some(recovery) = self.settings.recovery
+            && state.phase == Phase::Stay
+            && h[0] < 0.0
+        {
+            self.anchor(state, t, h, recovery);
+            state.recoveries += 1;
         }
+        let deadline = state.deadline;
         let elapsed = (t - state.anchor_time).max(0.0);
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
@@ -192,26 +217,37 @@ impl FixedTime {
         if self.settings.method != Method::RepeatedRoot || state.phase == Phase::Waiting {
             return None;
         }
-        repeated_root::rate(&state.anchor[..self.n], self.settings.deadline).err()
+        repeated_root::rate(&state.anchor[..self.n], state.deadline).err()
     }
 
-    /// The state at the anchor: the approach with its rate.
-    fn anchored(&self, t: f64, e: &[f64]) -> FixedTimeState {
+    /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
+    /// be reached within `deadline` seconds from there. A deadline ≤ 0 is past already: nothing is
+    /// guaranteed, the phase of the next [`Self::advance`] is [`Phase::Late`] where h < 0, and the target
+    /// is h = μ at once, approached with the rate. The count of recoveries goes on.
+    pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64) {
         let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
-        anchor[..self.n].copy_from_slice(e);
+        anchor[..self.n].copy_from_slice(&h[..self.n]);
+        anchor[0] -= self.settings.margin;
         let rate = match self.settings.method {
+            _ if deadline <= 0.0 => None,
             Method::ReferenceProfile => Some(self.settings.rate),
-            Method::RepeatedRoot => repeated_root::rate(e, self.settings.deadline).ok(),
-            Method::FirstOrder(exponent) => Some(exponent.rate(self.settings.deadline)),
+            Method::RepeatedRoot => repeated_root::rate(&anchor[..self.n], deadline).ok(),
+            Method::FirstOrder(exponent) => Some(exponent.rate(deadline)),
         };
-        FixedTimeState {
+        let fallback = match self.settings.method {
+            Method::ReferenceProfile => self.settings.rate,
+            Method::RepeatedRoot | Method::FirstOrder(_) => self.settings.stay_rate,
+        };
+        *state = FixedTimeState {
             phase: Phase::Approach,
             anchor_time: t,
+            deadline,
+            recoveries: state.recoveries,
             anchor,
-            rate: rate.unwrap_or(self.settings.stay_rate),
+            rate: rate.unwrap_or(fallback),
             arrival: None,
             guaranteed: rate.is_some(),
-        }
+        };
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
@@ -220,21 +256,26 @@ impl FixedTime {
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
             Method::FirstOrder(exponent) => {
-                let deadline = self.settings.deadline;
+                let deadline = state.deadline;
                 let bound = exponent.lower_bound(anchor[0], deadline, elapsed);
                 // The comparison can start at any sample that is not below the bound.
                 state.guaranteed |= elapsed < deadline && e[0] >= bound;
                 (exponent.floor(anchor[0], deadline, e[0]), bound)
             }
             Method::ReferenceProfile => {
-                let r = HermiteProfile::new(anchor, self.settings.deadline).evaluate(elapsed);
+                let r = HermiteProfile::new(anchor, state.deadline).evaluate(elapsed);
                 let mut error = [0.0; MAX_RELATIVE_DEGREE];
                 for k in 0..self.n {
                     error[k] = e[k] - r[k];
                 }
                 let error = &error[..self.n];
+                // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
+                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + self.settings.margin);
+                if self.settings.margin > 0.0 && error[0] < -self.settings.margin - scale {
+                    state.guaranteed = false;
+                }
                 // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed |= elapsed < self.settings.deadline && stay::is_invariant(state.rate, error);
+                state.guaranteed |= elapsed < state.deadline && stay::is_invariant(state.rate, error);
                 (r[self.n] - lower_terms(state.rate, error), r[0])
             }
         }

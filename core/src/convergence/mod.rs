@@ -13,7 +13,8 @@
 //! | [`stay`] | h − μ | a ≥ [`stay::smallest_rate`] | h ≥ μ for ever | all c_k(a) ≥ 0 |
 //!
 //! The promises hold for the continuous-time constraint. An input that is held between samples
-//! breaks the constraint by up to its change over one period, which the margin μ has to absorb.
+//! breaks the constraint by up to its change over one period, which the margin μ has to absorb;
+//! [`sampled`] is the form of the constraint for such an input, which loses far less.
 
 pub mod comparison;
 pub mod first_order;
@@ -23,6 +24,7 @@ pub mod operator;
 pub mod polynomial;
 pub mod profile;
 pub mod repeated_root;
+pub mod sampled;
 pub mod stay;
 
 pub use fixed_time::{Demand, FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase};

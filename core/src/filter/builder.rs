@@ -2,12 +2,13 @@
 
 use nalgebra::SVector;
 
-use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Workspace};
+use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Sampling, Workspace};
 use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
+use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
-use crate::error::{Error, ErrorKind, length, positive};
+use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource, Derivatives};
 use crate::qp::{Bounds, Row};
 
@@ -18,6 +19,8 @@ pub struct FilterBuilder {
     channels: Vec<Channel>,
     bounds: Bounds,
     correction_limit: f64,
+    sampling: Sampling,
+    delay: f64,
 }
 
 impl FilterBuilder {
@@ -31,6 +34,8 @@ impl FilterBuilder {
             channels: Vec::new(),
             bounds: Bounds::NONE,
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
+            sampling: Sampling::default(),
+            delay: 0.0,
         }
     }
 
@@ -160,13 +165,41 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// How inputs that are held between samples are accounted for. Default:
+    /// [`Sampling::Pointwise`].
+    ///
+    /// # Errors
+    ///
+    /// A period that is not finite or ≤ 0.
+    pub fn sampling(mut self, sampling: Sampling) -> Result<Self, Error> {
+        self.sampling = sampling.validated()?;
+        Ok(self)
+    }
+
+    /// The time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
+    /// master that exchanges all values first (Jacobi). Default: 0.
+    ///
+    /// The input of the step before is taken to act until then (0, or the nearest admissible input, before
+    /// the first), so the delay must not exceed the sampling period. The constraint is enforced from the
+    /// predicted state at t + delay on; every barrier report but its [`h`](super::BarrierReport::h) is of
+    /// that time. Deadlines count from the first sample itself.
+    ///
+    /// # Errors
+    ///
+    /// A delay that is not finite or < 0.
+    pub fn actuation_delay(mut self, delay: f64) -> Result<Self, Error> {
+        self.delay = non_negative("actuation_delay", delay)?;
+        Ok(self)
+    }
+
     /// The filter, not yet anchored.
     ///
     /// # Errors
     ///
-    /// No barrier; no state or input, or more than [`MAX_INPUTS`] inputs.
+    /// No barrier; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
+    /// a given sampling period, or that a source cannot predict over.
     pub fn build(self) -> Result<SafetyFilter, Error> {
-        let Self { state_dim, input_dim, channels, bounds, correction_limit } = self;
+        let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling, delay } = self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if channels.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
@@ -177,13 +210,42 @@ impl FilterBuilder {
         if input_dim == 0 || input_dim > MAX_INPUTS {
             return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
         }
-        let state = FilterState { barriers: vec![FixedTimeState::default(); channels.len()] };
+        if let Sampling::Period(period) = sampling
+            && delay > period
+        {
+            let message = format!("is {delay}, must be <= sampling_period = {period}");
+            return Err(Error::new(ErrorKind::Range, "actuation_delay", message));
+        }
+        let mut predicted = vec![0.0; state_dim];
+        let held = vec![0.0; input_dim];
+        for channel in channels.iter().filter(|_| delay > 0.0) {
+            if !channel.source.predict(&mut predicted, &held, delay) {
+                let message = "the barrier's source of derivatives cannot predict the state";
+                return Err(
+                    Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&channel.name)
+                );
+            }
+        }
+        let barriers = vec![FixedTimeState::default(); channels.len()];
+        let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {
             derivatives: Derivatives::ZERO,
             rows: vec![Row::ZERO; channels.len()],
+            demands: vec![SampledDemand::ZERO; channels.len()],
             next: state.clone(),
+            predicted: vec![0.0; state_dim * channels.len()],
             report: Report::new(channels.len()),
         };
-        Ok(SafetyFilter { state_dim, input_dim, channels, bounds, correction_limit, state, workspace })
+        Ok(SafetyFilter {
+            state_dim,
+            input_dim,
+            channels,
+            bounds,
+            correction_limit,
+            sampling,
+            delay,
+            state,
+            workspace,
+        })
     }
 }

@@ -7,32 +7,45 @@
 
 mod builder;
 mod report;
+mod sampling;
 
 pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase};
 pub use builder::FilterBuilder;
 pub use report::{BarrierReport, Report, Status};
+pub use sampling::Sampling;
 
+use crate::MAX_INPUTS;
 use crate::convergence::repeated_root::NoAdmissibleRate;
+use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::error::{Error, length};
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Outcome, Row};
+use sampling::Held;
 
-/// What a filter remembers between samples: one promise per barrier.
+/// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
 #[derive(Debug, Default, PartialEq)]
 pub struct FilterState {
     /// In the order of the barriers.
     pub barriers: Vec<FixedTimeState>,
+    /// Time of the last sample with valid inputs, in s.
+    pub time: Option<f64>,
+    /// The measured sampling period in s, under [`Sampling::Measured`] from the second sample on.
+    pub period: Option<f64>,
+    /// The input handed out at [`Self::time`]; zeros above the number of inputs.
+    pub input: [f64; MAX_INPUTS],
 }
 
 impl Clone for FilterState {
     fn clone(&self) -> Self {
-        Self { barriers: self.barriers.clone() }
+        Self { barriers: self.barriers.clone(), ..*self }
     }
 
     /// Reuses the memory, which a derived `Clone` would not: a step must not allocate.
     fn clone_from(&mut self, source: &Self) {
-        self.barriers.clone_from(&source.barriers);
+        let Self { barriers, time, period, input } = source;
+        self.barriers.clone_from(barriers);
+        (self.time, self.period, self.input) = (*time, *period, *input);
     }
 }
 
@@ -47,7 +60,10 @@ struct Channel {
 struct Workspace {
     derivatives: Derivatives,
     rows: Vec<Row>,
+    demands: Vec<SampledDemand>,
     next: FilterState,
+    /// The state from which each barrier is held, one after the other.
+    predicted: Vec<f64>,
     report: Report,
 }
 
@@ -70,6 +86,8 @@ pub struct SafetyFilter {
     channels: Vec<Channel>,
     bounds: Bounds,
     correction_limit: f64,
+    sampling: Sampling,
+    delay: f64,
     state: FilterState,
     workspace: Workspace,
 }
@@ -125,7 +143,8 @@ impl SafetyFilter {
         length("x", x.len(), self.state_dim)?;
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        let Workspace { derivatives, rows, next, report } = &mut self.workspace;
+        let (begin, acting) = (t + self.delay, self.acting());
+        let Workspace { derivatives, rows, demands, next, predicted, report } = &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
         if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
@@ -134,20 +153,39 @@ impl SafetyFilter {
             return Ok(());
         }
 
+        let period = self.sampling.period(&self.state, t);
+        let mut sampled = period;
         for (i, channel) in self.channels.iter().enumerate() {
-            // Evaluate: h and its derivatives along the plant.
+            // Evaluate: h and its derivatives along the plant, where the input begins to act.
             channel.source.evaluate(t, x, derivatives);
+            let h = derivatives.drift[0];
+            let from = &mut predicted[i * x.len()..(i + 1) * x.len()];
+            from.copy_from_slice(x);
+            if self.delay > 0.0 {
+                channel.source.predict(from, &acting[..u.len()], self.delay);
+                channel.source.evaluate(begin, from, derivatives);
+            }
             let n = channel.source.relative_degree();
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
-            report_b.h = derivatives.drift[0];
+            report_b.h = h;
             if let Some(status) = defect(derivatives) {
                 report.status = status;
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
-            let demand = channel.promise.advance(promise, t, &derivatives.drift[..n]);
+            if promise.phase == Phase::Waiting {
+                let deadline = channel.promise.settings().deadline - self.delay;
+                channel.promise.anchor(promise, begin, &derivatives.drift[..n], deadline);
+            }
+            let demand = channel.promise.advance(promise, begin, &derivatives.drift[..n]);
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
+            if let Some(period) = period {
+                match channel.promise.over_period(promise, begin, &derivatives.drift[..n], period) {
+                    Some(demand) => demands[i] = demand,
+                    None => sampled = None,
+                }
+            }
             report_b.row = rows[i];
             report_b.profile = demand.profile;
             report_b.time_left = demand.time_left;
@@ -162,7 +200,24 @@ impl SafetyFilter {
         }
 
         // Solve, and report what came of it.
-        let solution = qp::solve(rows, &self.bounds, u_ref, self.correction_limit, u);
+        let limit = self.correction_limit;
+        let held = sampled.and_then(|period| {
+            report.period = period;
+            let (channels, bounds) = (&self.channels[..], &self.bounds);
+            let (t, x) = (begin, &predicted[..]);
+            let held = Held { channels, demands, t, x, period, bounds, u_ref, correction_limit: limit };
+            let last = self.state.time.map(|_| &self.state.input[..u.len()]);
+            held.solve(rows, last, u)
+        });
+        report.predicted = held.is_some();
+        let solution = held.unwrap_or_else(|| {
+            for (row, b) in rows.iter_mut().zip(&report.barriers) {
+                *row = b.row;
+            }
+            qp::solve(rows, &self.bounds, u_ref, limit, u)
+        });
+        (next.time, next.period) = (Some(t), period.filter(|_| self.sampling == Sampling::Measured));
+        next.input[..u.len()].copy_from_slice(u);
         report.solver = solution.solver;
         report.iterations = solution.iterations;
         report.status = match solution.outcome {
@@ -174,6 +229,11 @@ impl SafetyFilter {
         };
         for (i, row) in rows.iter().enumerate() {
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+            if let Some(period) = period.filter(|_| report.predicted) {
+                let n = self.channels[i].source.relative_degree();
+                report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period, n);
+            }
+            report_b.row = *row;
             report_b.slack = row.slack(u);
             if !report.status.is_satisfied() && !row.holds(u) {
                 promise.guaranteed = false;
@@ -183,9 +243,19 @@ impl SafetyFilter {
         Ok(())
     }
 
+    /// The input that acts until that of the present step does.
+    fn acting(&self) -> [f64; MAX_INPUTS] {
+        match self.state.time {
+            Some(_) => self.state.input,
+            None => std::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
+        }
+    }
+
     /// Forgets the anchors: the next sample with valid inputs starts every deadline anew.
     pub fn rearm(&mut self) {
         self.state.barriers.fill(FixedTimeState::default());
+        (self.state.time, self.state.period) = (None, None);
+        self.state.input.fill(0.0);
     }
 
     /// What the filter remembers.

@@ -67,10 +67,17 @@ pub struct BarrierReport {
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
-    /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ.
+    /// How often leaving the set has re-armed the deadline (the settings' `recovery`).
+    pub recoveries: u32,
+    /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ. Where the step looked
+    /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
     pub slack: f64,
+    /// How far h may fall below its promise within the period because the input is held, `[h]`: what
+    /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not
+    /// look over the period.
+    pub sampling_loss: f64,
 }
 
 impl BarrierReport {
@@ -82,8 +89,10 @@ impl BarrierReport {
         arrived: false,
         arrival_time: None,
         guaranteed: false,
+        recoveries: 0,
         row: Row::ZERO,
         slack: 0.0,
+        sampling_loss: 0.0,
     };
 
     /// Fills in what the promise remembers.
@@ -92,6 +101,7 @@ impl BarrierReport {
         self.arrival_time = promise.arrival;
         self.arrived = promise.arrival.is_some();
         self.guaranteed = promise.guaranteed;
+        self.recoveries = promise.recoveries;
     }
 }
 
@@ -106,6 +116,11 @@ pub struct Report {
     pub solver: Solver,
     /// Iterations of the interior-point method, else 0.
     pub iterations: u32,
+    /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.
+    pub period: f64,
+    /// Whether the constraint was enforced over the period, with the state at its end predicted by the
+    /// model; false also where a source cannot predict.
+    pub predicted: bool,
     /// One entry per barrier, in the order they were added.
     pub barriers: Vec<BarrierReport>,
 }
@@ -117,6 +132,8 @@ impl Report {
             status: Status::Unchanged,
             solver: Solver::Unchanged,
             iterations: 0,
+            period: 0.0,
+            predicted: false,
             barriers: vec![BarrierReport::BLANK; barriers],
         }
     }
@@ -126,6 +143,8 @@ impl Report {
         self.status = Status::Unchanged;
         self.solver = Solver::Unchanged;
         self.iterations = 0;
+        self.period = 0.0;
+        self.predicted = false;
         self.barriers.fill(BarrierReport::BLANK);
     }
 }

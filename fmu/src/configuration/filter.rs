@@ -186,6 +186,7 @@ impl BarrierSection {
             rate,
             stay_rate: default(self.stay_rate, rate),
             margin: self.margin.unwrap_or(0.0),
+            recovery: None,
         }
     }
 }

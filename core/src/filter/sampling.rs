@@ -1,0 +1,222 @@
+//! What a held input does until the next sample: the sampled form of the rows, and the search for an
+//! input that meets it.
+//!
+//! The row of the pointwise constraint is affine in u; its integral over the period
+//! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
+//! through the plant. It is solved by Newton's method on the rows: linearise them at the present
+//! guess, solve the quadratic programme, and go towards its answer as far as the violation decreases
+//! (halving the way). The guesses start from the answer of the pointwise rows and from the input of the
+//! step before; the better result is taken, by violation and then by distance from u_ref. The
+//! second guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries
+//! the turn that was begun on through the instants at which the linearisation cannot see it.
+
+use super::{Channel, FilterState};
+use crate::MAX_INPUTS;
+use crate::convergence::sampled::SampledDemand;
+use crate::error::{Error, positive};
+use crate::lie::Ahead;
+use crate::qp::{self, Bounds, Outcome, Row, Solution, Solver};
+
+/// How the filter accounts for inputs that are held between samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Sampling {
+    /// Not at all: the constraint is enforced at the samples, and the margin has to cover what the held
+    /// input costs, Mδ/aⁿ.
+    #[default]
+    Pointwise,
+    /// The constraint is enforced over the period since the step before, taken as the next one's length.
+    /// After a gap the period at most doubles from step to step. Pointwise at the first step.
+    Measured,
+    /// The constraint is enforced over this period in s, finite, > 0.
+    Period(f64),
+}
+
+impl Sampling {
+    pub(super) fn validated(self) -> Result<Self, Error> {
+        if let Self::Period(period) = self {
+            positive("sampling_period", period)?;
+        }
+        Ok(self)
+    }
+
+    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint; and what of
+    /// it is to be remembered.
+    pub(super) fn period(self, state: &FilterState, t: f64) -> Option<f64> {
+        match self {
+            Self::Pointwise => None,
+            Self::Period(period) => Some(period),
+            Self::Measured => {
+                let since = t - state.time?;
+                match state.period {
+                    // A sample at the same time, or an earlier one, says nothing new.
+                    known if since <= 0.0 => known,
+                    Some(known) => Some(since.min(2.0 * known)),
+                    None => Some(since),
+                }
+            }
+        }
+    }
+}
+
+/// Violations up to this part of a row's terms count as met: what Newton's method leaves.
+const MET: f64 = 1e-9;
+/// Linearisations per guess.
+const ITERATIONS: u32 = 12;
+/// Halvings of the way to the answer of one linearisation.
+const HALVINGS: u32 = 8;
+/// The part of the decrease that the linearisation foretells which must come true.
+const SUFFICIENT: f64 = 0.3;
+
+/// One sampled problem: where it starts and what it asks for.
+pub(super) struct Held<'a> {
+    pub(super) channels: &'a [Channel],
+    pub(super) demands: &'a [SampledDemand],
+    pub(super) t: f64,
+    /// The state of each barrier, one after the other.
+    pub(super) x: &'a [f64],
+    pub(super) period: f64,
+    pub(super) bounds: &'a Bounds,
+    pub(super) u_ref: &'a [f64],
+    pub(super) correction_limit: f64,
+}
+
+impl Held<'_> {
+    /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
+    /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
+    /// them, where a source cannot predict or its prediction is not finite.
+    pub(super) fn solve(&self, rows: &mut [Row], last: Option<&[f64]>, u: &mut [f64]) -> Option<Solution> {
+        let m = u.len();
+        let mut pointwise = [0.0; MAX_INPUTS];
+        let pointwise = &mut pointwise[..m];
+        let first = qp::solve(rows, self.bounds, self.u_ref, self.correction_limit, pointwise);
+        for (i, ui) in u.iter_mut().enumerate() {
+            *ui = self.bounds.clamp(i, self.u_ref[i]);
+        }
+        // Nothing to do where u_ref meets the sampled rows.
+        if self.violation(u, rows)? <= 0.0 {
+            return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
+        }
+        let mut best: Option<Guess> = None;
+        let mut guess = [0.0; MAX_INPUTS];
+        for start in [Some(&*pointwise), last].into_iter().flatten() {
+            guess[..m].copy_from_slice(start);
+            if let Some(found) = self.newton(&mut guess[..m], rows)
+                && best.as_ref().is_none_or(|b| found.better_than(b))
+            {
+                u.copy_from_slice(&guess[..m]);
+                best = Some(found);
+            }
+        }
+        let best = best?;
+        self.violation(u, rows)?;
+        let outcome = match best.outcome {
+            _ if best.violation <= 0.0 => Outcome::Optimal,
+            // The linearised rows can be met, the rows themselves could not.
+            Outcome::Optimal => Outcome::Degenerate,
+            other => other,
+        };
+        Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
+    }
+
+    /// Writes the sampled rows linearised at `u` and returns the largest violation, 0 if all are met, in
+    /// units of the terms of its row. `None` where there is no finite prediction.
+    fn violation(&self, u: &[f64], rows: &mut [Row]) -> Option<f64> {
+        let mut worst: f64 = 0.0;
+        let mut ahead = Ahead::ZERO;
+        let states = self.x.chunks_exact(self.x.len() / self.channels.len());
+        for (((channel, demand), x), row) in self.channels.iter().zip(self.demands).zip(states).zip(rows) {
+            let known = channel.source.ahead(self.t, x, u, self.period, &mut ahead);
+            if !known || !ahead.is_finite() {
+                return None;
+            }
+            let n = channel.source.relative_degree();
+            let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
+            let mut normal = [0.0; MAX_INPUTS];
+            for k in 0..n {
+                let weight = demand.weights[k];
+                value += weight * ahead.value[k];
+                terms += (weight * ahead.value[k]).abs();
+                for (a, d) in normal.iter_mut().zip(&ahead.gradient[k]) {
+                    *a += weight * d / self.period;
+                }
+            }
+            // Divided by the period, the row is one on h⁽ⁿ⁾ as the pointwise one.
+            value /= self.period;
+            let at_u: f64 = normal.iter().zip(u).map(|(a, v)| a * v).sum();
+            *row = Row { normal, floor: at_u - value };
+            if !row.floor.is_finite() {
+                return None;
+            }
+            let terms = terms / self.period;
+            if value < -MET * terms {
+                worst = worst.max(-value / terms);
+            }
+        }
+        Some(worst)
+    }
+
+    /// Newton's method from `u`.
+    fn newton(&self, u: &mut [f64], rows: &mut [Row]) -> Option<Guess> {
+        let m = u.len();
+        let mut violation = self.violation(u, rows)?;
+        let mut found = Guess {
+            violation,
+            distance: 0.0,
+            outcome: Outcome::Optimal,
+            solver: Solver::Unchanged,
+            iterations: 0,
+        };
+        let mut target = [0.0; MAX_INPUTS];
+        for _ in 0..ITERATIONS {
+            let target = &mut target[..m];
+            let solution = qp::solve(rows, self.bounds, self.u_ref, self.correction_limit, target);
+            found.outcome = solution.outcome;
+            found.solver = solution.solver;
+            found.iterations += solution.iterations;
+            let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+            let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
+            let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
+            if violation <= 0.0 && way <= MET * size {
+                break;
+            }
+            let mut part = 1.0;
+            let mut moved = false;
+            for _ in 0..=HALVINGS {
+                for i in 0..m {
+                    u[i] = from[i] + part * (target[i] - from[i]);
+                }
+                if let Some(there) = self.violation(u, rows)
+                    && (there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation)
+                {
+                    violation = there;
+                    moved = true;
+                    break;
+                }
+                part /= 2.0;
+            }
+            if !moved {
+                u.copy_from_slice(&from[..m]);
+                self.violation(u, rows)?;
+                break;
+            }
+        }
+        found.violation = violation;
+        found.distance = u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+        Some(found)
+    }
+}
+
+/// What a search came to.
+struct Guess {
+    violation: f64,
+    distance: f64,
+    outcome: Outcome,
+    solver: Solver,
+    iterations: u32,
+}
+
+impl Guess {
+    fn better_than(&self, other: &Self) -> bool {
+        (self.violation, self.distance) < (other.violation, other.distance)
+    }
+}

@@ -1,0 +1,108 @@
+//! The state and the barrier's derivatives a moment ahead, under an input that is held.
+//!
+//! Let φ(s; x, u) be the state s seconds after x under the constant input u. Running the classical
+//! Runge-Kutta method on dual numbers whose gradients are those along u gives φ and ∂φ/∂u; the series
+//! of h started there gives h⁽ᵏ⁾(t + s) and its total derivative with respect to u,
+//!
+//! ```text
+//! h⁽ᵏ⁾ ∘ φ  and  ∂(h⁽ᵏ⁾ ∘ φ)/∂u = (∂h⁽ᵏ⁾/∂x) (∂φ/∂u) + ∂h⁽ᵏ⁾/∂u,   k = 0 … n.      (4)
+//! ```
+//!
+//! The error is the integrator's, O(s⁵) over [`SUBSTEPS`] substeps; (4) is the exact derivative of what
+//! is computed, so that Newton's method on it converges quadratically.
+
+use std::array::from_fn;
+
+use nalgebra::SVector;
+
+use crate::barrier::Barrier;
+use crate::dynamics::ControlAffine;
+use crate::jet::{Dual, Taylor};
+use crate::scalar::Scalar;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+
+/// Runge-Kutta steps per prediction.
+pub const SUBSTEPS: usize = 2;
+
+/// Derivatives of one barrier a moment ahead along a held input, as plain numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ahead {
+    /// `value[k]` = h⁽ᵏ⁾ at the end of the moment for k = 0 ..= n, in `[h]`/s^k; zeros above n.
+    pub value: [f64; MAX_RELATIVE_DEGREE + 1],
+    /// `gradient[k]` = its derivative with respect to the input held until then, in
+    /// `[h]`/(s^k · unit of u); zeros above n and above the number of inputs.
+    pub gradient: [[f64; MAX_INPUTS]; MAX_RELATIVE_DEGREE + 1],
+}
+
+impl Ahead {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        value: [0.0; MAX_RELATIVE_DEGREE + 1],
+        gradient: [[0.0; MAX_INPUTS]; MAX_RELATIVE_DEGREE + 1],
+    };
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.value.iter().chain(self.gradient.as_flattened()).all(|v| v.is_finite())
+    }
+}
+
+/// The state `duration` seconds after `x` under the held input `u`, by `steps` ≥ 1 steps of the
+/// classical Runge-Kutta method; as [`rk4_step`](crate::dynamics::rk4_step), for any scalar.
+pub fn flow<P, S, const NX: usize, const NU: usize>(
+    plant: &P,
+    x: &SVector<S, NX>,
+    u: &SVector<S, NU>,
+    duration: f64,
+    steps: usize,
+) -> SVector<S, NX>
+where
+    P: ControlAffine<NX, NU>,
+    S: Scalar,
+{
+    let dt = duration / steps as f64;
+    let moved =
+        |x: &SVector<S, NX>, k: &SVector<S, NX>, s: f64| SVector::<S, NX>::from_fn(|i, _| x[i] + k[i] * s);
+    let mut x = *x;
+    for _ in 0..steps {
+        let k1 = plant.derivative(&x, u);
+        let k2 = plant.derivative(&moved(&x, &k1, dt / 2.0), u);
+        let k3 = plant.derivative(&moved(&x, &k2, dt / 2.0), u);
+        let k4 = plant.derivative(&moved(&x, &k3, dt), u);
+        x = SVector::from_fn(|i, _| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0));
+    }
+    x
+}
+
+/// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead;
+/// `K` = n + 1.
+pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
+    barrier: &B,
+    (t, duration): (f64, f64),
+    x: &SVector<f64, NX>,
+    u: &[f64],
+    out: &mut Ahead,
+) where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    let u = SVector::<Dual<NU>, NU>::from_fn(|i, _| Dual::variable(u[i], i));
+    let x = SVector::<Dual<NU>, NX>::from_fn(|i, _| Dual::from(x[i]));
+    let x = flow(plant, &x, &u, duration, SUBSTEPS);
+    let held = SVector::<Taylor<Dual<NU>, K>, NU>::from_fn(|i, _| Taylor::constant(u[i]));
+    let mut series = SVector::<Taylor<Dual<NU>, K>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
+    for k in 0..K - 1 {
+        let dx = plant.derivative(&series, &held);
+        for i in 0..NX {
+            series[i].coefficients[k + 1] = dx[i].coefficients[k] * (1.0 / (k + 1) as f64);
+        }
+    }
+    let h = barrier.value(Taylor::time(t + duration), &series);
+    let derivatives: [Dual<NU>; K] = from_fn(|k| h.derivative(k));
+    *out = Ahead::ZERO;
+    for (k, derivative) in derivatives.iter().enumerate() {
+        out.value[k] = derivative.value;
+        out.gradient[k][..NU].copy_from_slice(&derivative.gradient);
+    }
+}

@@ -1,0 +1,170 @@
+//! Nominal controllers: something sensible for u_ref, without any promise.
+//!
+//! A filter changes u_ref as little as its rows ask, so what a closed loop looks like is decided by the
+//! nominal controller: with u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`]
+//! is the least that belongs into every loop; [`Heading`] drives to a goal.
+
+use crate::error::{Error, finite, positive};
+
+/// Damping: −gain · v for a velocity or speed v (m/s), in m/s²; `gain` in 1/s, 1 in the figures of the
+/// documentation. On the point mass for each component, on unicycle and bicycle for the acceleration.
+pub fn damping(v: f64, gain: f64) -> f64 {
+    -gain * v
+}
+
+/// Drives a vehicle to a goal in the plane: turn towards it, or away from it where that is nearer, and
+/// reverse; with a speed in proportion to the distance, limited.
+///
+/// With d the vector to the goal, φ the angle from the heading to ±d of least size and σ its sign,
+///
+/// ```text
+/// v* = min(speed_gain |d|, speed_limit),   ω = clamp(turn_gain φ, ±turn_limit),
+/// a = clamp(acceleration_gain (σ v* cos φ − v), ±acceleration_limit).
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heading {
+    /// The goal in m.
+    pub goal: [f64; 2],
+    /// Speed per distance in 1/s, finite, > 0. Default 0.8.
+    pub speed_gain: f64,
+    /// Largest speed aimed at, in m/s, finite, > 0. Default 15.
+    pub speed_limit: f64,
+    /// Acceleration per speed error in 1/s, finite, > 0. Default 1.
+    pub acceleration_gain: f64,
+    /// Largest acceleration in m/s², finite, > 0. Default 10.
+    pub acceleration_limit: f64,
+    /// Turning rate per angle in 1/s, finite, > 0. Default 3.
+    pub turn_gain: f64,
+    /// Largest turning rate in rad/s, finite, > 0. Default 3.
+    pub turn_limit: f64,
+    /// Largest slip angle of the bicycle in rad, finite, > 0. Default 1.
+    pub slip_limit: f64,
+}
+
+impl Heading {
+    /// Within this distance in m the direction to the goal is not followed any more.
+    const NEAR: f64 = 0.5;
+
+    /// The defaults towards `goal` (m).
+    pub fn towards(goal: [f64; 2]) -> Self {
+        Self {
+            goal,
+            speed_gain: 0.8,
+            speed_limit: 15.0,
+            acceleration_gain: 1.0,
+            acceleration_limit: 10.0,
+            turn_gain: 3.0,
+            turn_limit: 3.0,
+            slip_limit: 1.0,
+        }
+    }
+
+    /// The same controller, its numbers checked.
+    ///
+    /// # Errors
+    ///
+    /// A number outside the range its field states.
+    pub fn validated(self) -> Result<Self, Error> {
+        finite("goal[1]", self.goal[0])?;
+        finite("goal[2]", self.goal[1])?;
+        positive("speed_gain", self.speed_gain)?;
+        positive("speed_limit", self.speed_limit)?;
+        positive("acceleration_gain", self.acceleration_gain)?;
+        positive("acceleration_limit", self.acceleration_limit)?;
+        positive("turn_gain", self.turn_gain)?;
+        positive("turn_limit", self.turn_limit)?;
+        positive("slip_limit", self.slip_limit)?;
+        Ok(self)
+    }
+
+    /// Acceleration (m/s²) of the point mass, x = (x_p, y_p, v_x, v_y).
+    pub fn point_mass(&self, x: &[f64; 4]) -> [f64; 2] {
+        let (d, distance) = self.offset(x);
+        let speed = self.speed(distance) / distance.max(f64::MIN_POSITIVE);
+        let wanted = [0, 1].map(|i| self.acceleration_gain * (d[i] * speed - x[i + 2]));
+        let size = wanted[0].hypot(wanted[1]);
+        let part = if size > self.acceleration_limit { self.acceleration_limit / size } else { 1.0 };
+        wanted.map(|a| a * part)
+    }
+
+    /// Acceleration (m/s²) and turning rate (rad/s) of the unicycle, x = (x_p, y_p, θ, v).
+    pub fn unicycle(&self, x: &[f64; 4]) -> [f64; 2] {
+        let (d, distance) = self.offset(x);
+        let ([sin, cos], v) = ([x[2].sin(), x[2].cos()], x[3]);
+        // The components of d along the heading and across it, to the left.
+        let (along, across) = (d[0] * cos + d[1] * sin, d[1] * cos - d[0] * sin);
+        let sign = if along < 0.0 { -1.0 } else { 1.0 };
+        let angle = if distance < Self::NEAR { 0.0 } else { (sign * across).atan2(along.abs()) };
+        let speed = sign * self.speed(distance) * angle.cos();
+        let acceleration = self.acceleration_gain * (speed - v);
+        [within(self.acceleration_limit, acceleration), within(self.turn_limit, self.turn_gain * angle)]
+    }
+
+    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v);
+    /// `l_r` > 0 in m. At rest it cannot turn: the slip angle is on its limit, to the side that turns
+    /// right once it moves.
+    pub fn bicycle(&self, x: &[f64; 4], l_r: f64) -> [f64; 2] {
+        let [acceleration, turning] = self.unicycle(x);
+        if turning == 0.0 {
+            return [acceleration, 0.0];
+        }
+        let v = if x[3] == 0.0 { f64::MIN_POSITIVE.copysign(acceleration) } else { x[3] };
+        [acceleration, within(self.slip_limit, turning * l_r / v)]
+    }
+
+    fn offset(&self, x: &[f64; 4]) -> ([f64; 2], f64) {
+        let d = [self.goal[0] - x[0], self.goal[1] - x[1]];
+        (d, d[0].hypot(d[1]))
+    }
+
+    fn speed(&self, distance: f64) -> f64 {
+        (self.speed_gain * distance).min(self.speed_limit)
+    }
+}
+
+/// `value` moved into ±`limit`.
+fn within(limit: f64, value: f64) -> f64 {
+    value.max(-limit).min(limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_the_short_way_and_reverses() {
+        let heading = Heading::towards([10.0, 0.0]).validated().expect("valid");
+        // Facing the goal, facing away from it, and with it to the left and right.
+        assert_eq!(heading.unicycle(&[0.0, 0.0, 0.0, 0.0]), [8.0, 0.0]);
+        let [a, turn] = heading.unicycle(&[0.0, 0.0, std::f64::consts::PI, 0.0]);
+        assert!(a < -7.9 && turn.abs() < 1e-12);
+        assert!(heading.unicycle(&[0.0, 0.0, -0.5, 0.0])[1] > 0.0);
+        assert!(heading.unicycle(&[0.0, 0.0, 0.5, 0.0])[1] < 0.0);
+        // Reversing, the slip angle that turns left is negative.
+        let x = [0.0, 0.0, 3.0, -4.0];
+        let turn = heading.unicycle(&x)[1];
+        let slip = heading.bicycle(&x, 10.0)[1];
+        assert!(turn != 0.0 && slip.signum() == -turn.signum());
+        assert_eq!(heading.point_mass(&[9.0, 0.0, 0.0, 0.0]), [0.8, 0.0]);
+    }
+
+    #[test]
+    fn stays_within_its_limits() {
+        let heading = Heading::towards([1e6, -1e6]);
+        for x in [[0.0; 4], [5.0, 1.0, 2.0, -300.0], [1e6, -1e6, 1.0, 0.0]] {
+            let [a, turn] = heading.unicycle(&x);
+            assert!(a.abs() <= 10.0 && turn.abs() <= 3.0);
+            let [a, slip] = heading.bicycle(&x, 2.0);
+            assert!(a.abs() <= 10.0 && slip.abs() <= 1.0);
+            let [a, b] = heading.point_mass(&x);
+            assert!(a.hypot(b) <= 10.0 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn numbers_are_checked() {
+        let refused =
+            Heading { turn_limit: -1.0, ..Heading::towards([0.0; 2]) }.validated().expect_err("range");
+        assert_eq!(refused.to_string(), "turn_limit: is -1, must be finite and > 0");
+    }
+}

@@ -1,0 +1,196 @@
+//! After an arrival and at the edges of a deadline: leaving, recovering, a deadline that is past or
+//! shorter than a step, an input that acts late.
+
+mod scenario;
+
+use punctual_core::convergence::{FixedTime, FixedTimeState};
+use punctual_core::dynamics::rk4_step;
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling};
+use punctual_core::lie;
+use punctual_core::nalgebra::{SVector, vector};
+use punctual_core::plants::Unicycle;
+use punctual_core::simulation::{Schedule, closed_loop};
+use scenario::{Integrator, NonNegative, distance_disc, goal, speed_damping};
+
+/// A gust throws the vehicle out of the disc: with a recovery time it is back within that time, each
+/// time; the guarantee is given anew, and the count goes up.
+#[test]
+fn leaving_rearms_with_the_recovery_time() {
+    let recovery = 1.5;
+    let settings = BarrierSettings { recovery: Some(recovery), margin: 0.05, ..BarrierSettings::within(3.0) };
+    let mut filter = goal(settings);
+    let mut x = vector![44.0, 45.0, 0.0, 0.0];
+    let (mut u, step) = (SVector::<f64, 2>::zeros(), 0.01);
+    for k in 0..1000_u32 {
+        let t = f64::from(k) * step;
+        let gusts = k / 300;
+        if k % 300 == 0 && k > 0 {
+            x[0] -= 6.0;
+        }
+        let u_ref = [-x[2], -x[3]];
+        let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+        assert_eq!((b.recoveries, b.guaranteed), (gusts, true), "at {t}");
+        let since = t - f64::from(300 * gusts) * step;
+        if gusts > 0 && b.phase == Phase::Approach && !b.arrived {
+            assert!((b.time_left - (recovery - since)).abs() < 1e-9, "at {t}");
+        }
+        assert!(gusts == 0 || since < recovery || b.h >= 0.0, "h = {} at {t}", b.h);
+        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+    }
+}
+
+#[test]
+fn without_a_recovery_time_leaving_is_reported() {
+    let mut filter = goal(BarrierSettings::within(3.0));
+    let mut u = [0.0; 2];
+    for (t, x, phase) in [(0.0, 45.0, Phase::Stay), (0.1, 40.0, Phase::Left), (0.2, 45.0, Phase::Stay)] {
+        let report = filter.step(t, &[x, 45.0, 0.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
+        let b = report.barriers[0];
+        assert_eq!((b.phase, b.guaranteed, b.recoveries), (phase, phase == Phase::Stay, 0), "at {t}");
+    }
+}
+
+#[test]
+fn a_recovery_time_must_be_positive() {
+    for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let settings = BarrierSettings { recovery: Some(value), ..BarrierSettings::within(3.0) };
+        let refused = FixedTime::new(2, settings).expect_err("refused");
+        assert_eq!(refused.to_string(), format!("recovery: is {value}, must be finite and > 0"));
+    }
+}
+
+/// A deadline that is past promises nothing, says so, and is still worked towards.
+#[test]
+fn a_deadline_in_the_past_is_late_at_once() {
+    let promise = FixedTime::new(2, BarrierSettings::within(3.0)).expect("valid");
+    for deadline in [0.0, -2.0] {
+        let mut state = FixedTimeState::default();
+        promise.anchor(&mut state, 7.0, &[-4.0, 1.0], deadline);
+        assert!(!state.guaranteed);
+        let demand = promise.advance(&mut state, 7.0, &[-4.0, 1.0]);
+        assert_eq!((state.phase, state.guaranteed), (Phase::Late, false));
+        assert_eq!((demand.time_left, demand.profile), (0.0, 0.0));
+        // (D + a)² h ≥ 0 with a = 20/3: the target is h = 0 at once.
+        let a: f64 = 20.0 / 3.0;
+        assert!((demand.floor - (4.0 * a * a - 2.0 * a)).abs() < 1e-9, "{}", demand.floor);
+        // Inside, with a stay constraint that holds from there, all is well again.
+        promise.advance(&mut state, 8.0, &[1.0, 0.0]);
+        assert_eq!((state.phase, state.guaranteed), (Phase::Stay, true));
+    }
+}
+
+/// A deadline shorter than a step: the sampled constraint has its end beyond the deadline, so that a
+/// barrier of relative degree 1 arrives at the first sample after it.
+#[test]
+fn a_deadline_shorter_than_a_step_is_met_at_the_next_sample() {
+    let (deadline, step) = (0.01, 0.05);
+    let mut filter = lie::along(Integrator::<1>, NonNegative, 1)
+        .and_then(|source| {
+            SafetyFilter::builder(1, 1).source("line", source, BarrierSettings::within(deadline))
+        })
+        .and_then(|b| b.sampling(Sampling::Period(step)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let schedule = Schedule { step, steps: 20, substeps: 1 };
+    closed_loop(
+        &mut filter,
+        &Integrator::<1>,
+        vector![-3.0],
+        schedule,
+        |_, _| vector![0.0],
+        |t, x, _, r| {
+            assert!(r.status.is_satisfied(), "{:?} at {t}", r.status);
+            // The tolerance of the sampled rows, 1e-9 of terms of order 3.
+            assert!(t < step / 2.0 || x[0] >= -1e-8, "h = {} at {t}", x[0]);
+            assert_ne!(r.barriers[0].phase, Phase::Left);
+        },
+    )
+    .expect("valid schedule");
+}
+
+/// One step of delay under a master that exchanges first: arrival and least h after the deadline, and the
+/// number of steps whose constraint could not be met.
+fn jacobi(compensated: bool, step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
+    let settings =
+        BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(5.0) };
+    let mut filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", Unicycle, distance_disc(), settings)
+        .and_then(|b| b.sampling(Sampling::Period(step)))
+        .and_then(|b| b.actuation_delay(if compensated { step } else { 0.0 }))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let (mut x, mut acting) = (SVector::from(x0), SVector::<f64, 2>::zeros());
+    let (mut arrival, mut least, mut unmet) = (None, f64::INFINITY, 0);
+    for k in 0..=(10.0 / step).round() as usize {
+        let t = k as f64 * step;
+        let mut u = SVector::<f64, 2>::zeros();
+        let u_ref = speed_damping(t, &x);
+        let report =
+            filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice()).expect("right dimensions");
+        let h = report.barriers[0].h;
+        if h >= 0.0 && arrival.is_none() {
+            arrival = Some(t);
+        }
+        if t > 5.0 - step / 2.0 {
+            least = least.min(h);
+        }
+        unmet += usize::from(!report.status.is_satisfied());
+        x = rk4_step(&Unicycle, &x, &acting, step);
+        acting = u;
+    }
+    (arrival, least, unmet)
+}
+
+#[test]
+fn a_delay_of_one_step_is_compensated() {
+    let mut unmet = [0, 0];
+    for x0 in [[5.0, 5.0, 0.3, 2.0], [12.0, 3.0, -2.0, 6.0], [0.0, 18.0, 2.2, -7.0]] {
+        for step in [0.01, 0.05] {
+            let (arrival, least, compensated) = jacobi(true, step, x0);
+            assert!(arrival.is_some_and(|t| t <= 5.0), "{x0:?}, {step}: {arrival:?}");
+            assert!(least >= 0.0, "{x0:?}, {step}: {least}");
+            unmet[0] += compensated;
+            unmet[1] += jacobi(false, step, x0).2;
+        }
+    }
+    assert!(2 * unmet[0] < unmet[1], "steps unmet with and without compensation: {unmet:?}");
+}
+
+/// h is of now, the rest of the time at which the input acts; the deadline counts from the first sample.
+#[test]
+fn a_delayed_report_names_its_times() {
+    let mut filter = SafetyFilter::builder(2, 1)
+        .source(
+            "line",
+            lie::along(Integrator::<2>, NonNegative, 2).expect("in range"),
+            BarrierSettings::within(4.0),
+        )
+        .and_then(|b| b.actuation_delay(0.5))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut u = [0.0];
+    let report = filter.step(1.0, &[-3.0, 2.0], &[0.0], &mut u).expect("right dimensions");
+    let b = report.barriers[0];
+    assert_eq!((b.h, b.time_left), (-3.0, 3.5));
+    // Where it will be: −3 + 2 · 0.5.
+    assert!((b.profile + 2.0).abs() < 1e-12, "{}", b.profile);
+    assert_eq!(filter.state().barriers[0].anchor_time, 1.5);
+}
+
+#[test]
+fn a_delay_is_checked() {
+    let builder = || SafetyFilter::builder(4, 2);
+    let settings = BarrierSettings::within(4.0);
+    for value in [-0.1, f64::NAN, f64::INFINITY] {
+        let refused = builder().actuation_delay(value).err().expect("refused");
+        assert_eq!(refused.to_string(), format!("actuation_delay: is {value}, must be finite and >= 0"));
+    }
+    let refused = builder()
+        .barrier("goal", Unicycle, distance_disc(), settings)
+        .and_then(|b| b.sampling(Sampling::Period(0.01)))
+        .and_then(|b| b.actuation_delay(0.02))
+        .and_then(FilterBuilder::build)
+        .err()
+        .expect("refused");
+    assert_eq!(refused.to_string(), "actuation_delay: is 0.02, must be <= sampling_period = 0.01");
+}

@@ -1,0 +1,346 @@
+//! Held inputs: predictions along the flow, the sampled form of the constraint, and what it changes.
+
+mod scenario;
+
+use proptest::prelude::*;
+use punctual_core::convergence::comparison::binomial;
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
+use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
+use punctual_core::nalgebra::{SVector, vector};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::simulation::{Schedule, closed_loop};
+use scenario::{Integrator, NonNegative, damping, distance_disc, speed_damping};
+
+const DEADLINE: f64 = 5.0;
+
+fn bicycle() -> Bicycle {
+    Bicycle::new(10.0).expect("valid bicycle")
+}
+
+fn settings() -> BarrierSettings {
+    BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(DEADLINE) }
+}
+
+fn filter<P>(plant: P, sampling: Sampling) -> SafetyFilter
+where
+    P: ControlAffine<4, 2> + Send + 'static,
+{
+    SafetyFilter::builder(4, 2)
+        .barrier("goal", plant, distance_disc(), settings())
+        .and_then(|b| b.sampling(sampling))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter")
+}
+
+/// Prediction against many small Runge-Kutta steps, its gradient against central differences.
+#[test]
+fn predictions_follow_the_flow() {
+    let source = lie::along(bicycle(), distance_disc(), 2).expect("in range");
+    let (x, u, period) = ([10.0, 20.0, 0.4, 6.0], [3.0, -0.7], 0.05);
+    let mut ahead = Ahead::ZERO;
+    assert!(source.ahead(1.0, &x, &u, period, &mut ahead));
+    let mut exact = SVector::from(x);
+    for _ in 0..100 {
+        exact = rk4_step(&bicycle(), &exact, &SVector::from(u), period / 100.0);
+    }
+    let mut predicted = x;
+    assert!(source.predict(&mut predicted, &u, period));
+    // Two steps of a fourth-order method of 25 ms, rates of order 1/s: 2 · 0.025⁵ ≈ 2e-8 of 50 m.
+    assert!((SVector::from(predicted) - exact).norm() < 1e-6);
+    let mut there = Derivatives::ZERO;
+    source.evaluate(1.05, &predicted, &mut there);
+    assert!((ahead.value[0] - there.drift[0]).abs() < 1e-12);
+    assert!((ahead.value[1] - there.drift[1]).abs() < 1e-12);
+    let at_u: f64 = there.drift[2] + there.row[0] * u[0] + there.row[1] * u[1];
+    assert!((ahead.value[2] - at_u).abs() < 1e-11);
+    for i in 0..2 {
+        let step = 1e-4;
+        let at = |d: f64| {
+            let (mut moved, mut out) = (u, Ahead::ZERO);
+            moved[i] += d;
+            source.ahead(1.0, &x, &moved, period, &mut out);
+            out.value
+        };
+        let (high, low) = (at(step), at(-step));
+        for k in 0..=2 {
+            let difference = (high[k] - low[k]) / (2.0 * step);
+            // Central differences: step² and round-off 1e-14/step of values of order 10.
+            assert!((ahead.gradient[k][i] - difference).abs() < 1e-7, "order {k}, input {i}");
+        }
+    }
+}
+
+/// A chain of integrators is linear, so the sampled constraint is met to round-off at every sample,
+/// whatever the period: ψ = (D + a)ⁿ⁻¹ e never falls below e^{−aδ} of itself.
+fn psi_never_falls_faster<const N: usize>(period: f64) {
+    let rate = 3.0;
+    let settings = BarrierSettings { rate, stay_rate: rate, margin: 0.05, ..BarrierSettings::within(4.0) };
+    let mut filter = lie::along(Integrator::<N>, NonNegative, N)
+        .and_then(|source| SafetyFilter::builder(N, 1).source("line", source, settings))
+        .and_then(|b| b.sampling(Sampling::Period(period)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut x0 = SVector::<f64, N>::zeros();
+    x0[0] = -1.0;
+    let psi = |x: &SVector<f64, N>| -> f64 {
+        (0..N)
+            .map(|k| {
+                binomial(N - 1, k) * rate.powi((N - 1 - k) as i32) * (x[k] - if k == 0 { 0.05 } else { 0.0 })
+            })
+            .sum()
+    };
+    let mut last: Option<f64> = None;
+    let mut least: f64 = f64::INFINITY;
+    let schedule = Schedule { step: period, steps: (8.0 / period).ceil() as usize, substeps: 20 };
+    closed_loop(
+        &mut filter,
+        &Integrator::<N>,
+        x0,
+        schedule,
+        |_, _| vector![0.0],
+        |t, x, _, report| {
+            assert!(report.predicted && report.status.is_satisfied(), "n {N} at {t}: {:?}", report.status);
+            if t >= 4.0 {
+                // The profile is over: e is h − μ itself.
+                if let Some(last) = last {
+                    let floor = (-rate * period).exp() * last;
+                    // The rows' tolerance and the predictor, exact for n ≤ 4, times the weights.
+                    assert!(psi(x) >= floor - 1e-8, "n {N} at {t}: {} below {floor}", psi(x));
+                }
+                last = Some(psi(x));
+                least = least.min(x[0]);
+            }
+        },
+    )
+    .expect("valid schedule");
+    assert!(least >= 0.0, "n {N}, period {period}: least h after the deadline {least}");
+}
+
+#[test]
+fn the_sampled_constraint_holds_at_every_sample() {
+    for period in [0.01, 0.05, 0.2] {
+        psi_never_falls_faster::<1>(period);
+        psi_never_falls_faster::<2>(period);
+        psi_never_falls_faster::<3>(period);
+        psi_never_falls_faster::<4>(period);
+    }
+}
+
+/// Arrival and least h after the deadline.
+fn run<P>(
+    plant: &P,
+    nominal: fn(f64, &SVector<f64, 4>) -> SVector<f64, 2>,
+    sampling: Sampling,
+    step: f64,
+    x0: [f64; 4],
+) -> (Option<f64>, f64)
+where
+    P: ControlAffine<4, 2> + Clone + Send + 'static,
+{
+    let mut filter = filter(plant.clone(), sampling);
+    let (mut arrival, mut least) = (None, f64::INFINITY);
+    let schedule = Schedule { step, steps: (2.0 * DEADLINE / step).round() as usize, substeps: 4 };
+    closed_loop(&mut filter, plant, x0.into(), schedule, nominal, |t, _, _, report| {
+        arrival = report.barriers[0].arrival_time;
+        if t > DEADLINE - step / 2.0 {
+            least = least.min(report.barriers[0].h);
+        }
+    })
+    .expect("valid schedule");
+    (arrival, least)
+}
+
+/// Starts that the pointwise constraint loses at 50 ms: slow and across the line of sight, or reversing.
+const HARD: [[f64; 4]; 4] =
+    [[2.69, 16.95, 5.28, -4.90], [9.9, 9.0, 3.03, 5.77], [10.0, 10.0, 2.356, 0.01], [0.0, 20.0, -2.2, -9.0]];
+
+#[test]
+fn fifty_milliseconds_keep_the_deadline_and_the_margin() {
+    for x0 in HARD {
+        for sampling in [Sampling::Period(0.05), Sampling::Measured] {
+            for (name, (arrival, least)) in [
+                ("point mass", run(&PointMass, damping, sampling, 0.05, x0)),
+                ("unicycle", run(&Unicycle, speed_damping, sampling, 0.05, x0)),
+                ("bicycle", run(&bicycle(), speed_damping, sampling, 0.05, x0)),
+            ] {
+                assert!(arrival.is_some_and(|t| t <= DEADLINE), "{name} {x0:?} {sampling:?}: {arrival:?}");
+                assert!(least >= 0.0, "{name} {x0:?} {sampling:?}: {least}");
+            }
+        }
+    }
+}
+
+/// The pointwise constraint at 50 ms throws this unicycle off its profile, and no longer claims what it
+/// cannot keep; the sampled one keeps both.
+#[test]
+fn a_margin_that_is_used_up_is_no_guarantee() {
+    let broken = |sampling: Sampling| {
+        let mut filter = filter(Unicycle, sampling);
+        let (mut claimed_below, mut lost) = (0, 0);
+        let schedule = Schedule { step: 0.05, steps: 99, substeps: 4 };
+        closed_loop(&mut filter, &Unicycle, HARD[0].into(), schedule, speed_damping, |_, _, _, r| {
+            let b = &r.barriers[0];
+            // The profile is reported with the margin.
+            let below = b.h < b.profile - 0.02 - 1e-9;
+            claimed_below += usize::from(below && b.guaranteed);
+            lost += usize::from(!b.guaranteed);
+        })
+        .expect("valid schedule");
+        (claimed_below, lost)
+    };
+    let (claimed, lost) = broken(Sampling::Pointwise);
+    assert!(claimed == 0 && lost > 0, "{claimed} {lost}");
+    assert_eq!(broken(Sampling::Period(0.05)).0, 0);
+}
+
+/// The report names the period, and the loss is of second order in it.
+#[test]
+fn the_loss_shrinks_with_the_square_of_the_period() {
+    let largest = |period: f64| {
+        let mut filter = filter(PointMass, Sampling::Period(period));
+        let mut loss: f64 = 0.0;
+        let schedule = Schedule { step: period, steps: (4.0 / period) as usize, substeps: 1 };
+        closed_loop(
+            &mut filter,
+            &PointMass,
+            vector![5.0, 5.0, 1.0, -1.0],
+            schedule,
+            damping,
+            |_, _, _, r| {
+                assert_eq!((r.period, r.predicted), (period, true));
+                loss = loss.max(r.barriers[0].sampling_loss);
+            },
+        )
+        .expect("valid schedule");
+        loss
+    };
+    let (coarse, fine) = (largest(0.02), largest(0.01));
+    assert!(fine > 0.0 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
+}
+
+#[test]
+fn a_reference_that_meets_the_sampled_rows_is_returned_bit_for_bit() {
+    let mut filter = filter(PointMass, Sampling::Period(0.05));
+    let (u_ref, mut u) = ([12.3, 11.7], [0.0; 2]);
+    let report = filter.step(0.0, &[10.0, 10.0, 5.0, 5.0], &u_ref, &mut u).expect("right dimensions");
+    assert_eq!((report.status, u), (Status::Unchanged, u_ref));
+}
+
+/// The measured period: none at first, the step before then, at most twice as much after a gap, and
+/// unchanged by a repeated or an earlier sample.
+#[test]
+fn the_period_is_measured() {
+    let mut filter = filter(PointMass, Sampling::Measured);
+    let mut u = [0.0; 2];
+    let mut periods = Vec::new();
+    for t in [0.0, 0.125, 0.25, 1.25, 1.25, 1.0, 1.125] {
+        let report = filter.step(t, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+        assert_eq!(report.predicted, report.period > 0.0);
+        periods.push(report.period);
+    }
+    assert_eq!(periods, [0.0, 0.125, 0.125, 0.25, 0.25, 0.25, 0.125]);
+    filter.rearm();
+    assert_eq!(filter.step(2.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").period, 0.0);
+}
+
+#[test]
+fn a_period_must_be_positive() {
+    for value in [0.0, -0.01, f64::NAN, f64::INFINITY] {
+        let refused = SafetyFilter::builder(4, 2).sampling(Sampling::Period(value)).err().expect("refused");
+        assert_eq!(refused.to_string(), format!("sampling_period: is {value}, must be finite and > 0"));
+    }
+}
+
+/// A source of derivatives that knows no plant.
+struct Blind(Box<dyn DerivativeSource>);
+
+impl DerivativeSource for Blind {
+    fn relative_degree(&self) -> usize {
+        self.0.relative_degree()
+    }
+    fn state_dim(&self) -> usize {
+        self.0.state_dim()
+    }
+    fn input_dim(&self) -> usize {
+        self.0.input_dim()
+    }
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
+        self.0.evaluate(t, x, out);
+    }
+}
+
+/// Without a model the constraint is pointwise, to the bit, and the report says so.
+#[test]
+fn without_a_prediction_the_constraint_is_pointwise() {
+    let blind = Blind(lie::along(PointMass, distance_disc(), 2).expect("in range"));
+    let mut blind = SafetyFilter::builder(4, 2)
+        .source("goal", Box::new(blind), settings())
+        .and_then(|b| b.sampling(Sampling::Period(0.05)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut pointwise = filter(PointMass, Sampling::Pointwise);
+    for k in 0..20 {
+        let (t, x) = (f64::from(k) * 0.05, [f64::from(k), 3.0, 1.0, -4.0]);
+        let (mut u, mut wanted) = ([0.0; 2], [0.0; 2]);
+        let report = blind.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions").clone();
+        let expected = pointwise.step(t, &x, &[0.0; 2], &mut wanted).expect("right dimensions");
+        assert_eq!((u, report.predicted), (wanted, false));
+        assert_eq!(report.barriers, expected.barriers);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
+
+    /// A restored filter goes on with the same bits, and `peek` answers as `step` does.
+    #[test]
+    fn restored_equals_uninterrupted(interrupt in 0..30_usize, x0 in prop::array::uniform4(-10.0..20.0_f64)) {
+        let build = || filter(bicycle(), Sampling::Measured);
+        let (mut whole, mut second) = (build(), build());
+        let mut u = [0.0; 2];
+        second.step(0.7, &[45.0, 45.0, 1.0, 1.0], &[0.0; 2], &mut u).expect("right dimensions");
+        let mut x = SVector::<f64, 4>::from(x0);
+        for k in 0..60 {
+            let t = k as f64 * 0.05;
+            if k == interrupt {
+                second.restore(whole.state()).expect("as many barriers");
+            }
+            let mut wanted = [0.0; 2];
+            whole.step(t, x.as_slice(), &[0.0; 2], &mut wanted).expect("right dimensions");
+            if k >= interrupt {
+                second.peek(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+                prop_assert_eq!(u.map(f64::to_bits), wanted.map(f64::to_bits), "peek at {}", t);
+                second.step(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+                prop_assert_eq!(u.map(f64::to_bits), wanted.map(f64::to_bits), "at {}", t);
+                prop_assert_eq!(whole.report(), second.report());
+                prop_assert_eq!(whole.state(), second.state());
+            }
+            x = rk4_step(&bicycle(), &x, &SVector::from(wanted), 0.05);
+        }
+    }
+
+    /// Whatever finite state, time and reference come, u is finite and within bounds.
+    #[test]
+    fn the_output_is_always_finite_and_within_bounds(
+        samples in prop::collection::vec((any::<f64>(), prop::array::uniform4(any::<f64>()), prop::array::uniform2(any::<f64>())), 1..6),
+        near in prop::collection::vec(prop::array::uniform4(-50.0..50.0_f64), 1..6),
+        bounded in any::<bool>(),
+        measured in any::<bool>(),
+    ) {
+        let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
+        let sampling = if measured { Sampling::Measured } else { Sampling::Period(0.05) };
+        let mut filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", Unicycle, distance_disc(), settings())
+            .and_then(|b| b.bounds(&high.map(|v| -v), &high))
+            .and_then(|b| b.sampling(sampling))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let near = near.iter().enumerate().map(|(k, x)| (k as f64 * 0.05, *x, [1.0, 1.0]));
+        for (t, x, u_ref) in samples.into_iter().chain(near) {
+            let mut u = [f64::NAN; 2];
+            let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            prop_assert!(u.iter().zip(high).all(|(v, m)| v.is_finite() && v.abs() <= m), "{u:?} {report:?}");
+        }
+    }
+}
