@@ -28,7 +28,7 @@ fn an_unknown_key() {
         "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
          unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `radius`, `smoothing`, \
-         `deadline`, `method`, `rate`, `stay_rate`, `margin`",
+         `deadline`, `method`, `rate`, `stay_rate`, `margin`, `recovery`",
     );
 }
 

@@ -15,7 +15,7 @@ fn workshop() -> Workshop {
 fn every_example_configuration_is_built() {
     let workshop = Workshop::with_library();
     for (stem, says) in [
-        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 31 variables"),
+        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 32 variables"),
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
     ] {
         let (toml, fmu) = (format!("{stem}.toml"), format!("{stem}.fmu"));

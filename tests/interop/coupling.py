@@ -55,12 +55,13 @@ class Slave:
         shutil.rmtree(self.folder)
 
 
-def couple(filter_fmu, plant_fmu, damping, stop, h):
+def couple(filter_fmu, plant_fmu, damping, stop, h, start=None):
     """Yields (time, {variable: value}) at every communication point from 0 to `stop`.
 
-    `damping` maps a reference input of the filter to the state it opposes: u_ref = -x.
+    `damping` maps a reference input of the filter to the state it opposes: u_ref = -x; `start` holds start
+    values of the plant.
     """
-    filter_, plant = Slave(filter_fmu), Slave(plant_fmu)
+    filter_, plant = Slave(filter_fmu), Slave(plant_fmu, start)
     states = plant.names("output")
     inputs = plant.names("input")
     outputs = filter_.names("output")

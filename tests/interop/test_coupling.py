@@ -1,10 +1,11 @@
 """Filter and plant in a plain FMPy loop: the promise is kept, and `punctual run` gives the same."""
 
 import csv
+import itertools
 
 import pytest
 
-from conftest import METHODS, MODELS
+from conftest import METHODS, MODELS, ROOT, punctual
 from coupling import couple
 
 STOP, STEP, DEADLINE = 20.0, 0.001, 10.0
@@ -83,3 +84,29 @@ def test_inputs_stay_small_with_the_reference_profile(run):
         assert length < 10.0
     elif model == "point_mass":
         assert length > 30_000.0  # the paper: 31,950 m/s²
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_long_steps_from_random_starts(model, tmp_path):
+    # Theory, section 8: T = 5 s, 50 ms, with the constraint enforced on the predicted state.
+    deadline, step = 5.0, 0.05
+    (tmp_path / "filter.toml").write_text(
+        f"""kind = "filter"
+sampling = "step_size"
+plant = {{ model = "{model}" }}
+barrier = [{{ name = "goal", centre = [45, 45], radius = 2, deadline = {deadline}, rate = 5, margin = 0.02 }}]
+experiment = {{ step_size = {step} }}
+"""
+    )
+    (tmp_path / "plant.toml").write_text(f'kind = "plant"\nplant = {{ model = "{model}" }}\n')
+    for kind in ["filter", "plant"]:
+        punctual("build", tmp_path / f"{kind}.toml", "-o", tmp_path / f"{kind}.fmu")
+    states = {"point_mass": ["x_p", "y_p", "v_x", "v_y"]}.get(model, ["x_p", "y_p", "theta", "v"])
+    with open(ROOT / "tests" / "data" / "starts100.csv", newline="") as file:
+        starts = [[float(value) for value in row] for row in itertools.islice(csv.reader(file), 1, 21)]
+    for start in starts:
+        x0 = {f"x0.{name}": value for name, value in zip(states, start)}
+        rows = couple(tmp_path / "filter.fmu", tmp_path / "plant.fmu", DAMPING[model], 2 * deadline, step, x0)
+        h = [(t, row["filter.goal.h"]) for t, row in rows]
+        assert min(t for t, value in h if value >= 0.0) <= deadline, (model, start)
+        assert min(value for t, value in h if t >= deadline - step / 2) >= 0.0, (model, start)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +57,19 @@ pub enum MethodName {
     RepeatedRoot,
 }
 
+/// What is done about inputs that are held between samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SamplingName {
+    /// [`Sampling::Pointwise`]: the margin has to cover it.
+    #[default]
+    Pointwise,
+    /// [`Sampling::Measured`]: predicted over the period since the last step.
+    Measured,
+    /// [`Sampling::Period`] with the step size of `[experiment]`.
+    StepSize,
+}
+
 /// `[[barrier]]`: a safe set and the deadline for reaching it.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -91,6 +104,9 @@ pub struct BarrierSection {
     /// `quadratic_disc`.
     #[serde(default)]
     pub margin: Option<f64>,
+    /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
+    #[serde(default)]
+    pub recovery: f64,
 }
 
 impl BarrierSection {
@@ -151,6 +167,13 @@ impl BarrierSection {
             row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| {
                 b.margin.get_or_insert(0.0)
             }),
+            row(
+                "recovery",
+                "s",
+                Range::NON_NEGATIVE,
+                "deadline for coming back after leaving; 0: none",
+                |b| &mut b.recovery,
+            ),
             row("centre[1]", "m", Range::FINITE, "centre along x, at time 0", |b| &mut b.centre[0]),
             row("centre[2]", "m", Range::FINITE, "centre along y, at time 0", |b| &mut b.centre[1]),
             row("velocity[1]", "m/s", Range::FINITE, "velocity of the centre along x", |b| {
@@ -186,7 +209,7 @@ impl BarrierSection {
             rate,
             stay_rate: default(self.stay_rate, rate),
             margin: self.margin.unwrap_or(0.0),
-            recovery: None,
+            recovery: (self.recovery > 0.0).then_some(self.recovery),
         }
     }
 }
@@ -209,6 +232,13 @@ pub struct FilterConfiguration {
     /// are computed in steps only, for the same result in every master.
     #[serde(default = "yes")]
     pub direct_feedthrough: bool,
+    /// What is done about inputs held between samples. Default `pointwise`.
+    #[serde(default)]
+    pub sampling: SamplingName,
+    /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
+    /// Jacobi master. The state is predicted over it. Default 0.
+    #[serde(default)]
+    pub actuation_delay: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
     /// reported as degenerate. Default 1e6.
     #[serde(default = "correction_limit")]
@@ -299,6 +329,14 @@ impl FilterConfiguration {
         rows
     }
 
+    fn sampling(&self, step_size: f64) -> Sampling {
+        match self.sampling {
+            SamplingName::Pointwise => Sampling::Pointwise,
+            SamplingName::Measured => Sampling::Measured,
+            SamplingName::StepSize => Sampling::Period(step_size),
+        }
+    }
+
     /// The filter, not yet anchored.
     ///
     /// # Errors
@@ -341,6 +379,8 @@ impl FilterConfiguration {
         builder
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
+            .and_then(|b| b.actuation_delay(self.actuation_delay))
+            .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
             .and_then(FilterBuilder::build)
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }

@@ -78,6 +78,11 @@ defects! {
         "bounds.a: is [9, 8], must be [min, max] with min <= max (in an FMU: u_min.a, u_max.a)";
     lower_bound_plus_infinity: FILTER, "[-9.0, 8.0]" => "[inf, inf]",
         "bounds.a: is inf, must be finite and >= -1e30 and <= 1e30";
+    negative_delay: FILTER, "kind = \"filter\"" => "kind = \"filter\"\nactuation_delay = -0.1",
+        "actuation_delay: is -0.1, must be finite and >= 0";
+    delay_above_the_step: FILTER,
+        "kind = \"filter\"" => "kind = \"filter\"\nactuation_delay = 0.5\nsampling = \"step_size\"",
+        "actuation_delay: is 0.5, must be <= sampling_period = 0.001";
     zero_correction_limit: FILTER, "kind = \"filter\"" => "kind = \"filter\"\ncorrection_limit = 0.0",
         "correction_limit: is 0, must be finite and > 0";
     name_with_a_blank: FILTER, "kind = \"filter\"" => "kind = \"filter\"\nname = \"my filter\"",
