@@ -271,6 +271,22 @@ impl Table {
         self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
         self.ranges.push(row.range);
     }
+
+    /// Adds the parameters of `configuration`, which come last, and completes `layout` with their place.
+    fn finish<C: Clone>(
+        mut self,
+        configuration: &C,
+        rows: &[Parameter<C>],
+        layout: Layout,
+    ) -> (Self, Layout) {
+        let parameters = self.variables.len();
+        let mut configuration = configuration.clone();
+        for row in rows {
+            self.parameter(row, &mut configuration);
+        }
+        let end = self.variables.len();
+        (self, Layout { parameters, end, ..layout })
+    }
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
@@ -325,14 +341,11 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         variable.dependencies = Some(direct.clone());
     }
 
-    let parameters = table.variables.len();
-    let mut c = c.clone();
-    for row in c.parameters() {
-        table.parameter(&row, &mut c);
-    }
-    let end = table.variables.len();
-    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, parameters, end };
-    (table, layout)
+    table.finish(
+        c,
+        &c.parameters(),
+        Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() },
+    )
 }
 
 fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
@@ -349,13 +362,11 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         // `x0.*` are the first parameters, in the order of the states.
         variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
     }
-    let mut c = c.clone();
-    for row in c.parameters() {
-        table.parameter(&row, &mut c);
-    }
-    let end = table.variables.len();
-    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, parameters, end };
-    (table, layout)
+    table.finish(
+        c,
+        &c.parameters(),
+        Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() },
+    )
 }
 
 #[cfg(test)]

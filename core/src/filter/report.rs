@@ -16,7 +16,9 @@ pub enum Status {
     /// The constraints cannot be met within the input bounds: the bounded input of least violation.
     Infeasible = 2,
     /// A constraint's row is so small that no reasonable input meets it (the barrier cannot be
-    /// influenced at this instant): the bounded input of least violation, or u_ref without bounds.
+    /// influenced at this instant): the bounded input of least violation, or u_ref without bounds. Where
+    /// the constraint is enforced on a predicted state ([`Sampling`](super::Sampling)), also: no input was
+    /// found that meets it, and the returned one is the best of the search, finite and within bounds.
     Degenerate = 3,
     /// Time, state or reference input is not a number or infinite: the admissible input nearest 0.
     /// Nothing is remembered but that guarantees already given are lost.
