@@ -65,7 +65,7 @@ fn filters() -> Vec<(&'static str, SafetyFilter)> {
     let repeated = BarrierSettings { method: Method::RepeatedRoot, ..settings };
     let bounded = SafetyFilter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), settings)
-        .and_then(|b| b.bounds(&[-5.0, -5.0], &[5.0, 5.0]))
+        .and_then(|b| b.bounds(&[-50.0, -50.0], &[50.0, 50.0]))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");
     let sampled = |sampling: Sampling| {
@@ -82,7 +82,7 @@ fn filters() -> Vec<(&'static str, SafetyFilter)> {
         ("bicycle, repeated root", one(bicycle, quadratic_disc(), repeated)),
         ("point mass, bounded", bounded),
         ("unicycle, sampled", sampled(Sampling::Period(0.005))),
-        ("unicycle, measured period", sampled(Sampling::Measured)),
+        ("unicycle, measured period", sampled(Sampling::Measured { first: None })),
     ]
 }
 

@@ -4,8 +4,8 @@
 
 use punctual_core::convergence::comparison::factorial;
 use punctual_core::convergence::first_order::Exponent;
-use punctual_core::convergence::repeated_root::{Deadlines, Reason};
-use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase};
+use punctual_core::convergence::repeated_root::{Deadlines, NoAdmissibleRate, Reason};
+use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase, Refusal};
 
 /// What came of a run.
 struct Run {
@@ -41,6 +41,13 @@ fn run(settings: FixedTimeSettings, mut h: Vec<f64>, step: f64) -> Run {
     run
 }
 
+fn no_rate(promise: &FixedTime, state: &FixedTimeState) -> Option<NoAdmissibleRate> {
+    match promise.refusal(state) {
+        Some(Refusal::NoAdmissibleRate(none)) => Some(none),
+        _ => None,
+    }
+}
+
 fn settings(method: Method) -> FixedTimeSettings {
     FixedTimeSettings { method, ..FixedTimeSettings::within(5.0) }
 }
@@ -67,9 +74,9 @@ fn the_repeated_root_arrives_from_rest_for_even_orders() {
 fn without_an_admissible_rate_nothing_is_promised() {
     let promise = FixedTime::new(3, settings(Method::RepeatedRoot)).expect("valid settings");
     let mut state = FixedTimeState::default();
-    assert_eq!(promise.no_admissible_rate(&state), None);
+    assert_eq!(promise.refusal(&state), None);
     let demand = promise.advance(&mut state, 0.0, &[-10.0, 0.0, 0.0]);
-    let none = promise.no_admissible_rate(&state).expect("none from rest");
+    let none = no_rate(&promise, &state).expect("none from rest");
     assert_eq!((none.reason, none.deadlines), (Reason::NoRealRoot, Deadlines::None));
     assert_eq!((state.phase, state.guaranteed, state.rate), (Phase::Approach, false, 4.0));
     // (D + 4)³ h ≥ 0: the stay rate 20/T takes the place of the root.
@@ -77,14 +84,14 @@ fn without_an_admissible_rate_nothing_is_promised() {
 
     let mut state = FixedTimeState::default();
     promise.advance(&mut state, 0.0, &[-10.0, 1.0, 0.0]);
-    let none = promise.no_admissible_rate(&state).expect("T = 5 is too short");
+    let none = no_rate(&promise, &state).expect("T = 5 is too short");
     assert_eq!(none.deadlines, Deadlines::From(10.0));
     assert!(!state.guaranteed);
 
     // With one, it is the rate of the state.
     let mut state = FixedTimeState::default();
     promise.advance(&mut state, 0.0, &[-10.0, 3.0, 0.0]);
-    assert_eq!(promise.no_admissible_rate(&state), None);
+    assert_eq!(promise.refusal(&state), None);
     assert!(state.guaranteed);
 }
 

@@ -3,8 +3,12 @@
 mod scenario;
 
 use proptest::prelude::*;
+use punctual_core::barrier::Barrier;
 use punctual_core::convergence::FixedTimeState;
-use punctual_core::filter::{BarrierSettings, FilterState, Method, Phase, SafetyFilter, Status};
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{
+    BarrierSettings, FilterBuilder, FilterState, Method, Phase, SafetyFilter, Sampling, Status,
+};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
 use punctual_core::plants::{PointMass, Unicycle};
@@ -17,6 +21,19 @@ fn step(filter: &mut SafetyFilter, t: f64, x: &[f64]) -> ([f64; 2], Status) {
     let mut u = [f64::NAN; 2];
     let status = filter.step(t, x, &[0.0; 2], &mut u).expect("right dimensions").status;
     (u, status)
+}
+
+/// A filter without regard to how long inputs are held.
+fn pointwise<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> SafetyFilter
+where
+    P: ControlAffine<4, 2> + Send + 'static,
+    B: Barrier<4> + Send + 'static,
+{
+    SafetyFilter::builder(4, 2)
+        .barrier("goal", plant, barrier, settings)
+        .and_then(|b| b.sampling(Sampling::Pointwise))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter")
 }
 
 #[test]
@@ -52,7 +69,7 @@ fn phases_follow_one_another() {
 /// A vehicle that cannot move as told: the deadline passes outside, then it is put inside, then outside.
 #[test]
 fn late_stay_left_and_back() {
-    let mut filter = goal(BarrierSettings::within(1.0));
+    let mut filter = pointwise(PointMass, distance_disc(), BarrierSettings::within(1.0));
     let outside = [0.0, 0.0, 0.0, 0.0];
     let inside = [45.0, 44.5, 0.0, 0.0];
     let phase = |filter: &mut SafetyFilter, t: f64, x: &[f64; 4]| {
@@ -106,7 +123,7 @@ fn anchoring_waits_for_the_first_valid_sample() {
     let mut filter = SafetyFilter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(5.0))
         .and_then(|b| b.bounds(&[1.0, -60.0], &[60.0, 60.0]))
-        .and_then(punctual_core::filter::FilterBuilder::build)
+        .and_then(FilterBuilder::build)
         .expect("valid filter");
     let good = [0.0, 0.0, 1.0, 0.0];
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -154,7 +171,8 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
         let b = &report.barriers[0];
         if t >= 5.0 {
             assert!(b.h >= margin - SAMPLING, "h = {} at {t}", b.h);
-            assert_eq!(b.profile, margin);
+            // The first step does not know the period yet and takes a hundredth of the deadline for it.
+            assert!(b.profile == b.margin && (0.0..1e-3).contains(&(b.margin - margin)), "{b:?}");
         }
     })
     .expect("valid schedule");
@@ -168,12 +186,12 @@ fn follows_its_profile<P>(
     step: f64,
     x0: [f64; 4],
 ) where
-    P: punctual_core::dynamics::ControlAffine<4, 2> + Send + Clone + 'static,
+    P: ControlAffine<4, 2> + Send + Clone + 'static,
 {
     /// The slack is seen at the ends of the periods; within one it may dip a little lower.
     const WITHIN_THE_PERIOD: f64 = 1.1;
-    let settings = BarrierSettings { rate: 5.0, stay_rate: 5.0, ..BarrierSettings::within(5.0) };
-    let mut filter = one(plant.clone(), distance_disc(), settings);
+    let settings = BarrierSettings { rate: Some(5.0), stay_rate: Some(5.0), ..BarrierSettings::within(5.0) };
+    let mut filter = pointwise(plant.clone(), distance_disc(), settings);
     let (mut deficit, mut held, mut compared) = (0.0_f64, None, 0);
     let schedule = Schedule { step, steps: (5.0 / step) as usize, substeps: 4 };
     closed_loop(&mut filter, plant, x0.into(), schedule, damping, |t, _, u, report| {
@@ -210,12 +228,16 @@ fn h_follows_its_profile_up_to_the_sampling_error() {
 fn the_arrival_of_a_bounded_one_dimensional_run_is_on_time() {
     // ẋ₁ = x₂, ẋ₂ = u, h = x₁ from −1: n = 2 by hand, through `source`.
     let source = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
-    let settings =
-        BarrierSettings { margin: 0.05, rate: 3.0, stay_rate: 3.0, ..BarrierSettings::within(5.0) };
+    let settings = BarrierSettings {
+        margin: 0.05,
+        rate: Some(3.0),
+        stay_rate: Some(3.0),
+        ..BarrierSettings::within(5.0)
+    };
     let mut filter = SafetyFilter::builder(2, 1)
         .source("line", source, settings)
         .and_then(|b| b.bounds(&[-1.0], &[1.0]))
-        .and_then(punctual_core::filter::FilterBuilder::build)
+        .and_then(FilterBuilder::build)
         .expect("valid filter");
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };
     closed_loop(
@@ -311,7 +333,7 @@ fn two_barriers_go_through_the_interior_point_method() {
             BarrierSettings { margin: 0.05, ..BarrierSettings::within(5.0) },
         )
         .and_then(|b| b.source("line", lie::along(PointMass, NonNegative, 2)?, BarrierSettings::within(2.0)))
-        .and_then(punctual_core::filter::FilterBuilder::build)
+        .and_then(FilterBuilder::build)
         .expect("valid filter");
     assert_eq!(filter.barrier_names().collect::<Vec<_>>(), ["goal", "line"]);
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [2, 2]);
@@ -343,7 +365,7 @@ fn bounds_that_forbid_the_row_are_infeasible_and_void_the_guarantee() {
     let mut filter = SafetyFilter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(0.5))
         .and_then(|b| b.bounds(&[-1.0, -2.0], &[1.0, 2.0]))
-        .and_then(punctual_core::filter::FilterBuilder::build)
+        .and_then(FilterBuilder::build)
         .expect("valid filter");
     let (u, status) = step(&mut filter, 0.0, &[0.0; 4]);
     // Both components of the row are positive: the corner nearest the goal.
@@ -373,7 +395,7 @@ fn the_centre_of_the_quadratic_disc_is_degenerate() {
 }
 
 fn goal_quadratic(deadline: f64) -> SafetyFilter {
-    one(PointMass, quadratic_disc(), BarrierSettings::within(deadline))
+    pointwise(PointMass, quadratic_disc(), BarrierSettings::within(deadline))
 }
 
 /// One barrier without finite derivatives stops the step: no other barrier is anchored by it.
@@ -382,7 +404,7 @@ fn a_singular_barrier_anchors_none() {
     let mut filter = SafetyFilter::builder(4, 2)
         .barrier("line", PointMass, NonNegative, BarrierSettings::within(2.0))
         .and_then(|b| b.barrier("goal", PointMass, distance_disc(), BarrierSettings::within(2.0)))
-        .and_then(punctual_core::filter::FilterBuilder::build)
+        .and_then(FilterBuilder::build)
         .expect("valid filter");
     let (_, status) = step(&mut filter, 0.0, &[1e200, 0.0, 0.0, 0.0]);
     assert_eq!(status, Status::Singular);

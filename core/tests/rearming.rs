@@ -3,9 +3,10 @@
 
 mod scenario;
 
+use punctual_core::barriers::DistanceDisc;
 use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::rk4_step;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, Phase, SafetyFilter, Sampling};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
 use punctual_core::plants::Unicycle;
@@ -65,7 +66,7 @@ fn a_deadline_in_the_past_is_late_at_once() {
     let promise = FixedTime::new(2, BarrierSettings::within(3.0)).expect("valid");
     for deadline in [0.0, -2.0] {
         let mut state = FixedTimeState::default();
-        promise.anchor(&mut state, 7.0, &[-4.0, 1.0], deadline);
+        promise.anchor(&mut state, 7.0, &[-4.0, 1.0], deadline, 0.0);
         assert!(!state.guaranteed);
         let demand = promise.advance(&mut state, 7.0, &[-4.0, 1.0]);
         assert_eq!((state.phase, state.guaranteed), (Phase::Late, false));
@@ -79,40 +80,166 @@ fn a_deadline_in_the_past_is_late_at_once() {
     }
 }
 
-/// A deadline shorter than a step: the sampled constraint has its end beyond the deadline, so that a
-/// barrier of relative degree 1 arrives at the first sample after it.
-#[test]
-fn a_deadline_shorter_than_a_step_is_met_at_the_next_sample() {
-    let (deadline, step) = (0.01, 0.05);
-    let mut filter = lie::along(Integrator::<1>, NonNegative, 1)
+/// A deadline shorter than a step: the sampled constraint has its end beyond the deadline, so that the
+/// barrier arrives at the first sample after it, whatever its relative degree, and stays.
+fn short_deadline<const N: usize>(step: f64, deadline: f64) {
+    let mut filter = lie::along(Integrator::<N>, NonNegative, N)
         .and_then(|source| {
-            SafetyFilter::builder(1, 1).source("line", source, BarrierSettings::within(deadline))
+            SafetyFilter::builder(N, 1).source("line", source, BarrierSettings::within(deadline))
         })
         .and_then(|b| b.sampling(Sampling::Period(step)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let schedule = Schedule { step, steps: 20, substeps: 1 };
+    let schedule = Schedule { step, steps: 100, substeps: 1 };
+    let mut x0 = SVector::<f64, N>::zeros();
+    x0[0] = -3.0;
+    let (mut first, mut least) = (None, 0.0_f64);
     closed_loop(
         &mut filter,
-        &Integrator::<1>,
-        vector![-3.0],
+        &Integrator::<N>,
+        x0,
         schedule,
         |_, _| vector![0.0],
         |t, x, _, r| {
-            assert!(r.status.is_satisfied(), "{:?} at {t}", r.status);
-            // The tolerance of the sampled rows, 1e-9 of terms of order 3.
-            assert!(t < step / 2.0 || x[0] >= -1e-8, "h = {} at {t}", x[0]);
-            assert_ne!(r.barriers[0].phase, Phase::Left);
+            assert!(r.status.is_satisfied(), "{N}: {r:?} at {t}");
+            if x[0] >= 0.0 {
+                first.get_or_insert(t);
+            }
+            if first.is_some() {
+                least = least.min(x[0]);
+            }
         },
     )
     .expect("valid schedule");
+    // One held input reaches h = 0 in one step at order 1; for order n it takes n of them.
+    assert!(first.is_some_and(|t| t <= (N as f64 + 0.5) * step), "{N}: first inside at {first:?}");
+    assert!(least >= 0.0, "{N}: {least} after the arrival");
+}
+
+#[test]
+fn a_deadline_shorter_than_a_step_is_met_as_soon_as_samples_allow() {
+    for (step, deadline) in [(0.05, 0.01), (0.05, 0.049), (1.0, 1e-6)] {
+        short_deadline::<1>(step, deadline);
+    }
+}
+
+/// Well inside at the start: the stay constraint applies from the first sample, with its guarantee.
+/// Inside, but leaving too fast for its rate: an approach that may pass outside and is inside again by T.
+#[test]
+fn a_start_inside() {
+    for (x0, phase) in [([1.0, -1.0], Phase::Stay), ([1.0, -40.0], Phase::Approach)] {
+        let mut filter = SafetyFilter::builder(2, 1)
+            .barrier("line", Integrator::<2>, NonNegative, BarrierSettings::within(4.0))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let schedule = Schedule { step: 0.01, steps: 1200, substeps: 1 };
+        let mut least_late = f64::INFINITY;
+        closed_loop(
+            &mut filter,
+            &Integrator::<2>,
+            x0.into(),
+            schedule,
+            |_, _| vector![-1.0],
+            |t, x, _, r| {
+                let b = r.barriers[0];
+                assert!(b.guaranteed && b.arrival_time == Some(0.0), "at {t}: {b:?}");
+                assert!(t > 0.0 || b.phase == phase);
+                assert!(phase == Phase::Approach || x[0] >= 0.0, "{} at {t}", x[0]);
+                if t >= 4.0 {
+                    least_late = least_late.min(x[0]);
+                }
+            },
+        )
+        .expect("valid schedule");
+        assert!(least_late >= 0.0, "{x0:?}: {least_late}");
+    }
+}
+
+/// Another deadline on the way: the promise starts anew where the plant is, never without a guarantee,
+/// and is kept.
+#[test]
+fn a_new_deadline_on_the_way() {
+    for (changed_at, deadline) in [(2.0, 3.5), (2.0, 9.0), (4.9, 2.0)] {
+        let mut filter = goal(BarrierSettings::within(5.0));
+        let mut x = vector![0.0, 0.0, 1.0, 0.0];
+        let (mut u, step) = (SVector::<f64, 2>::zeros(), 0.01);
+        let end = changed_at + deadline;
+        for k in 0..1500_u32 {
+            let t = f64::from(k) * step;
+            if (t - changed_at).abs() < 1e-9 {
+                filter.set_deadline(0, deadline).expect("a barrier and a deadline");
+            }
+            let u_ref = [-x[2], -x[3]];
+            let b =
+                filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+            assert!(b.guaranteed, "at {t}: {b:?}");
+            if t >= changed_at && b.phase == Phase::Approach {
+                assert!((b.time_left - (end - t)).abs() < 1e-9, "at {t}");
+            }
+            assert!(t < end || b.h >= 0.0, "{deadline}: h = {} at {t}", b.h);
+            x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+        }
+    }
+    let mut filter = goal(BarrierSettings::within(5.0));
+    let refused = |r: Result<(), punctual_core::Error>| r.expect_err("refused").to_string();
+    assert_eq!(refused(filter.set_deadline(1, 2.0)), "barrier: is 1, must be < 1, the number of barriers");
+    assert_eq!(refused(filter.set_deadline(0, -2.0)), "goal.deadline: is -2, must be finite and > 0");
+}
+
+/// A goal that is moved: inside the new one within the deadline that counts from the move.
+#[test]
+fn a_moved_set_on_the_way() {
+    let mut filter = goal(BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) });
+    let mut x = vector![0.0, 0.0, 1.0, 0.0];
+    let (mut u, step, moved_at) = (SVector::<f64, 2>::zeros(), 0.01, 6.0);
+    for k in 0..1500_u32 {
+        let t = f64::from(k) * step;
+        if (t - moved_at).abs() < 1e-9 {
+            let disc = DistanceDisc::new([20.0, 60.0], 2.0, 2.0).expect("valid disc");
+            let source = lie::along(punctual_core::plants::PointMass, disc, 2).expect("in range");
+            filter.set_source(0, source).expect("the same dimensions");
+        }
+        let u_ref = [-x[2], -x[3]];
+        let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+        assert!(b.guaranteed, "at {t}: {b:?}");
+        let promised = (5.0..moved_at - 1e-9).contains(&t) || t >= moved_at + 5.0;
+        assert!(!promised || b.h >= 0.0, "h = {} at {t}", b.h);
+        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+    }
+    let other = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
+    let refused = filter.set_source(0, other).expect_err("refused");
+    assert_eq!(refused.to_string(), "goal.x: has 2 components, must have 4");
+    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 3).expect("in range");
+    let refused = filter.set_source(0, other).expect_err("refused");
+    assert_eq!(refused.to_string(), "goal.relative_degree: is 3, must stay 2");
+}
+
+/// The repeated root from rest at odd order: the report has the fallback, the filter the reason.
+#[test]
+fn a_method_that_fails_at_the_anchor_is_reported() {
+    let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(4.0) };
+    let mut filter = SafetyFilter::builder(3, 1)
+        .barrier("line", Integrator::<3>, NonNegative, settings)
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    assert_eq!(filter.refusal(0), None);
+    let report = filter.step(0.0, &[-3.0, 0.0, 0.0], &[0.0], &mut [0.0]).expect("right dimensions");
+    assert!(report.barriers[0].fallback && !report.barriers[0].guaranteed);
+    let reason = filter.refusal(0).expect("no rate from rest");
+    let wanted = "no admissible rate: the polynomial of the repeated root has no real root for any deadline";
+    assert_eq!(reason.to_string(), wanted);
+    assert_eq!(filter.refusal(1), None);
 }
 
 /// One step of delay under a master that exchanges first: arrival and least h after the deadline, and the
 /// number of steps whose constraint could not be met.
 fn jacobi(compensated: bool, step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
-    let settings =
-        BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(5.0) };
+    let settings = BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: 0.02,
+        ..BarrierSettings::within(5.0)
+    };
     let mut filter = SafetyFilter::builder(4, 2)
         .barrier("goal", Unicycle, distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(step)))

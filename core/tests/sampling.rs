@@ -19,7 +19,12 @@ fn bicycle() -> Bicycle {
 }
 
 fn settings() -> BarrierSettings {
-    BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(DEADLINE) }
+    BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: 0.02,
+        ..BarrierSettings::within(DEADLINE)
+    }
 }
 
 fn filter<P>(plant: P, sampling: Sampling) -> SafetyFilter
@@ -75,7 +80,12 @@ fn predictions_follow_the_flow() {
 /// whatever the period: ψ = (D + a)ⁿ⁻¹ e never falls below e^{−aδ} of itself.
 fn psi_never_falls_faster<const N: usize>(period: f64) {
     let rate = 3.0;
-    let settings = BarrierSettings { rate, stay_rate: rate, margin: 0.05, ..BarrierSettings::within(4.0) };
+    let settings = BarrierSettings {
+        rate: Some(rate),
+        stay_rate: Some(rate),
+        margin: 0.05,
+        ..BarrierSettings::within(4.0)
+    };
     let mut filter = lie::along(Integrator::<N>, NonNegative, N)
         .and_then(|source| SafetyFilter::builder(N, 1).source("line", source, settings))
         .and_then(|b| b.sampling(Sampling::Period(period)))
@@ -158,7 +168,7 @@ const HARD: [[f64; 4]; 4] =
 #[test]
 fn fifty_milliseconds_keep_the_deadline_and_the_margin() {
     for x0 in HARD {
-        for sampling in [Sampling::Period(0.05), Sampling::Measured] {
+        for sampling in [Sampling::Period(0.05), Sampling::Measured { first: None }] {
             for (name, (arrival, least)) in [
                 ("point mass", run(&PointMass, damping, sampling, 0.05, x0)),
                 ("unicycle", run(&Unicycle, speed_damping, sampling, 0.05, x0)),
@@ -227,21 +237,25 @@ fn a_reference_that_meets_the_sampled_rows_is_returned_bit_for_bit() {
     assert_eq!((report.status, u), (Status::Unchanged, u_ref));
 }
 
-/// The measured period: none at first, the step before then, at most twice as much after a gap, and
-/// unchanged by a repeated or an earlier sample.
+/// The measured period: a hundredth of the deadline at first or what is given, the step before then, at most
+/// twice as much after a gap, and unchanged by a repeated or an earlier sample.
 #[test]
 fn the_period_is_measured() {
-    let mut filter = filter(PointMass, Sampling::Measured);
+    let mut filter = filter(PointMass, Sampling::Measured { first: None });
     let mut u = [0.0; 2];
     let mut periods = Vec::new();
     for t in [0.0, 0.125, 0.25, 1.25, 1.25, 1.0, 1.125] {
         let report = filter.step(t, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
-        assert_eq!(report.predicted, report.period > 0.0);
+        assert!(report.predicted);
         periods.push(report.period);
     }
-    assert_eq!(periods, [0.0, 0.125, 0.125, 0.25, 0.25, 0.25, 0.125]);
+    assert_eq!(periods, [0.01 * DEADLINE, 0.125, 0.125, 0.25, 0.25, 0.25, 0.125]);
     filter.rearm();
-    assert_eq!(filter.step(2.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").period, 0.0);
+    let report = filter.step(2.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert_eq!(report.period, 0.01 * DEADLINE);
+    let mut given = self::filter(PointMass, Sampling::Measured { first: Some(0.03) });
+    let report = given.step(2.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert_eq!(report.period, 0.03);
 }
 
 #[test]
@@ -279,7 +293,15 @@ fn without_a_prediction_the_constraint_is_pointwise() {
         .and_then(|b| b.sampling(Sampling::Period(0.05)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut pointwise = filter(PointMass, Sampling::Pointwise);
+    let first = [0.0, 3.0, 1.0, -4.0];
+    let margin =
+        blind.peek(0.0, &first, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").barriers[0].margin;
+    assert!(margin > settings().margin);
+    let mut pointwise = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, distance_disc(), BarrierSettings { margin, ..settings() })
+        .and_then(|b| b.sampling(Sampling::Pointwise))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
     for k in 0..20 {
         let (t, x) = (f64::from(k) * 0.05, [f64::from(k), 3.0, 1.0, -4.0]);
         let (mut u, mut wanted) = ([0.0; 2], [0.0; 2]);
@@ -290,13 +312,32 @@ fn without_a_prediction_the_constraint_is_pointwise() {
     }
 }
 
+/// Samples further apart than was thought at the first one: the margin becomes what it would have been.
+#[test]
+fn the_margin_follows_the_measured_period() {
+    let mut known = filter(PointMass, Sampling::Measured { first: Some(0.2) });
+    let mut measured = filter(PointMass, Sampling::Measured { first: Some(0.001) });
+    let mut u = [0.0; 2];
+    let mut margin = |filter: &mut SafetyFilter, t: f64| {
+        let report = filter.step(t, &[2.0 * t, 0.0, 2.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
+        report.barriers[0].margin
+    };
+    let (wanted, first) = (margin(&mut known, 0.0), margin(&mut measured, 0.0));
+    assert!(settings().margin < first && first < wanted, "{first} {wanted}");
+    // Until round-off: h at the anchor is put together again from the margin and what is above it.
+    let second = margin(&mut measured, 0.2);
+    assert!((second - wanted).abs() < 1e-12, "{second} for {wanted}");
+    // Once only, and never less.
+    assert_eq!(margin(&mut measured, 0.6), second);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
 
     /// A restored filter goes on with the same bits, and `peek` answers as `step` does.
     #[test]
     fn restored_equals_uninterrupted(interrupt in 0..30_usize, x0 in prop::array::uniform4(-10.0..20.0_f64)) {
-        let build = || filter(bicycle(), Sampling::Measured);
+        let build = || filter(bicycle(), Sampling::Measured { first: None });
         let (mut whole, mut second) = (build(), build());
         let mut u = [0.0; 2];
         second.step(0.7, &[45.0, 45.0, 1.0, 1.0], &[0.0; 2], &mut u).expect("right dimensions");
@@ -329,7 +370,7 @@ proptest! {
         measured in any::<bool>(),
     ) {
         let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
-        let sampling = if measured { Sampling::Measured } else { Sampling::Period(0.05) };
+        let sampling = if measured { Sampling::Measured { first: None } } else { Sampling::Period(0.05) };
         let mut filter = SafetyFilter::builder(4, 2)
             .barrier("goal", Unicycle, distance_disc(), settings())
             .and_then(|b| b.bounds(&high.map(|v| -v), &high))

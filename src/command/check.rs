@@ -208,7 +208,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         if experiment.stop_time - experiment.start_time < settings.deadline {
             warn("the experiment stops before the deadline".to_owned());
         }
-        if let Some(reason) = filter.no_admissible_rate(i) {
+        if let Some(reason) = filter.refusal(i) {
             warn(format!("{reason}; the stay rate is used instead, without a promise"));
         }
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {

@@ -20,8 +20,12 @@ const HEADING: Kinds = [
 
 /// Point mass, unicycle, bicycle: all on time and inside; returns the median peaks.
 fn all_keep_the_deadline(starts: &[[f64; 4]], nominal: Kinds, scheme: Scheme, step: f64) -> [f64; 3] {
-    let settings =
-        BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: 0.02,
+        ..BarrierSettings::within(DEADLINE)
+    };
     let median = |name: &str, runs: Vec<Run>| {
         assert_all_keep_the_deadline(&format!("{name}, {scheme:?}, {step}"), &runs, starts);
         quantile(&runs, 0.5)

@@ -39,8 +39,12 @@ fn profile_runs<P>(plant: &P, nominal: Nominal, starts: &[[f64; 4]]) -> Vec<Run>
 where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
 {
-    let settings =
-        BarrierSettings { rate: 5.0, stay_rate: 5.0, margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: 0.02,
+        ..BarrierSettings::within(DEADLINE)
+    };
     starts.iter().map(|x0| run(plant, distance(), settings, nominal, STEP, *x0)).collect()
 }
 

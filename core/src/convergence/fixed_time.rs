@@ -1,84 +1,18 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
+use std::fmt;
+use std::sync::Arc;
+
 use super::comparison::{Stack, lower_bound, lower_terms};
-use super::first_order::Exponent;
-use super::hermite::HermiteProfile;
+use super::profile::{self, Derivatives, Hermite, Profile, ProfileError};
 use super::repeated_root::{self, NoAdmissibleRate};
-use super::stay;
+use super::settings::{FixedTimeSettings, Method};
+use super::{sampled, stay};
 use crate::MAX_RELATIVE_DEGREE;
-use crate::error::{Error, ErrorKind, non_negative, positive};
+use crate::error::{Error, ErrorKind, positive};
 
 /// Round-off of h − μ − r, as a part of its terms.
 const MARGIN_TOLERANCE: f64 = 1e-12;
-
-/// How the deadline is met.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root::rate`]. Relative degree 2
-    /// and above; for odd ones many anchors have no such rate ([`FixedTime::no_admissible_rate`]).
-    RepeatedRoot,
-    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`] r and the configured rate.
-    #[default]
-    ReferenceProfile,
-    /// ė ≥ α |e|^p for e = h − μ < 0, with α such that e = 0 at T ([`Exponent`]). Relative degree 1.
-    FirstOrder(Exponent),
-}
-
-/// Settings of one barrier's promise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FixedTimeSettings {
-    /// T in s from the anchor, finite, > 0.
-    pub deadline: f64,
-    /// How the deadline is met. Default: [`Method::ReferenceProfile`].
-    pub method: Method,
-    /// a in 1/s, finite, > 0: how fast an error against the profile decays.
-    pub rate: f64,
-    /// a of the stay constraint in 1/s, finite, > 0.
-    pub stay_rate: f64,
-    /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside.
-    pub margin: f64,
-    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
-    /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
-    /// ([`Phase::Left`]) and the stay constraint pulls back, without a deadline.
-    pub recovery: Option<f64>,
-}
-
-impl FixedTimeSettings {
-    /// The product of rate and deadline that [`Self::within`] chooses.
-    pub const DEFAULT_RATE_TIMES_DEADLINE: f64 = 20.0;
-
-    /// The defaults for a deadline of `deadline` seconds: reference profile, both rates
-    /// 20/T, no margin.
-    pub fn within(deadline: f64) -> Self {
-        let rate = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
-        Self { deadline, method: Method::default(), rate, stay_rate: rate, margin: 0.0, recovery: None }
-    }
-
-    fn validated(self, n: usize) -> Result<Self, Error> {
-        if n == 0 || n > MAX_RELATIVE_DEGREE {
-            let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
-            return Err(Error::new(ErrorKind::RelativeDegree, "relative_degree", message));
-        }
-        if self.method == Method::RepeatedRoot && n == 1 {
-            let message = "the repeated root does not exist for relative degree 1; use the reference profile";
-            return Err(Error::new(ErrorKind::Unsupported, "method", message));
-        }
-        if matches!(self.method, Method::FirstOrder(_)) && n != 1 {
-            let message = format!(
-                "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
-            );
-            return Err(Error::new(ErrorKind::Unsupported, "method", message));
-        }
-        positive("deadline", self.deadline)?;
-        positive("rate", self.rate)?;
-        positive("stay_rate", self.stay_rate)?;
-        non_negative("margin", self.margin)?;
-        if let Some(recovery) = self.recovery {
-            positive("recovery", recovery)?;
-        }
-        Ok(self)
-    }
-}
 
 /// Where a barrier stands with its promise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,8 +45,17 @@ pub struct FixedTimeState {
     pub recoveries: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     pub anchor: Stack,
-    /// The rate of the approach in 1/s, chosen at the anchor.
+    /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
     pub rate: f64,
+    /// The rate of the stay constraint in 1/s, chosen at the anchor.
+    pub stay_rate: f64,
+    /// μ in the unit of h, chosen at the anchor: the settings' margin and what held inputs cost.
+    pub margin: f64,
+    /// The sampling period in s that was accounted for at the anchor, 0 for none.
+    pub period: f64,
+    /// Whether the method could not be used from this anchor and another took its place
+    /// ([`FixedTime::refusal`] says why).
+    pub fallback: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
@@ -133,11 +76,44 @@ pub struct Demand {
     pub time_left: f64,
 }
 
-/// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
+/// Why the configured method cannot be used from an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate,
+    /// which leads towards the set without a deadline; nothing is guaranteed until the stay constraint
+    /// takes over.
+    NoAdmissibleRate(NoAdmissibleRate),
+    /// The profile of one's own is not one from this anchor. In its place: the Hermite profile, with its
+    /// guarantee.
+    Profile(ProfileError),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoAdmissibleRate(reason) => reason.fmt(f),
+            Self::Profile(reason) => reason.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
+#[derive(Clone)]
 pub struct FixedTime {
     pub(super) n: usize,
     pub(super) settings: FixedTimeSettings,
+    /// A profile of one's own in place of [`Hermite`].
+    own: Option<Arc<dyn Profile + Send + Sync>>,
+}
+
+impl fmt::Debug for FixedTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { n, settings, own } = self;
+        let own = own.is_some();
+        f.debug_struct("FixedTime").field("n", n).field("settings", settings).field("own", &own).finish()
+    }
 }
 
 impl FixedTime {
@@ -148,7 +124,31 @@ impl FixedTime {
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
     /// repeated root with n = 1, the first-order condition with n > 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
-        Ok(Self { n, settings: settings.validated(n)? })
+        Ok(Self { n, settings: settings.validated(n)?, own: None })
+    }
+
+    /// The same promise along a profile of one's own. It is [checked](profile::check) at every anchor,
+    /// some 3000 evaluations; one that fails is [refused](Refusal::Profile).
+    ///
+    /// # Errors
+    ///
+    /// A method other than [`Method::ReferenceProfile`].
+    pub fn with_profile(self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
+        if self.settings.method != Method::ReferenceProfile {
+            let message = "a profile of one's own belongs to the reference profile";
+            return Err(Error::new(ErrorKind::Unsupported, "method", message));
+        }
+        Ok(Self { own: Some(Arc::new(profile)), ..self })
+    }
+
+    /// The same promise with another deadline in s, for anchors to come.
+    ///
+    /// # Errors
+    ///
+    /// A deadline that is not finite or ≤ 0.
+    pub fn with_deadline(mut self, deadline: f64) -> Result<Self, Error> {
+        self.settings.deadline = positive("deadline", deadline)?;
+        Ok(self)
     }
 
     /// The settings.
@@ -159,26 +159,25 @@ impl FixedTime {
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
     /// returns what the constraint asks for there.
     ///
-    /// The first call anchors, as [`Self::anchor`] with the configured deadline does. Arrival is the first sample with h ≥ 0; the stay constraint takes over
-    /// at the first sample at which h ≥ μ *and* it is invariant from there ([`stay::is_invariant`]).
+    /// The first call anchors, as [`Self::anchor`] with the configured deadline and no period does. Arrival is
+    /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
+    /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
-        let FixedTimeSettings { stay_rate, margin, .. } = self.settings;
         if state.phase == Phase::Waiting {
-            self.anchor(state, t, h, self.settings.deadline);
+            self.anchor(state, t, h, self.settings.deadline, 0.0);
         }
-        let mut e = [0.0; MAX_RELATIVE_DEGREE];
-        e[..self.n].copy_from_slice(&h[..self.n]);
-        e[0] -= margin;
-        let e = &e[..self.n];
-
         if let Some(recovery) = self.settings.recovery
             && state.phase == Phase::Stay
             && h[0] < 0.0
         {
-            self.anchor(state, t, h, recovery);
+            self.anchor(state, t, h, recovery, state.period);
             state.recoveries += 1;
         }
-        let deadline = state.deadline;
+        let FixedTimeState { stay_rate, margin, deadline, .. } = *state;
+        let mut e = [0.0; MAX_RELATIVE_DEGREE];
+        e[..self.n].copy_from_slice(&h[..self.n]);
+        e[0] -= margin;
+        let e = &e[..self.n];
         let elapsed = (t - state.anchor_time).max(0.0);
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
@@ -207,47 +206,103 @@ impl FixedTime {
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
 
-    /// Why the approach in `state` has no guarantee from its anchor: the repeated root has no admissible
-    /// rate there. `None` for other methods, before the anchor, and where the rate exists.
-    ///
-    /// The fallback is (D + a)ⁿ (h − μ) ≥ 0 with the stay rate a > 0: from the anchor it leads towards
-    /// the set without a deadline. Such an approach is not [`FixedTimeState::guaranteed`] until the
-    /// stay constraint takes over.
-    pub fn no_admissible_rate(&self, state: &FixedTimeState) -> Option<NoAdmissibleRate> {
-        if self.settings.method != Method::RepeatedRoot || state.phase == Phase::Waiting {
+    /// Why the configured method is not the one in force since the anchor in `state`, if it is not:
+    /// `None` too before the anchor. Computed anew: not for every step.
+    pub fn refusal(&self, state: &FixedTimeState) -> Option<Refusal> {
+        if !state.fallback || state.phase == Phase::Waiting {
             return None;
         }
-        repeated_root::rate(&state.anchor[..self.n], state.deadline).err()
+        let (anchor, deadline) = (&state.anchor[..self.n], state.deadline);
+        match (&self.settings.method, &self.own) {
+            (Method::RepeatedRoot, _) => {
+                repeated_root::rate(anchor, deadline).err().map(Refusal::NoAdmissibleRate)
+            }
+            (Method::ReferenceProfile, Some(own)) => {
+                profile::check(&**own, anchor, deadline).err().map(Refusal::Profile)
+            }
+            _ => None,
+        }
     }
 
     /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
-    /// be reached within `deadline` seconds from there. A deadline ≤ 0 is past already: nothing is
-    /// guaranteed, the phase of the next [`Self::advance`] is [`Phase::Late`] where h < 0, and the target
-    /// is h = μ at once, approached with the rate. The count of recoveries goes on.
-    pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64) {
+    /// be reached within `deadline` seconds from there, with inputs held for `period` ≥ 0 seconds (0: not
+    /// held, or not known). The count of recoveries goes on.
+    ///
+    /// A deadline ≤ 0 is past already: nothing is guaranteed, the phase of the next [`Self::advance`] is
+    /// [`Phase::Late`] where h < 0, and the target is h = μ at once, approached with the rate.
+    pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64, period: f64) {
+        let settings = &self.settings;
+        let (n, past) = (self.n, deadline <= 0.0);
+        let allowed = if past { settings.deadline } else { deadline };
+        let default_rate = FixedTimeSettings::default_rate(allowed, period);
+        let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
         let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
-        anchor[..self.n].copy_from_slice(&h[..self.n]);
-        anchor[0] -= self.settings.margin;
-        let rate = match self.settings.method {
-            _ if deadline <= 0.0 => None,
-            Method::ReferenceProfile => Some(self.settings.rate),
-            Method::RepeatedRoot => repeated_root::rate(&anchor[..self.n], deadline).ok(),
-            Method::FirstOrder(exponent) => Some(exponent.rate(deadline)),
-        };
-        let fallback = match self.settings.method {
-            Method::ReferenceProfile => self.settings.rate,
-            Method::RepeatedRoot | Method::FirstOrder(_) => self.settings.stay_rate,
-        };
+        anchor[..n].copy_from_slice(&h[..n]);
+        let mut margin = settings.margin;
+        let (mut rate, mut fallback) = (stay_rate, false);
+        let mut guaranteed = !past;
+        match settings.method {
+            Method::ReferenceProfile => {
+                rate = settings.rate.unwrap_or(default_rate);
+                if !past && period > 0.0 {
+                    margin +=
+                        sampled::margin(&anchor[..n], deadline, self.attenuation(rate, deadline), period);
+                }
+            }
+            Method::FirstOrder(exponent) if !past => rate = exponent.rate(deadline),
+            Method::RepeatedRoot | Method::FirstOrder(_) => {}
+        }
+        anchor[0] -= margin;
+        if !past {
+            if settings.method == Method::RepeatedRoot {
+                match repeated_root::rate(&anchor[..n], deadline) {
+                    Ok(root) => rate = root,
+                    Err(_) => (fallback, guaranteed) = (true, false),
+                }
+            } else if let Some(own) = &self.own {
+                fallback = profile::check(&**own, &anchor[..n], deadline).is_err();
+            }
+        }
         *state = FixedTimeState {
             phase: Phase::Approach,
             anchor_time: t,
             deadline,
             recoveries: state.recoveries,
             anchor,
-            rate: rate.unwrap_or(fallback),
+            rate,
+            stay_rate,
+            margin,
+            period,
+            fallback,
             arrival: None,
-            guaranteed: rate.is_some(),
+            guaranteed,
         };
+    }
+
+    /// Takes into account, on the way, that inputs are held for `period` > 0 seconds: margin and default
+    /// rates become what they would have been had it been known at the anchor. With the reference profile
+    /// h − μ − r changes by less than (elapsed/T)ⁿ parts of the change of the margin; other methods take
+    /// none.
+    pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
+        if self.settings.method != Method::ReferenceProfile {
+            return;
+        }
+        let FixedTimeState { arrival, guaranteed, phase, .. } = *state;
+        let mut h = state.anchor;
+        h[0] += state.margin;
+        self.anchor(state, state.anchor_time, &h[..self.n], state.deadline, period);
+        (state.arrival, state.guaranteed, state.phase) = (arrival, guaranteed, phase);
+    }
+
+    /// The profile in force and its derivatives, without the margin.
+    pub(super) fn profile(&self, state: &FixedTimeState, elapsed: f64) -> Derivatives {
+        let anchor = &state.anchor[..self.n];
+        match &self.own {
+            Some(own) if !state.fallback && state.deadline > 0.0 => {
+                own.evaluate(anchor, state.deadline, elapsed)
+            }
+            _ => Hermite.evaluate(anchor, state.deadline, elapsed),
+        }
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
@@ -263,20 +318,24 @@ impl FixedTime {
                 (exponent.floor(anchor[0], deadline, e[0]), bound)
             }
             Method::ReferenceProfile => {
-                let r = HermiteProfile::new(anchor, state.deadline).evaluate(elapsed);
+                let r = self.profile(state, elapsed);
                 let mut error = [0.0; MAX_RELATIVE_DEGREE];
                 for k in 0..self.n {
                     error[k] = e[k] - r[k];
                 }
                 let error = &error[..self.n];
                 // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
-                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + self.settings.margin);
-                if self.settings.margin > 0.0 && error[0] < -self.settings.margin - scale {
+                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
+                if state.margin > 0.0 && error[0] < -state.margin - scale {
                     state.guaranteed = false;
                 }
+                let (terms, invariant) = match &self.settings.rates {
+                    Some(rates) => (rates.lower_terms(error), rates.is_invariant(error)),
+                    None => (lower_terms(state.rate, error), stay::is_invariant(state.rate, error)),
+                };
                 // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed |= elapsed < state.deadline && stay::is_invariant(state.rate, error);
-                (r[self.n] - lower_terms(state.rate, error), r[0])
+                state.guaranteed |= elapsed < state.deadline && invariant;
+                (r[self.n] - terms, r[0])
             }
         }
     }

@@ -25,6 +25,8 @@ pub mod polynomial;
 pub mod profile;
 pub mod repeated_root;
 pub mod sampled;
+mod settings;
 pub mod stay;
 
-pub use fixed_time::{Demand, FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase};
+pub use fixed_time::{Demand, FixedTime, FixedTimeState, Phase, Refusal};
+pub use settings::{FixedTimeSettings, Method};

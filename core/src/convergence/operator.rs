@@ -33,6 +33,28 @@ pub struct Operator {
     coefficients: Stack,
 }
 
+/// The coefficients of Π (D + a_i) below its leading 1; zeros from there on.
+fn lower_coefficients(rates: &[f64]) -> Stack {
+    let mut c = [0.0; MAX_RELATIVE_DEGREE];
+    for (i, &a) in rates.iter().enumerate() {
+        // Multiply the operator of the first i rates, whose leading coefficient is 1, by D + a.
+        c[i] = 1.0;
+        for j in (0..=i).rev() {
+            c[j] = a * c[j] + if j > 0 { c[j - 1] } else { 0.0 };
+        }
+    }
+    c
+}
+
+/// Π (D + a_i) e = (D + `last`) Σ_k `weights[k]` e⁽ᵏ⁾.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Split {
+    /// Of n − 1 rates, its leading coefficient 1 among them; zeros above.
+    pub(super) weights: Stack,
+    /// a_n in 1/s.
+    pub(super) last: f64,
+}
+
 impl Operator {
     /// The operator with these rates: 1 to [`MAX_RELATIVE_DEGREE`] of them, each in 1/s, finite, > 0.
     ///
@@ -54,19 +76,12 @@ impl Operator {
             let message = format!("has {n} components, must have 1 to {MAX_RELATIVE_DEGREE}");
             return Err(Error::new(ErrorKind::Dimension, "rates", message));
         }
-        let mut operator =
-            Self { n, rates: [0.0; MAX_RELATIVE_DEGREE], coefficients: [0.0; MAX_RELATIVE_DEGREE] };
-        operator.rates[..n].copy_from_slice(rates);
         for (i, &a) in rates.iter().enumerate() {
             positive(&format!("rates[{}]", i + 1), a)?;
-            // Multiply the operator of the first i rates, whose leading coefficient is 1, by D + a.
-            let c = &mut operator.coefficients;
-            c[i] = 1.0;
-            for j in (0..=i).rev() {
-                c[j] = a * c[j] + if j > 0 { c[j - 1] } else { 0.0 };
-            }
         }
-        Ok(operator)
+        let mut kept = [0.0; MAX_RELATIVE_DEGREE];
+        kept[..n].copy_from_slice(rates);
+        Ok(Self { n, rates: kept, coefficients: lower_coefficients(rates) })
     }
 
     /// The number of rates, n.
@@ -82,6 +97,15 @@ impl Operator {
     /// Π (D + a_i) e without e⁽ⁿ⁾, where `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾.
     pub fn lower_terms(&self, e: &[f64]) -> f64 {
         self.coefficients().iter().zip(e).map(|(c, e)| c * e).sum()
+    }
+
+    /// The operator as (D + a_n) after that of the other n − 1 rates.
+    pub(super) fn without_last(&self) -> Split {
+        let others = &self.rates[..self.n - 1];
+        let mut weights = lower_coefficients(others);
+        weights[others.len()] = 1.0;
+        let last = self.rates[others.len()];
+        Split { weights, last }
     }
 
     /// Whether Π (D + a_i) e ≥ 0 keeps e ≥ 0 for ever from `e`: all e_i ≥ 0, i < n, the rates taken in

@@ -23,23 +23,33 @@
 
 use std::fmt;
 
-use super::comparison::Stack;
 use super::hermite::HermiteProfile;
-use super::operator::Operator;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// r and its derivatives, `[e]`/s^k; entries above the order in use are ignored.
 pub type Derivatives = [f64; MAX_RELATIVE_DEGREE + 1];
 
-/// A function of time since the anchor that leaves from the anchor and is ≥ 0 from the deadline on.
+/// A way from every anchor into the set: a function of time since the anchor that leaves with the
+/// anchor's derivatives and is ≥ 0 from the deadline on.
 pub trait Profile {
-    /// r⁽⁰⁾ … r⁽ⁿ⁾ at `elapsed` = τ ≥ 0 in s; at a jump of r⁽ⁿ⁾, its value after it.
-    fn evaluate(&self, elapsed: f64) -> Derivatives;
+    /// r⁽⁰⁾ … r⁽ⁿ⁾ at `elapsed` = τ ≥ 0 in s, from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within
+    /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 }
 
-impl Profile for HermiteProfile {
-    fn evaluate(&self, elapsed: f64) -> Derivatives {
-        HermiteProfile::evaluate(self, elapsed)
+impl<F: Fn(&[f64], f64, f64) -> Derivatives> Profile for F {
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
+        self(anchor, deadline, elapsed)
+    }
+}
+
+/// [`HermiteProfile`]s, the default.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hermite;
+
+impl Profile for Hermite {
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
+        HermiteProfile::new(anchor, deadline).evaluate(elapsed)
     }
 }
 
@@ -110,16 +120,24 @@ impl fmt::Display for ProfileError {
 
 impl std::error::Error for ProfileError {}
 
+/// A profile from one anchor.
+struct Anchored<'a> {
+    profile: &'a dyn Profile,
+    anchor: &'a [f64],
+    deadline: f64,
+}
+
 /// Checks that `profile` leaves from `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), that its derivatives up to r⁽ⁿ⁾ are each
 /// other's, and that it is ≥ 0 from `deadline` = T > 0 s on, until 3T.
 ///
 /// # Errors
 ///
 /// The first [`ProfileError`] met, in the order of time.
-pub fn check(profile: &impl Profile, anchor: &[f64], deadline: f64) -> Result<(), ProfileError> {
+pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(), ProfileError> {
     let n = anchor.len();
     let panel = deadline / 64.0;
-    let start = finite(profile, n, 0.0)?;
+    let profile = Anchored { profile, anchor, deadline };
+    let start = profile.finite(0.0)?;
     // Sizes of r⁽ᵏ⁾ Tᵏ decide what is round-off: a derivative that should vanish has no size of its own.
     let size = |r: &Derivatives| {
         (0..=n).fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * deadline.powi(k as i32)).abs()))
@@ -134,11 +152,11 @@ pub fn check(profile: &impl Profile, anchor: &[f64], deadline: f64) -> Result<()
     for i in 0..3 * 64 {
         // The panels meet at T exactly, where r⁽ⁿ⁾ may jump.
         let (a, b) = (panel * f64::from(i), panel * f64::from(i + 1));
-        let right = finite(profile, n, b)?;
+        let right = profile.finite(b)?;
         largest = largest.max(size(&right));
-        let whole = mean(profile, n, a, b)?;
+        let whole = profile.mean(a, b)?;
         let middle = a + (b - a) / 2.0;
-        let (first, second) = (mean(profile, n, a, middle)?, mean(profile, n, middle, b)?);
+        let (first, second) = (profile.mean(a, middle)?, profile.mean(middle, b)?);
         for order in 1..=n {
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);
@@ -155,64 +173,32 @@ pub fn check(profile: &impl Profile, anchor: &[f64], deadline: f64) -> Result<()
     Ok(())
 }
 
-fn finite(profile: &impl Profile, n: usize, elapsed: f64) -> Result<Derivatives, ProfileError> {
-    let r = profile.evaluate(elapsed);
-    match r[..=n].iter().position(|v| !v.is_finite()) {
-        Some(order) => Err(ProfileError::NotFinite { order, elapsed }),
-        None => Ok(r),
-    }
-}
-
-/// The mean of every derivative over [a, b] by Gauss' rule with five nodes.
-fn mean(profile: &impl Profile, n: usize, a: f64, b: f64) -> Result<Derivatives, ProfileError> {
-    /// Nodes on [−1, 1] and half the weights.
-    const RULE: [(f64, f64); 5] = [
-        (-0.906_179_845_938_664, 0.118_463_442_528_094_54),
-        (-0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
-        (0.0, 0.284_444_444_444_444_44),
-        (0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
-        (0.906_179_845_938_664, 0.118_463_442_528_094_54),
-    ];
-    let mut sum = [0.0; MAX_RELATIVE_DEGREE + 1];
-    for (node, weight) in RULE {
-        let r = finite(profile, n, a + (b - a) * (0.5 + 0.5 * node))?;
-        for k in 0..=n {
-            sum[k] += weight * r[k];
+impl Anchored<'_> {
+    fn finite(&self, elapsed: f64) -> Result<Derivatives, ProfileError> {
+        let r = self.profile.evaluate(self.anchor, self.deadline, elapsed);
+        match r[..=self.anchor.len()].iter().position(|v| !v.is_finite()) {
+            Some(order) => Err(ProfileError::NotFinite { order, elapsed }),
+            None => Ok(r),
         }
     }
-    Ok(sum)
-}
 
-/// The constraint (P) for a checked profile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracking<P> {
-    profile: P,
-    operator: Operator,
-}
-
-impl<P: Profile> Tracking<P> {
-    /// The constraint that keeps e above `profile`, from `anchor`, with the rates of `operator`.
-    ///
-    /// # Panics
-    ///
-    /// An anchor of another length than the operator's order.
-    ///
-    /// # Errors
-    ///
-    /// As for [`check`].
-    pub fn new(profile: P, operator: Operator, anchor: &[f64], deadline: f64) -> Result<Self, ProfileError> {
-        assert_eq!(anchor.len(), operator.order(), "the anchor needs one derivative for each rate");
-        check(&profile, anchor, deadline)?;
-        Ok(Self { profile, operator })
-    }
-
-    /// The least e⁽ⁿ⁾ allowed at `elapsed` = τ with the derivatives `e` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), and r there.
-    pub fn floor(&self, elapsed: f64, e: &[f64]) -> (f64, f64) {
-        let (n, r) = (self.operator.order(), self.profile.evaluate(elapsed));
-        let mut error: Stack = [0.0; MAX_RELATIVE_DEGREE];
-        for k in 0..n {
-            error[k] = e[k] - r[k];
+    /// The mean of every derivative over [a, b] by Gauss' rule with five nodes.
+    fn mean(&self, a: f64, b: f64) -> Result<Derivatives, ProfileError> {
+        /// Nodes on [−1, 1] and half the weights.
+        const RULE: [(f64, f64); 5] = [
+            (-0.906_179_845_938_664, 0.118_463_442_528_094_54),
+            (-0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
+            (0.0, 0.284_444_444_444_444_44),
+            (0.538_469_310_105_683_1, 0.239_314_335_249_683_24),
+            (0.906_179_845_938_664, 0.118_463_442_528_094_54),
+        ];
+        let mut sum = [0.0; MAX_RELATIVE_DEGREE + 1];
+        for (node, weight) in RULE {
+            let r = self.finite(a + (b - a) * (0.5 + 0.5 * node))?;
+            for k in 0..=self.anchor.len() {
+                sum[k] += weight * r[k];
+            }
         }
-        (r[n] - self.operator.lower_terms(&error[..n]), r[0])
+        Ok(sum)
     }
 }

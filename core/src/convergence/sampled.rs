@@ -21,13 +21,19 @@
 //! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`SampledDemand::loss`] is (5): an
 //! estimate to leading order, not a bound, since the slope is only seen through its mean.
 //!
+//! **The margin.** Along the profile c₋ is known beforehand: a held input keeps e⁽ⁿ⁾ constant, so M is
+//! the slope of r⁽ⁿ⁾ and c₋ = Mδ/2. [`margin`] is twice (5) for the steepest part of the profile, and a
+//! part of its size for round-off: what a promise needs on top of the margin it is given. What the plant
+//! adds (its own drift, turning gradients) is only seen on the way, as [`SampledDemand::loss`].
+//!
 //! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its
 //! samples' average. It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across
 //! the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
 
-use super::comparison::{Stack, binomial};
-use super::fixed_time::{FixedTime, FixedTimeState, Method, Phase};
+use super::comparison::{Stack, binomial, factorial};
+use super::fixed_time::{FixedTime, FixedTimeState, Phase};
 use super::hermite::HermiteProfile;
+use super::settings::Method;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
@@ -37,26 +43,57 @@ pub struct SampledDemand {
     pub weights: Stack,
     /// The least value at the end of the period, `[h]`/sⁿ⁻¹.
     pub floor: f64,
-    /// a in 1/s.
-    pub rate: f64,
+    /// ψ ≥ −c gives e ≥ −c/`attenuation`, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow, what they
+    /// grow to until the deadline: (n − 1)! e^{aτ}/τⁿ⁻¹ for the time τ until then.
+    pub attenuation: f64,
 }
 
 impl SampledDemand {
     /// Asks for nothing.
-    pub const ZERO: Self = Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, rate: 0.0 };
+    pub const ZERO: Self = Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0 };
 
     /// (5): how far e may fall below 0 within the `period` (s), `[h]`, where the pointwise constraint
-    /// has the slack `slack` (`[h]`/sⁿ) at its start, for relative degree `n`. Not a number for a ≤ 0,
-    /// where errors grow and no margin is enough.
-    pub fn loss(&self, slack: f64, period: f64, n: usize) -> f64 {
-        if n == 1 {
-            // ψ = e: the dip is within the period, and gone at its end.
-            return (-slack).max(0.0) * period / 4.0;
-        }
-        if self.rate <= 0.0 {
-            return f64::NAN;
-        }
-        (-slack).max(0.0) * period / 4.0 / self.rate.powi(n as i32 - 1)
+    /// has the slack `slack` (`[h]`/sⁿ) at its start. For n = 1 the dip is gone at the end of the period.
+    pub fn loss(&self, slack: f64, period: f64) -> f64 {
+        (-slack).max(0.0) * period / 4.0 / self.attenuation
+    }
+}
+
+/// The margin in the unit of e that inputs held for `period` > 0 seconds are expected to need along the
+/// Hermite profile from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
+/// `attenuation` as in [`SampledDemand`].
+pub fn margin(anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
+    const PANELS: usize = 32;
+    let n = anchor.len();
+    let profile = HermiteProfile::new(anchor, deadline);
+    let panel = deadline / PANELS as f64;
+    let at = |i: usize| profile.evaluate(panel * i as f64)[n];
+    // The last panel ends where r⁽ⁿ⁾ drops to zero.
+    let mut steepest: f64 = 0.0;
+    let mut left = at(0);
+    for i in 1..PANELS {
+        let right = at(i);
+        steepest = steepest.max((right - left).abs() / panel);
+        left = right;
+    }
+    // A profile of a few samples is followed on average only: its own size bounds what that can cost.
+    let size = (0..n).fold(0.0, |m: f64, k| m.max((anchor[k] * deadline.powi(k as i32)).abs()));
+    let loss = steepest * period / 2.0 * period / 4.0 / attenuation;
+    (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
+}
+
+/// The largest margin that is taken for held inputs, as a part of the anchor's size.
+const LARGEST_MARGIN: f64 = 0.01;
+
+/// The tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
+const ROUND_OFF: f64 = 1e-8;
+
+fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
+    let order = n as i32 - 1;
+    if rate > 0.0 {
+        rate.powi(order)
+    } else {
+        factorial(n - 1) * (rate * time_left).exp() / time_left.powi(order)
     }
 }
 
@@ -72,36 +109,54 @@ impl FixedTime {
         period: f64,
     ) -> Option<SampledDemand> {
         let n = self.n;
-        let (rate, follows) = match state.phase {
-            Phase::Stay | Phase::Left => (self.settings.stay_rate, false),
-            _ if matches!(self.settings.method, Method::FirstOrder(_)) => return None,
-            _ => (state.rate, self.settings.method == Method::ReferenceProfile),
+        let (rate, rates, follows) = match state.phase {
+            Phase::Stay | Phase::Left => (state.stay_rate, None, false),
+            _ => match self.settings.method {
+                Method::FirstOrder(_) => return None,
+                Method::RepeatedRoot => (state.rate, None, false),
+                Method::ReferenceProfile => (state.rate, self.settings.rates, true),
+            },
         };
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
-        for (k, weight) in weights[..n].iter_mut().enumerate() {
-            *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
+        let elapsed = (t - state.anchor_time).max(0.0);
+        let time_left = (state.deadline - elapsed).max(period);
+        let (mut last, mut attenuation) = (rate, attenuation(rate, n, time_left));
+        if let Some(rates) = rates {
+            let split = rates.without_last();
+            (weights, last, attenuation) = (split.weights, split.last, split.weights[0]);
+        } else {
+            for (k, weight) in weights[..n].iter_mut().enumerate() {
+                *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
+            }
         }
         // What h is compared with: μ + r and its derivatives.
         let target = |elapsed: f64| {
             let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
             if follows {
-                r = HermiteProfile::new(&state.anchor[..n], state.deadline).evaluate(elapsed);
+                r = self.profile(state, elapsed);
             }
-            r[0] += self.settings.margin;
+            r[0] += state.margin;
             r
         };
-        let elapsed = (t - state.anchor_time).max(0.0);
         let (now, then) = (target(elapsed), target(elapsed + period));
-        let decay = (-rate * period).exp();
+        let decay = (-last * period).exp();
         let floor = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
-        Some(SampledDemand { weights, floor, rate })
+        Some(SampledDemand { weights, floor, attenuation })
+    }
+
+    /// As in [`SampledDemand`], for errors against the profile at `rate` or the rates of the settings.
+    pub(super) fn attenuation(&self, rate: f64, time_left: f64) -> f64 {
+        match &self.settings.rates {
+            Some(rates) => rates.without_last().weights[0],
+            None => attenuation(rate, self.n, time_left),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::comparison::lower_terms;
-    use super::super::fixed_time::FixedTimeSettings;
+    use super::super::settings::FixedTimeSettings;
     use super::*;
 
     /// (S) is the integral of the pointwise constraint: for δ → 0 its difference quotient tends to it.
@@ -119,7 +174,7 @@ mod tests {
             // Moving along h⁽ⁿ⁾ = floor, Σ weights h⁽ᵏ⁾ grows by Σ weights h⁽ᵏ⁺¹⁾ δ.
             let next = |k: usize| if k + 1 < n { moved[k + 1] } else { demand.floor };
             let reached: f64 = (0..n).map(|k| sampled.weights[k] * (moved[k] + period * next(k))).sum();
-            let scale = lower_terms(sampled.rate, &moved[..n]).abs() + demand.floor.abs() + 1.0;
+            let scale = lower_terms(state.rate, &moved[..n]).abs() + demand.floor.abs() + 1.0;
             // The remainder is of second order in the period, with rates of order a = 10.
             let error = (reached - sampled.floor) / period;
             assert!(error.abs() < 1e-3 * scale, "n {n}: {error} of {scale}");
@@ -129,9 +184,25 @@ mod tests {
     #[test]
     fn the_loss_is_that_of_an_even_slope() {
         // (D + 2)² e = −c + 2cτ/δ over a period: ψ dips by cδ/4, e by no more than cδ/8.
-        let demand = SampledDemand { rate: 2.0, ..SampledDemand::ZERO };
-        assert_eq!(demand.loss(-8.0, 0.1, 2), 8.0 * 0.1 / 4.0 / 2.0);
-        assert_eq!(demand.loss(3.0, 0.1, 2), 0.0);
-        assert!(SampledDemand { rate: -0.2, ..demand }.loss(-8.0, 0.1, 2).is_nan());
+        let demand = SampledDemand { attenuation: 2.0, ..SampledDemand::ZERO };
+        assert_eq!(demand.loss(-8.0, 0.1), 8.0 * 0.1 / 4.0 / 2.0);
+        assert_eq!(demand.loss(3.0, 0.1), 0.0);
+        // n = 2: ψ = −c for a time τ at the rate −a makes e = −c (e^{aτ} − 1)/a, less than c τ e^{aτ}.
+        let growing = SampledDemand { attenuation: attenuation(-0.2, 2, 3.0), ..demand }.loss(-8.0, 0.1);
+        let exact = 0.2 * ((0.6_f64).exp() - 1.0) / 0.2;
+        assert!(growing > exact && growing < 2.0 * exact, "{growing} for {exact}");
+    }
+
+    /// n = 2 from rest at −1 within 1 s: r = −(1 − s)²(1 + 2s), r‴ = −12, so the dip with a = 4 and
+    /// δ = 0.1 is 12 · 0.1²/8/4, and the margin twice that.
+    #[test]
+    fn the_margin_is_that_of_the_profile() {
+        let found = margin(&[-1.0, 0.0], 1.0, 4.0, 0.1);
+        assert!(
+            (found - (2.0 * 12.0 * 0.01 / 32.0_f64).min(LARGEST_MARGIN) - ROUND_OFF).abs() < 1e-12,
+            "{found}"
+        );
+        let half = margin(&[-1.0, 0.0], 1.0, 4.0, 0.05);
+        assert!((half - 2.0 * 12.0 * 0.0025 / 32.0 - ROUND_OFF).abs() < 1e-12, "{half}");
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::SVector;
 use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Sampling, Workspace};
 use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
+use crate::convergence::profile::Profile;
 use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
@@ -124,6 +125,33 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// Makes the last barrier added follow a profile of one's own ([`FixedTime::with_profile`]).
+    ///
+    /// # Errors
+    ///
+    /// No barrier yet; a barrier with another method than the reference profile.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, convergence::profile::Hermite, filter::*, plants::PointMass};
+    /// use punctual_core::convergence::profile::Profile;
+    ///
+    /// // Arrive in nine tenths of the time.
+    /// let early = |anchor: &[f64], deadline: f64, elapsed: f64| Hermite.evaluate(anchor, 0.9 * deadline, elapsed);
+    /// let filter = SafetyFilter::builder(4, 2)
+    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .profile(early)?
+    ///     .build()?;
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    pub fn profile(mut self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
+        let Some(channel) = self.channels.last_mut() else {
+            return Err(Error::new(ErrorKind::Dimension, "profile", "there is no barrier yet to follow it"));
+        };
+        let named = |e: Error| e.within(&channel.name);
+        channel.promise = channel.promise.clone().with_profile(profile).map_err(named)?;
+        Ok(self)
+    }
+
     /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity where there is none.
     /// Default: none.
     ///
@@ -166,7 +194,7 @@ impl FilterBuilder {
     }
 
     /// How inputs that are held between samples are accounted for. Default:
-    /// [`Sampling::Pointwise`].
+    /// [`Sampling::Measured`].
     ///
     /// # Errors
     ///
@@ -236,6 +264,8 @@ impl FilterBuilder {
             predicted: vec![0.0; state_dim * channels.len()],
             report: Report::new(channels.len()),
         };
+        let deadlines = channels.iter().map(|c| c.promise.settings().deadline);
+        let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
         Ok(SafetyFilter {
             state_dim,
             input_dim,
@@ -244,6 +274,7 @@ impl FilterBuilder {
             correction_limit,
             sampling,
             delay,
+            first_period,
             state,
             workspace,
         })

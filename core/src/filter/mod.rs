@@ -9,16 +9,15 @@ mod builder;
 mod report;
 mod sampling;
 
-pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase};
+pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase, Refusal};
 pub use builder::FilterBuilder;
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 
 use crate::MAX_INPUTS;
-use crate::convergence::repeated_root::NoAdmissibleRate;
 use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
-use crate::error::{Error, length};
+use crate::error::{Error, ErrorKind, length};
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Outcome, Row};
 use sampling::Held;
@@ -56,6 +55,25 @@ struct Channel {
     promise: FixedTime,
 }
 
+impl Channel {
+    /// Anchors `promise` at time `begin` where it waits for that; and where samples turn out to be further
+    /// apart than was thought then, takes the margin for that into account.
+    fn anchor(
+        &self,
+        promise: &mut FixedTimeState,
+        (begin, delay): (f64, f64),
+        h: &[f64],
+        (period, measured_first): (Option<f64>, bool),
+    ) {
+        let period = period.unwrap_or(0.0);
+        if promise.phase == Phase::Waiting {
+            self.promise.anchor(promise, begin, h, self.promise.settings().deadline - delay, period);
+        } else if measured_first && promise.phase == Phase::Approach && period > promise.period {
+            self.promise.resample(promise, period);
+        }
+    }
+}
+
 /// Scratch memory of a step; carries nothing from one step to the next.
 struct Workspace {
     derivatives: Derivatives,
@@ -73,7 +91,7 @@ struct Workspace {
 /// # Requirements
 ///
 /// The plant is control-affine and every barrier has the relative degree it was declared with;
-/// inputs are held between samples, and the margin covers what that costs. A barrier's guarantee
+/// inputs are held between samples ([`Sampling`]). A barrier's guarantee
 /// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::guaranteed`] says whether
 /// its theorem's conditions have held so far.
 ///
@@ -88,6 +106,8 @@ pub struct SafetyFilter {
     correction_limit: f64,
     sampling: Sampling,
     delay: f64,
+    /// The period in s that [`Sampling::Measured`] starts from.
+    first_period: f64,
     state: FilterState,
     workspace: Workspace,
 }
@@ -153,7 +173,8 @@ impl SafetyFilter {
             return Ok(());
         }
 
-        let period = self.sampling.period(&self.state, t);
+        let period = self.sampling.period(&self.state, t, self.first_period);
+        let first = self.sampling.measures_first(&self.state, t);
         let mut sampled = period;
         for (i, channel) in self.channels.iter().enumerate() {
             // Evaluate: h and its derivatives along the plant, where the input begins to act.
@@ -173,10 +194,7 @@ impl SafetyFilter {
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
-            if promise.phase == Phase::Waiting {
-                let deadline = channel.promise.settings().deadline - self.delay;
-                channel.promise.anchor(promise, begin, &derivatives.drift[..n], deadline);
-            }
+            channel.anchor(promise, (begin, self.delay), &derivatives.drift[..n], (period, first));
             let demand = channel.promise.advance(promise, begin, &derivatives.drift[..n]);
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
@@ -216,7 +234,11 @@ impl SafetyFilter {
             }
             qp::solve(rows, &self.bounds, u_ref, limit, u)
         });
-        (next.time, next.period) = (Some(t), period.filter(|_| self.sampling == Sampling::Measured));
+        if matches!(self.sampling, Sampling::Measured { .. }) && self.state.time.is_some_and(|last| t > last)
+        {
+            next.period = period;
+        }
+        next.time = Some(t);
         next.input[..u.len()].copy_from_slice(u);
         report.solver = solution.solver;
         report.iterations = solution.iterations;
@@ -230,8 +252,7 @@ impl SafetyFilter {
         for (i, row) in rows.iter().enumerate() {
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
             if let Some(period) = period.filter(|_| report.predicted) {
-                let n = self.channels[i].source.relative_degree();
-                report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period, n);
+                report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period);
             }
             report_b.row = *row;
             report_b.slack = row.slack(u);
@@ -284,10 +305,53 @@ impl SafetyFilter {
         self.channels.iter().map(|c| c.name.as_str())
     }
 
-    /// Why the repeated root of barrier `index` has no admissible rate from its anchor, if it has none;
-    /// `None` too for another method, before the anchor and for an index that no barrier has.
-    pub fn no_admissible_rate(&self, index: usize) -> Option<NoAdmissibleRate> {
-        self.channels.get(index)?.promise.no_admissible_rate(self.state.barriers.get(index)?)
+    /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample: its
+    /// promise starts anew there, from the derivatives h then has. Until then the input of the last sample
+    /// keeps the old promise, and the new profile starts with a zero error, so that no guarantee has a gap.
+    ///
+    /// # Errors
+    ///
+    /// No such barrier; a deadline out of range.
+    pub fn set_deadline(&mut self, index: usize, deadline: f64) -> Result<(), Error> {
+        let channel = self.channel(index)?;
+        let named = |e: Error| e.within(&channel.name);
+        channel.promise = channel.promise.clone().with_deadline(deadline).map_err(named)?;
+        self.state.barriers[index] = FixedTimeState::default();
+        Ok(())
+    }
+
+    /// Replaces the set of barrier number `index`, such as a goal that was moved: its promise starts anew
+    /// at the next sample, as with [`Self::set_deadline`].
+    ///
+    /// # Errors
+    ///
+    /// No such barrier; a source of other dimensions or another relative degree.
+    pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
+        let dims = (self.state_dim, self.input_dim);
+        let channel = self.channel(index)?;
+        let named = |e: Error| e.within(&channel.name);
+        length("x", source.state_dim(), dims.0).map_err(named)?;
+        length("u", source.input_dim(), dims.1).map_err(named)?;
+        let (found, wanted) = (source.relative_degree(), channel.source.relative_degree());
+        if found != wanted {
+            let message = format!("is {found}, must stay {wanted}");
+            return Err(named(Error::new(ErrorKind::RelativeDegree, "relative_degree", message)));
+        }
+        channel.source = source;
+        self.state.barriers[index] = FixedTimeState::default();
+        Ok(())
+    }
+
+    fn channel(&mut self, index: usize) -> Result<&mut Channel, Error> {
+        let count = self.channels.len();
+        let message = || format!("is {index}, must be < {count}, the number of barriers");
+        self.channels.get_mut(index).ok_or_else(|| Error::new(ErrorKind::Range, "barrier", message()))
+    }
+
+    /// Why barrier `index` goes by another method than the configured one since its anchor
+    /// ([`BarrierReport::fallback`]); `None` where it does not. Computed anew: not for every step.
+    pub fn refusal(&self, index: usize) -> Option<Refusal> {
+        self.channels.get(index)?.promise.refusal(self.state.barriers.get(index)?)
     }
 
     /// The relative degree of each barrier, in the order of the report.

@@ -69,6 +69,11 @@ pub struct BarrierReport {
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
+    /// μ in force since the anchor, `[h]`: the settings' margin and what held inputs are expected to cost.
+    pub margin: f64,
+    /// Whether the configured method could not be used from the anchor and another took its place
+    /// ([`SafetyFilter::refusal`](super::SafetyFilter::refusal) says why).
+    pub fallback: bool,
     /// How often leaving the set has re-armed the deadline (the settings' `recovery`).
     pub recoveries: u32,
     /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ. Where the step looked
@@ -91,6 +96,8 @@ impl BarrierReport {
         arrived: false,
         arrival_time: None,
         guaranteed: false,
+        margin: 0.0,
+        fallback: false,
         recoveries: 0,
         row: Row::ZERO,
         slack: 0.0,
@@ -103,6 +110,8 @@ impl BarrierReport {
         self.arrival_time = promise.arrival;
         self.arrived = promise.arrival.is_some();
         self.guaranteed = promise.guaranteed;
+        self.margin = promise.margin;
+        self.fallback = promise.fallback;
         self.recoveries = promise.recoveries;
     }
 }

@@ -1,0 +1,119 @@
+//! What a barrier's promise is asked for, with its defaults.
+
+use super::first_order::Exponent;
+use super::operator::Operator;
+use crate::MAX_RELATIVE_DEGREE;
+use crate::error::{Error, ErrorKind, non_negative, positive};
+
+/// How the deadline is met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root::rate`](super::repeated_root::rate).
+    /// Relative degree 2 and above; for odd ones many anchors have no such rate
+    /// ([`FixedTime::refusal`](super::FixedTime::refusal)).
+    RepeatedRoot,
+    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`](super::hermite::HermiteProfile) r, or one of
+    /// one's own ([`FixedTime::with_profile`](super::FixedTime::with_profile)).
+    #[default]
+    ReferenceProfile,
+    /// ė ≥ α |e|^p for e = h − μ < 0, with α such that e = 0 at T ([`Exponent`]). Relative degree 1.
+    FirstOrder(Exponent),
+}
+
+/// Settings of one barrier's promise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedTimeSettings {
+    /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample
+    /// where the filter looks over the period ([`Sampling`](crate::filter::Sampling)), else late.
+    pub deadline: f64,
+    /// How the deadline is met. Default: [`Method::ReferenceProfile`].
+    pub method: Method,
+    /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`]
+    /// of the deadline in force and the sampling period.
+    pub rate: Option<f64>,
+    /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
+    pub rates: Option<Operator>,
+    /// a of the stay constraint in 1/s, finite, > 0. Default: [`Self::default_rate`].
+    pub stay_rate: Option<f64>,
+    /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. What held inputs are expected
+    /// to cost comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
+    pub margin: f64,
+    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
+    /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
+    /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
+    pub recovery: Option<f64>,
+}
+
+impl FixedTimeSettings {
+    /// Rate times deadline of [`Self::default_rate`], for periods that are short against the deadline.
+    pub const DEFAULT_RATE_TIMES_DEADLINE: f64 = 20.0;
+
+    /// Rate times sampling period that [`Self::default_rate`] stays below.
+    pub const DEFAULT_RATE_TIMES_PERIOD: f64 = 0.5;
+
+    /// The defaults for a deadline of `deadline` seconds: reference profile, default rates, no margin.
+    pub fn within(deadline: f64) -> Self {
+        Self {
+            deadline,
+            method: Method::default(),
+            rate: None,
+            rates: None,
+            stay_rate: None,
+            margin: 0.0,
+            recovery: None,
+        }
+    }
+
+    /// The default of both rates in 1/s: the smaller of 20/T and 1/(2δ), for a deadline T > 0 and a period
+    /// δ ≥ 0, both in s.
+    ///
+    /// An error of order n is gone after some n/a, 0.4 T for n = 8: early enough before the deadline, and
+    /// slow enough that inputs stay of the size the profile itself needs. A rate above 1/(2δ) asks for
+    /// more than two samples can do.
+    pub fn default_rate(deadline: f64, period: f64) -> f64 {
+        let by_deadline = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
+        if period > 0.0 { by_deadline.min(Self::DEFAULT_RATE_TIMES_PERIOD / period) } else { by_deadline }
+    }
+
+    pub(super) fn validated(self, n: usize) -> Result<Self, Error> {
+        let unsupported = |message: String| Err(Error::new(ErrorKind::Unsupported, "method", message));
+        if n == 0 || n > MAX_RELATIVE_DEGREE {
+            let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
+            return Err(Error::new(ErrorKind::RelativeDegree, "relative_degree", message));
+        }
+        if self.method == Method::RepeatedRoot && n == 1 {
+            return unsupported(
+                "the repeated root does not exist for relative degree 1; use the reference profile".into(),
+            );
+        }
+        if matches!(self.method, Method::FirstOrder(_)) && n != 1 {
+            return unsupported(format!(
+                "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
+            ));
+        }
+        positive("deadline", self.deadline)?;
+        for (field, value) in
+            [("rate", self.rate), ("stay_rate", self.stay_rate), ("recovery", self.recovery)]
+        {
+            if let Some(value) = value {
+                positive(field, value)?;
+            }
+        }
+        if let Some(rates) = self.rates {
+            let mut refused = None;
+            if rates.order() != n {
+                refused =
+                    Some(format!("has {} components, must have {n}, the relative degree", rates.order()));
+            } else if self.rate.is_some() {
+                refused = Some("given beside `rate`, which it replaces".to_owned());
+            } else if self.method != Method::ReferenceProfile {
+                refused = Some("belongs to the reference profile".to_owned());
+            }
+            if let Some(message) = refused {
+                return Err(Error::new(ErrorKind::Dimension, "rates", message));
+            }
+        }
+        non_negative("margin", self.margin)?;
+        Ok(self)
+    }
+}
