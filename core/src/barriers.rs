@@ -12,27 +12,37 @@ use crate::barrier::Barrier;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
-/// A point that moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
+/// Where a disc is.
 #[derive(Clone, Copy, Debug)]
-struct Centre {
-    start: [f64; 2],
-    velocity: [f64; 2],
+enum Centre {
+    /// It moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
+    Given { start: [f64; 2], velocity: [f64; 2] },
+    /// At the two states from this one on.
+    State(usize),
 }
 
 impl Centre {
     fn at_rest(centre: [f64; 2]) -> Result<Self, Error> {
         let start = [finite("centre[1]", centre[0])?, finite("centre[2]", centre[1])?];
-        Ok(Self { start, velocity: [0.0; 2] })
+        Ok(Self::Given { start, velocity: [0.0; 2] })
     }
 
     fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
         let velocity = [finite("velocity[1]", velocity[0])?, finite("velocity[2]", velocity[1])?];
-        Ok(Self { velocity, ..self })
+        Ok(match self {
+            Self::Given { start, .. } => Self::Given { start, velocity },
+            Self::State(_) => self,
+        })
     }
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
     fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
-        let away = |i: usize| x[i] - (t * self.velocity[i] + self.start[i]);
+        let away = |i: usize| {
+            x[i] - match self {
+                Self::Given { start, velocity } => t * velocity[i] + start[i],
+                Self::State(first) => x[first + i],
+            }
+        };
         away(0).squared() + away(1).squared()
     }
 }
@@ -79,6 +89,13 @@ impl QuadraticDisc {
     pub fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
         Ok(Self { centre: self.centre.moving(velocity)?, ..self })
     }
+
+    /// The same disc around the point whose coordinates are the states number `first` and the next,
+    /// counted from 0, in place of its centre and velocity; see
+    /// [`WithPoint`](crate::dynamics::WithPoint).
+    pub fn following(self, first: usize) -> Self {
+        Self { centre: Centre::State(first), ..self }
+    }
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
@@ -121,6 +138,13 @@ impl DistanceDisc {
     /// A velocity that is not finite.
     pub fn moving(self, velocity: [f64; 2]) -> Result<Self, Error> {
         Ok(Self { centre: self.centre.moving(velocity)?, ..self })
+    }
+
+    /// The same disc around the point whose coordinates are the states number `first` and the next,
+    /// counted from 0, in place of its centre and velocity; see
+    /// [`WithPoint`](crate::dynamics::WithPoint).
+    pub fn following(self, first: usize) -> Self {
+        Self { centre: Centre::State(first), ..self }
     }
 }
 

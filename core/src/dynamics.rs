@@ -110,6 +110,50 @@ where
     }
 }
 
+/// A plant beside a point that moves on its own at constant velocity, such as an obstacle that another
+/// system measures: the last four states are the point's position (m) and velocity (m/s).
+///
+/// With the position and velocity of each sample a barrier on these states knows where the point is then,
+/// and expects it to go on like that until the next one. `NX` is the number of states of the plant
+/// inside; the extended one has `NX` + 4, which is checked at compile time.
+///
+/// ```
+/// use punctual_core::barriers::{DistanceDisc, Outside};
+/// use punctual_core::dynamics::WithPoint;
+/// use punctual_core::filter::{BarrierSettings, SafetyFilter};
+/// use punctual_core::plants::Unicycle;
+///
+/// // State (x_p, y_p, θ, v, p_x, p_y, v_x, v_y).
+/// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
+/// let filter = SafetyFilter::builder(8, 2)
+///     .barrier::<_, _, 8, 2>("clear", WithPoint::<_, 4>(Unicycle), clear, BarrierSettings::within(5.0))?
+///     .build()?;
+/// # Ok::<(), punctual_core::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct WithPoint<P, const NX: usize>(pub P);
+
+impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<EXTENDED, NU>
+    for WithPoint<P, NX>
+where
+    P: ControlAffine<NX, NU>,
+{
+    fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
+        const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };
+        let f = self.0.drift(&SVector::<S, NX>::from_fn(|i, _| x[i]));
+        SVector::from_fn(|i, _| match i {
+            i if i < NX => f[i],
+            i if i < NX + 2 => x[i + 2],
+            _ => S::zero(),
+        })
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
+        let g = self.0.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
+        SMatrix::from_fn(|i, j| if i < NX { g[(i, j)] } else { S::zero() })
+    }
+}
+
 /// A plant chosen at run time: [`ControlAffine`] behind slices, in plain numbers.
 pub trait DynPlant: Send + Sync {
     /// Number of states.

@@ -16,6 +16,7 @@
 
 mod ahead;
 mod degree;
+mod embedded;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
@@ -31,6 +32,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
 pub use degree::{detected, relative_degree};
+pub use embedded::embedded;
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.

@@ -12,7 +12,8 @@ use punctual_modeldescription::{
 use uuid::Uuid;
 
 use crate::configuration::{
-    Configuration, ConfigurationError, FilterConfiguration, Parameter, PlantConfiguration, Range,
+    BarrierSection, Configuration, ConfigurationError, FilterConfiguration, Parameter, PlantConfiguration,
+    Range,
 };
 
 /// Log categories: name and meaning.
@@ -38,7 +39,8 @@ pub struct Product {
 /// Value references of the groups of variables, in the order of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
-    /// Number of states: the first inputs of a filter, the outputs of a plant.
+    /// Number of states: the first inputs of a filter (with the points that its barriers follow), the
+    /// outputs of a plant.
     pub states: usize,
     /// Number of inputs of the plant.
     pub inputs: usize,
@@ -51,7 +53,7 @@ pub struct Layout {
 }
 
 /// Outputs of one barrier, in the order of the table.
-pub const BARRIER_OUTPUTS: usize = 7;
+pub const BARRIER_OUTPUTS: usize = 9;
 
 impl Product {
     /// Derives everything from a completed configuration.
@@ -306,6 +308,10 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     for state in states {
         table.signal("x", state, "measured ", Causality::Input);
     }
+    for (name, unit, start, description) in c.barrier.iter().flat_map(BarrierSection::inputs) {
+        table.add(name, description, Causality::Input, real(Some(start), unit));
+    }
+    let measured = table.variables.len();
     for input in inputs {
         table.signal("u_ref", input, "wanted ", Causality::Input);
     }
@@ -329,6 +335,10 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         table.add(name("time_left"), "time to the deadline, 0 from then on", output, real(None, "s"));
         let slack = "row times u minus its floor; < 0: the constraint is violated by that much";
         table.add(name("slack"), slack, output, real(None, rate_unit));
+        let margin = "h to arrive and stay above: the parameter, and what held inputs are expected to cost";
+        table.add(name("margin_used"), margin, output, real(None, unit));
+        let loss = "how far below its promise h may fall within the step because u is held";
+        table.add(name("sampling_loss"), loss, output, real(None, unit));
         table.add(name("arrived"), "h >= 0 has been reached", output, flag());
         let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
         table.add(name("guaranteed"), guaranteed, output, flag());
@@ -344,7 +354,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     table.finish(
         c,
         &c.parameters(),
-        Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() },
+        Layout { states: measured, inputs: inputs.len(), outputs, ..Layout::default() },
     )
 }
 

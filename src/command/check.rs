@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use punctual_core::filter::{Method, Phase, SafetyFilter};
-use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfiguration};
+use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfiguration, SamplingName};
 use punctual_fmu::product::describe;
 use serde::Serialize;
 
@@ -172,7 +172,11 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
     let mut filter = c.build()?;
     let inputs = c.plant.model.inputs().len();
     let status = match start.as_deref() {
-        Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
+        Some(x0) => {
+            // The points that barriers follow are where the configuration says.
+            let x0: Vec<f64> = x0.iter().copied().chain(c.points()).collect();
+            Some(first_sample(&mut filter, inputs, c.experiment.start_time, &x0)?)
+        }
         None => None,
     };
     let (step, experiment) = (c.experiment.step_size, c.experiment);
@@ -180,22 +184,27 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let mut barriers = Vec::new();
     for (i, section) in c.barrier.iter().enumerate() {
-        let (settings, name, unit) = (section.settings(), &section.name, section.units().0);
+        let (name, unit) = (&section.name, section.units().0);
+        let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
+        let default_rate = BarrierSettings::default_rate(settings.deadline, step);
         let begun = start.is_some();
         let approaching = begun && filter.report().barriers[i].phase == Phase::Approach;
         let (method, rate) = match settings.method {
-            Method::ReferenceProfile => ("reference profile", Some(settings.rate)),
+            Method::ReferenceProfile if settings.rates.is_some() => ("reference profile, rates given", None),
+            Method::ReferenceProfile => ("reference profile", Some(settings.rate.unwrap_or(default_rate))),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
             Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(settings.deadline))),
         };
+        let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
+        let margin = if begun { filter.report().barriers[i].margin } else { settings.margin };
         let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
-        if settings.margin == 0.0 {
+        if c.sampling == SamplingName::Pointwise && margin == 0.0 {
             warn(format!(
                 "the margin is 0, so that an input held over {} s can cost the deadline",
                 number(step)
             ));
         }
-        for (which, rate) in [("rate", rate), ("stay_rate", Some(settings.stay_rate))] {
+        for (which, rate) in [("rate", rate), ("stay_rate", Some(stay_rate))] {
             let Some(rate) = rate.filter(|rate| rate * step > 1.0) else { continue };
             warn(format!(
                 "{which} times step is {}, more than 1: the error changes faster than the input",
@@ -209,7 +218,12 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             warn("the experiment stops before the deadline".to_owned());
         }
         if let Some(reason) = filter.refusal(i) {
-            warn(format!("{reason}; the stay rate is used instead, without a promise"));
+            warn(match reason {
+                Refusal::NoAdmissibleRate(_) => {
+                    format!("{reason}; the stay rate is used instead, without a promise")
+                }
+                Refusal::Profile(_) => format!("{reason}; the Hermite profile is used instead"),
+            });
         }
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
             warn(format!(
@@ -231,8 +245,8 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             deadline: settings.deadline,
             rate,
             rate_times_deadline: rate.map(|rate| rate * settings.deadline),
-            stay_rate: settings.stay_rate,
-            margin: settings.margin,
+            stay_rate,
+            margin,
             start,
         });
     }

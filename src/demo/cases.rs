@@ -100,11 +100,15 @@ pub(super) fn filter(model: Model, method: Method) -> String {
         Method::RepeatedRoot => "shape = \"quadratic_disc\" # h = R² − d²\nmethod = \"repeated_root\"\n",
         Method::ReferenceProfile => {
             "shape = \"disc\" # h = √(R² + ε²) − √(d² + ε²)\nmethod = \"reference_profile\"\n\
-             margin = 0.02 # m: what the held input may cost between samples\n"
+             margin = 0.02 # m\n"
         }
     };
+    let sampling = match method {
+        Method::RepeatedRoot => "sampling = \"pointwise\" # as in the paper\n",
+        Method::ReferenceProfile => "",
+    };
     format!(
-        "# Brings a {title} into the disc within the deadline: {method}.\nkind = \"filter\"\nname = \"{key}_filter\"\n\n\
+        "# Brings a {title} into the disc within the deadline: {method}.\nkind = \"filter\"\nname = \"{key}_filter\"\n{sampling}\n\
          [plant]\nmodel = \"{key}\"\n\n[[barrier]]\nname = \"goal\"\ncentre = {CENTRE:?} # m\nradius = {RADIUS:?} # m\n\
          deadline = {DEADLINE:?} # s\n{barrier}\n[experiment]\nstop_time = {STOP:?} # s\nstep_size = {STEP:?} # s\n",
         title = model.title,

@@ -27,8 +27,8 @@ fn an_unknown_key() {
         2,
         "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
-         unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `radius`, `smoothing`, \
-         `deadline`, `method`, `rate`, `stay_rate`, `margin`, `recovery`",
+         unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `centre_input`, `radius`, `smoothing`, \
+         `deadline`, `method`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`",
     );
 }
 

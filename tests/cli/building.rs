@@ -15,8 +15,10 @@ fn workshop() -> Workshop {
 fn every_example_configuration_is_built() {
     let workshop = Workshop::with_library();
     for (stem, says) in [
-        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 32 variables"),
+        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 34 variables"),
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
+        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 54 variables"),
+        ("escort-plant", "Reference plant: point mass in the plane with 11 variables"),
     ] {
         let (toml, fmu) = (format!("{stem}.toml"), format!("{stem}.fmu"));
         workshop.write(&toml, fs::read(examples().join(&toml)).expect("an example"));

@@ -69,12 +69,18 @@ fn the_json_tells_the_same() {
 fn warnings_name_what_does_not_fit_the_step() {
     let none: [String; 0] = [];
     assert_eq!(warnings(&workshop(&[]), &[]), none);
-    let zero = workshop(&[("margin = 0.02 ", "margin = 0.0")]);
+    let pointwise = ("[plant]", "sampling = \"pointwise\"\n[plant]");
+    assert_eq!(warnings(&workshop(&[("margin = 0.02 ", "margin = 0.0")]), &[]), none);
+    let zero = workshop(&[("margin = 0.02 ", "margin = 0.0"), pointwise]);
     assert_eq!(
         warnings(&zero, &[]),
         ["goal: the margin is 0, so that an input held over 0.001 s can cost the deadline"]
     );
-    let long = workshop(&[("step_size = 0.001", "step_size = 2.0"), ("deadline = 10.0", "deadline = 1.0")]);
+    // The default rates heed the step; rates given are taken as they are.
+    let long = [("step_size = 0.001", "step_size = 2.0"), ("deadline = 10.0", "deadline = 1.0")];
+    assert_eq!(warnings(&workshop(&long), &[]), ["goal: the deadline is shorter than the step of 2 s"]);
+    let given = ("margin = 0.02 ", "rate = 20.0\nmargin = 0.02 ");
+    let long = workshop(&[long[0], long[1], given]);
     assert_eq!(
         warnings(&long, &[]),
         [

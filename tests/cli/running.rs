@@ -50,7 +50,7 @@ fn the_example_keeps_its_promise() {
 fn header_and_rows() {
     let table = recorded(&[("stop_time = 20.0", "stop_time = 0.01")], "");
     let outputs = ["u.a", "u.omega", "status", "goal.h", "goal.profile", "goal.time_left", "goal.slack"];
-    let flags = ["goal.arrived", "goal.guaranteed", "goal.phase"];
+    let flags = ["goal.margin_used", "goal.sampling_loss", "goal.arrived", "goal.guaranteed", "goal.phase"];
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];
     let mut names = vec!["time".to_owned()];
     let filter = outputs.iter().chain(&flags).chain(&states).chain(&["u_ref.a"]);
@@ -115,7 +115,7 @@ fn the_json_of_a_run() {
     assert_eq!((&report["files"], &report["notes"]), (&Value::Array(vec![]), &Value::Array(vec![])));
     assert_eq!(report["components"][1]["model"], "unicycle");
     let signals = report["signals"].as_array().expect("a list");
-    assert_eq!(signals.len(), 21);
+    assert_eq!(signals.len(), 23);
     let left = signals.iter().find(|s| s["name"] == "filter.goal.time_left").expect("the time left");
     assert_eq!((&left["unit"], &left["max"], &left["final"]), (&"s".into(), &10.0.into(), &9.5.into()));
     assert_eq!(

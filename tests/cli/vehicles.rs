@@ -1,7 +1,9 @@
 //! Goals that move, obstacles, and the finer bicycles, from configuration to CSV.
 
+use std::fs;
+
 use crate::table::Table;
-use crate::workshop::Workshop;
+use crate::workshop::{Workshop, examples};
 
 const DEADLINE: f64 = 5.0;
 
@@ -78,4 +80,31 @@ fn bicycles_steered_by_rates_keep_the_deadline() {
         let (time, h) = (table.column("time"), table.column("f.goal.h"));
         assert!((0..time.len()).all(|k| time[k] < DEADLINE || h[k] >= 0.0), "{model}: late, or left again");
     }
+}
+
+/// A goal whose place comes from another FMU, past an obstacle: where the leader is follows from its own
+/// column, and it does not keep its velocity as the filter expects between samples.
+#[test]
+fn a_goal_that_is_another_fmu() {
+    let workshop = Workshop::with_library();
+    for stem in ["escort-filter", "escort-plant"] {
+        let (toml, fmu) = (format!("{stem}.toml"), format!("{stem}.fmu"));
+        workshop.write(&toml, fs::read(examples().join(&toml)).expect("an example"));
+        workshop.punctual(["build", &toml, "-o", &fmu]).success();
+    }
+    workshop.write("escort.toml", fs::read(examples().join("escort.toml")).expect("an example"));
+    workshop.punctual(["run", "escort.toml", "--out", "out"]).success();
+    let table = Table::parse(&workshop.text("out/escort.csv"));
+    assert!(table.column("filter.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
+    let column = |name: &str| table.column(name);
+    let (time, x, y) = (column("time"), column("plant.x.x_p"), column("plant.x.y_p"));
+    let (lead_x, lead_y) = (column("leader.x.x_p"), column("leader.x.y_p"));
+    for k in 0..time.len() {
+        let t = time[k];
+        let apart = (x[k] - lead_x[k]).hypot(y[k] - lead_y[k]);
+        assert!(t < DEADLINE || apart <= 2.0, "{apart} m from the leader at {t} s");
+        let clear = (x[k] - 12.0 + 0.5 * t).hypot(y[k] - 0.05 * t);
+        assert!(clear >= 1.0, "{clear} m from the buoy at {t} s");
+    }
+    assert!(lead_x[time.len() - 1] < 20.0 + 3.0 * 20.0 - 15.0, "the leader brakes");
 }

@@ -66,7 +66,8 @@ impl Run {
     }
 }
 
-/// One barrier with these settings, sampled every `step` seconds until 2T.
+/// One barrier with these settings, sampled every `step` seconds until 2T; the repeated root without regard
+/// to the period, as in the paper.
 fn run<P, B>(
     plant: &P,
     barrier: B,
@@ -79,7 +80,11 @@ where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    run_as(Scheme::default(), plant, barrier, settings, nominal, step, x0)
+    let sampling = match settings.method {
+        Method::RepeatedRoot => Sampling::Pointwise,
+        _ => Sampling::default(),
+    };
+    run_as(Scheme { sampling, ..Scheme::default() }, plant, barrier, settings, nominal, step, x0)
 }
 
 /// What the filter is built with beside its barrier.

@@ -54,7 +54,7 @@ fn assert_close(found: [f64; 3], wanted: [f64; 3]) {
 #[test]
 fn the_hundred_starts_at_fifty_milliseconds() {
     assert_close(all_keep_the_deadline(&starts(), DAMPING, over(0.05), 0.05), [7.7, 9.5, 9.8]);
-    let measured = Scheme { sampling: Sampling::Measured, ..Scheme::default() };
+    let measured = Scheme { sampling: Sampling::Measured { first: None }, ..Scheme::default() };
     all_keep_the_deadline(&starts(), DAMPING, measured, 0.05);
 }
 
@@ -81,4 +81,37 @@ fn a_heading_controller_and_bounds_at_fifty_milliseconds() {
     let bounded = Scheme { bounds: [60.0, 20.0], ..over(0.05) };
     all_keep_the_deadline(&starts(), HEADING, bounded, 0.05);
     all_keep_the_deadline(&drawn(100), HEADING, bounded, 0.05);
+}
+
+/// The documentation's table: `cargo test --release --test theory -- --ignored --nocapture table`.
+#[test]
+#[ignore = "prints a table; its claims are checked by the tests above"]
+fn table_of_the_hundred_starts() {
+    let settings = BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: 0.02,
+        ..BarrierSettings::within(DEADLINE)
+    };
+    println!("step, sampling: on time / inside until 2T / median peak / p95, per model");
+    for step in [0.001, 0.01, 0.05] {
+        for sampling in [Sampling::default(), Sampling::Period(step), Sampling::Pointwise] {
+            let scheme = Scheme { sampling, ..Scheme::default() };
+            let all = [
+                each(&|x0| run_as(scheme, &PointMass, distance(), settings, DAMPING[0], step, x0)),
+                each(&|x0| run_as(scheme, &Unicycle, distance(), settings, DAMPING[1], step, x0)),
+                each(&|x0| run_as(scheme, &bicycle(), distance(), settings, DAMPING[2], step, x0)),
+            ];
+            let cell = |runs: &Vec<Run>| {
+                let on_time = runs.iter().filter(|r| r.on_time(DEADLINE)).count();
+                let inside = runs.iter().filter(|r| r.least_after >= 0.0).count();
+                format!("{on_time}/{inside}/{:.1}/{:.1}", quantile(runs, 0.5), quantile(runs, 0.95))
+            };
+            println!("{step} {sampling:?}: {}", all.each_ref().map(cell).join("  "));
+        }
+    }
+}
+
+fn each(one: &dyn Fn([f64; 4]) -> Run) -> Vec<Run> {
+    starts().iter().map(|x0| one(*x0)).collect()
 }

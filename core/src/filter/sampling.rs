@@ -132,6 +132,7 @@ impl Held<'_> {
         let outcome = match best.outcome {
             _ if best.violation <= 0.0 => Outcome::Optimal,
             // The linearised rows can be met, the rows themselves could not.
+            Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
             Outcome::Optimal => Outcome::Degenerate,
             other => other,
         };

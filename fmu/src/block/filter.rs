@@ -67,10 +67,11 @@ impl FilterBlock {
         values.integers[at] = report.status as i32;
         at += 1;
         for b in &report.barriers {
-            values.reals[at..][..4].copy_from_slice(&[b.h, b.profile, b.time_left, b.slack]);
-            values.booleans[at + 4] = b.arrived;
-            values.booleans[at + 5] = b.guaranteed;
-            values.integers[at + 6] = b.phase as i32;
+            let reals = [b.h, b.profile, b.time_left, b.slack, b.margin, b.sampling_loss];
+            values.reals[at..][..6].copy_from_slice(&reals);
+            values.booleans[at + 6] = b.arrived;
+            values.booleans[at + 7] = b.guaranteed;
+            values.integers[at + 8] = b.phase as i32;
             at += BARRIER_OUTPUTS;
         }
     }

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
+use punctual_core::convergence::operator::Operator;
+use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
+use punctual_core::lie;
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
@@ -62,12 +65,20 @@ pub enum MethodName {
 #[serde(rename_all = "snake_case")]
 pub enum SamplingName {
     /// [`Sampling::Pointwise`]: the margin has to cover it.
-    #[default]
     Pointwise,
-    /// [`Sampling::Measured`]: predicted over the period since the last step.
+    /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
+    /// `[experiment]`.
+    #[default]
     Measured,
     /// [`Sampling::Period`] with the step size of `[experiment]`.
     StepSize,
+}
+
+/// Which barrier, and the first of the filter's states that say where its point is, if it follows one.
+#[derive(Clone, Copy)]
+struct Place {
+    index: usize,
+    point: Option<usize>,
 }
 
 /// `[[barrier]]`: a safe set and the deadline for reaching it.
@@ -84,6 +95,10 @@ pub struct BarrierSection {
     /// Velocity of the centre in m/s. Default 0.
     #[serde(default)]
     pub velocity: [f64; 2],
+    /// Whether centre and velocity are inputs of the FMU, such as a measured obstacle's, that start with the
+    /// values here, and not parameters. Default false.
+    #[serde(default)]
+    pub centre_input: bool,
     /// Radius in m, > 0.
     pub radius: f64,
     /// `disc` and `obstacle` only: ε in m, ≥ 0. Default 0: the radius.
@@ -97,11 +112,14 @@ pub struct BarrierSection {
     /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
     #[serde(default)]
     pub rate: f64,
-    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`.
+    /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rates: Vec<f64>,
+    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`, 20 / deadline where there are `rates`.
     #[serde(default)]
     pub stay_rate: f64,
-    /// Margin μ in the unit of h, ≥ 0. Default: a hundredth of the radius, none for
-    /// `quadratic_disc`.
+    /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added. Default: a
+    /// hundredth of the radius, none for `quadratic_disc`.
     #[serde(default)]
     pub margin: Option<f64>,
     /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
@@ -174,16 +192,22 @@ impl BarrierSection {
                 "deadline for coming back after leaving; 0: none",
                 |b| &mut b.recovery,
             ),
-            row("centre[1]", "m", Range::FINITE, "centre along x, at time 0", |b| &mut b.centre[0]),
-            row("centre[2]", "m", Range::FINITE, "centre along y, at time 0", |b| &mut b.centre[1]),
-            row("velocity[1]", "m/s", Range::FINITE, "velocity of the centre along x", |b| {
-                &mut b.velocity[0]
-            }),
-            row("velocity[2]", "m/s", Range::FINITE, "velocity of the centre along y", |b| {
-                &mut b.velocity[1]
-            }),
-            row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius),
         ];
+        if !self.centre_input {
+            rows.push(row("centre[1]", "m", Range::FINITE, "centre along x, at time 0", |b| {
+                &mut b.centre[0]
+            }));
+            rows.push(row("centre[2]", "m", Range::FINITE, "centre along y, at time 0", |b| {
+                &mut b.centre[1]
+            }));
+            rows.push(row("velocity[1]", "m/s", Range::FINITE, "velocity of the centre along x", |b| {
+                &mut b.velocity[0]
+            }));
+            rows.push(row("velocity[2]", "m/s", Range::FINITE, "velocity of the centre along y", |b| {
+                &mut b.velocity[1]
+            }));
+        }
+        rows.push(row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius));
         if self.shape.is_distance_shaped() {
             rows.push(row(
                 "smoothing",
@@ -196,21 +220,43 @@ impl BarrierSection {
         rows
     }
 
-    /// The settings of its promise, with every 0 that means "as the others say" replaced.
-    pub fn settings(&self) -> BarrierSettings {
-        let default = |value: f64, default: f64| if value == 0.0 { default } else { value };
-        let rate = default(self.rate, BarrierSettings::within(self.deadline).rate);
-        BarrierSettings {
+    /// The settings of its promise; 0 means "as the others say".
+    ///
+    /// # Errors
+    ///
+    /// Rates out of range.
+    pub fn settings(&self) -> Result<BarrierSettings, punctual_core::Error> {
+        let given = |value: f64| (value != 0.0).then_some(value);
+        let rates = match &self.rates[..] {
+            [] => None,
+            rates => Some(Operator::new(rates)?),
+        };
+        Ok(BarrierSettings {
             deadline: self.deadline,
             method: match self.method {
                 MethodName::ReferenceProfile => Method::ReferenceProfile,
                 MethodName::RepeatedRoot => Method::RepeatedRoot,
             },
-            rate,
-            stay_rate: default(self.stay_rate, rate),
+            rate: given(self.rate),
+            rates,
+            stay_rate: given(self.stay_rate),
             margin: self.margin.unwrap_or(0.0),
-            recovery: (self.recovery > 0.0).then_some(self.recovery),
+            recovery: given(self.recovery),
+        })
+    }
+
+    /// Its variables that are inputs, with their units, start values and meanings.
+    pub fn inputs(&self) -> Vec<(String, &'static str, f64, &'static str)> {
+        if !self.centre_input {
+            return Vec::new();
         }
+        let name = |field: &str| format!("{}.{field}", self.name);
+        vec![
+            (name("centre[1]"), "m", self.centre[0], "where the centre is, along x"),
+            (name("centre[2]"), "m", self.centre[1], "where the centre is, along y"),
+            (name("velocity[1]"), "m/s", self.velocity[0], "velocity of the centre along x"),
+            (name("velocity[2]"), "m/s", self.velocity[1], "velocity of the centre along y"),
+        ]
     }
 }
 
@@ -232,7 +278,7 @@ pub struct FilterConfiguration {
     /// are computed in steps only, for the same result in every master.
     #[serde(default = "yes")]
     pub direct_feedthrough: bool,
-    /// What is done about inputs held between samples. Default `pointwise`.
+    /// What is done about inputs held between samples. Default `measured`.
     #[serde(default)]
     pub sampling: SamplingName,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
@@ -332,7 +378,7 @@ impl FilterConfiguration {
     fn sampling(&self, step_size: f64) -> Sampling {
         match self.sampling {
             SamplingName::Pointwise => Sampling::Pointwise,
-            SamplingName::Measured => Sampling::Measured,
+            SamplingName::Measured => Sampling::Measured { first: Some(step_size) },
             SamplingName::StepSize => Sampling::Period(step_size),
         }
     }
@@ -344,23 +390,32 @@ impl FilterConfiguration {
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
         let inputs = self.plant.model.inputs();
-        let mut builder = SafetyFilter::builder(self.plant.model.states().len(), inputs.len());
+        let states = self.plant.model.states().len();
+        let mut next_point = states;
+        let mut builder = SafetyFilter::builder(states + self.points().len(), inputs.len());
         for (i, section) in self.barrier.iter().enumerate() {
             let path = format!("barrier[{i}]");
             let core = |e: punctual_core::Error| {
                 ConfigurationError::new(format!("{path}.{}", e.field()), e.message())
             };
+            let point = section.centre_input.then_some(next_point);
+            next_point += section.inputs().len();
             let smoothing = section.smoothing.filter(|s| *s != 0.0).unwrap_or(section.radius);
             let (centre, radius) = (section.centre, section.radius);
-            let distance_disc =
-                || DistanceDisc::new(centre, radius, smoothing).and_then(|d| d.moving(section.velocity));
+            let distance_disc = || {
+                let disc = DistanceDisc::new(centre, radius, smoothing)?.moving(section.velocity)?;
+                Ok(if point.is_some() { disc.following(states) } else { disc })
+            };
+            let quadratic_disc = || {
+                let disc = QuadraticDisc::new(centre, radius)?.moving(section.velocity)?;
+                Ok(if point.is_some() { disc.following(states) } else { disc })
+            };
             builder = match section.shape {
-                ShapeName::Disc => self.add(builder, i, distance_disc().map_err(core)?)?,
-                ShapeName::Obstacle => self.add(builder, i, Outside(distance_disc().map_err(core)?))?,
-                ShapeName::QuadraticDisc => {
-                    let disc = QuadraticDisc::new(centre, radius).and_then(|d| d.moving(section.velocity));
-                    self.add(builder, i, disc.map_err(core)?)?
+                ShapeName::Disc => self.add(builder, i, point, distance_disc().map_err(core)?)?,
+                ShapeName::Obstacle => {
+                    self.add(builder, i, point, Outside(distance_disc().map_err(core)?))?
                 }
+                ShapeName::QuadraticDisc => self.add(builder, i, point, quadratic_disc().map_err(core)?)?,
             };
         }
         let (mut min, mut max) = (Vec::new(), Vec::new());
@@ -385,28 +440,73 @@ impl FilterConfiguration {
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
 
+    /// The start values of the points that are inputs; they follow the states of the plant in the filter's.
+    pub fn points(&self) -> Vec<f64> {
+        self.barrier.iter().flat_map(BarrierSection::inputs).map(|(_, _, start, _)| start).collect()
+    }
+
     fn add<B>(
         &self,
         builder: FilterBuilder,
         index: usize,
+        point: Option<usize>,
         barrier: B,
     ) -> Result<FilterBuilder, ConfigurationError>
     where
-        B: Barrier<4> + Barrier<5> + Send + 'static,
+        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
     {
-        let section = &self.barrier[index];
-        let (name, settings) = (&section.name, section.settings());
-        match self.plant.model {
-            ModelName::PointMass => builder.barrier(name, PointMass, barrier, settings),
-            ModelName::Unicycle => builder.barrier(name, Unicycle, barrier, settings),
-            ModelName::Bicycle => builder.barrier(name, self.plant.bicycle()?, barrier, settings),
-            ModelName::BicycleSmallSlip => builder.barrier(name, self.plant.small_slip()?, barrier, settings),
-            ModelName::BicycleSmallSlipRate => {
-                builder.barrier(name, self.plant.small_slip()?.with_rate(), barrier, settings)
+        let model = &self.plant;
+        let at = Place { index, point };
+        match model.model {
+            ModelName::PointMass => self.add_along::<_, _, 4, 8>(builder, at, PointMass, barrier),
+            ModelName::Unicycle => self.add_along::<_, _, 4, 8>(builder, at, Unicycle, barrier),
+            ModelName::Bicycle => self.add_along::<_, _, 4, 8>(builder, at, model.bicycle()?, barrier),
+            ModelName::BicycleSmallSlip => {
+                self.add_along::<_, _, 4, 8>(builder, at, model.small_slip()?, barrier)
             }
-            ModelName::BicycleKinematic => builder.barrier(name, self.plant.kinematic()?, barrier, settings),
+            ModelName::BicycleSmallSlipRate => {
+                self.add_along::<_, _, 5, 9>(builder, at, model.small_slip()?.with_rate(), barrier)
+            }
+            ModelName::BicycleKinematic => {
+                self.add_along::<_, _, 5, 9>(builder, at, model.kinematic()?, barrier)
+            }
         }
-        .map_err(|e| self.refused(index, &e))
+    }
+
+    /// Adds `barrier` along `plant`; `EXTENDED` = `NX` + 4 states where it follows a point.
+    fn add_along<P, B, const NX: usize, const EXTENDED: usize>(
+        &self,
+        builder: FilterBuilder,
+        at: Place,
+        plant: P,
+        barrier: B,
+    ) -> Result<FilterBuilder, ConfigurationError>
+    where
+        P: ControlAffine<NX, 2> + Send + 'static,
+        B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
+    {
+        let section = &self.barrier[at.index];
+        let dim = NX + self.points().len();
+        let named = |e: punctual_core::Error| self.refused(at.index, &e.within(&section.name));
+        let source = match at.point {
+            None => lie::detected(&plant, &barrier)
+                .require(None)
+                .and_then(|n| lie::along(plant, barrier, n))
+                .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i))),
+            Some(first) => {
+                let plant = WithPoint::<_, NX>(plant);
+                let picks =
+                    std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
+                lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier)
+                    .require(None)
+                    .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
+                    .and_then(|source| lie::embedded(source, dim, &picks))
+            }
+        };
+        let settings = section.settings().map_err(named)?;
+        builder
+            .source(&section.name, source.map_err(named)?, settings)
+            .map_err(|e| self.refused(at.index, &e))
     }
 
     /// The core's refusal of barrier `index` in the words of the configuration.

@@ -1,0 +1,123 @@
+//! A source of derivatives that knows some of the filter's states.
+
+use super::{Ahead, DerivativeSource, Derivatives};
+use crate::error::{Error, ErrorKind, length};
+
+/// Most states that a picked source may have.
+const MAX_PICKED: usize = 32;
+
+struct Embedded {
+    source: Box<dyn DerivativeSource>,
+    state_dim: usize,
+    picks: Vec<usize>,
+}
+
+impl Embedded {
+    fn picked(&self, x: &[f64], buffer: &mut [f64; MAX_PICKED]) {
+        for (slot, &pick) in buffer.iter_mut().zip(&self.picks) {
+            *slot = x[pick];
+        }
+    }
+}
+
+impl DerivativeSource for Embedded {
+    fn relative_degree(&self) -> usize {
+        self.source.relative_degree()
+    }
+
+    fn state_dim(&self) -> usize {
+        self.state_dim
+    }
+
+    fn input_dim(&self) -> usize {
+        self.source.input_dim()
+    }
+
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
+        let mut own = [0.0; MAX_PICKED];
+        self.picked(x, &mut own);
+        self.source.evaluate(t, &own[..self.picks.len()], out);
+    }
+
+    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
+        let mut own = [0.0; MAX_PICKED];
+        self.picked(x, &mut own);
+        let known = self.source.predict(&mut own[..self.picks.len()], u, duration);
+        for (&pick, value) in self.picks.iter().zip(own) {
+            x[pick] = value;
+        }
+        known
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
+        let mut own = [0.0; MAX_PICKED];
+        self.picked(x, &mut own);
+        self.source.ahead(t, &own[..self.picks.len()], u, duration, out)
+    }
+}
+
+/// `source` as one of a filter with `state_dim` states: its own states are those numbered `picks`, counted
+/// from 0, in that order. For barriers that need different parts of a long state.
+///
+/// # Errors
+///
+/// Not as many picks as the source has states, more than 32 of them, one that is not a state.
+pub fn embedded(
+    source: Box<dyn DerivativeSource>,
+    state_dim: usize,
+    picks: &[usize],
+) -> Result<Box<dyn DerivativeSource>, Error> {
+    length("picks", picks.len(), source.state_dim())?;
+    if picks.len() > MAX_PICKED {
+        let message = format!("has {} components, must have at most {MAX_PICKED}", picks.len());
+        return Err(Error::new(ErrorKind::Dimension, "picks", message));
+    }
+    if let Some(i) = picks.iter().position(|&pick| pick >= state_dim) {
+        let message = format!("is {}, must be < {state_dim}, the number of states", picks[i]);
+        return Err(Error::new(ErrorKind::Range, format!("picks[{}]", i + 1), message));
+    }
+    Ok(Box::new(Embedded { source, state_dim, picks: picks.to_vec() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::along;
+    use super::*;
+    use crate::barriers::DistanceDisc;
+    use crate::plants::PointMass;
+
+    #[test]
+    fn the_picked_states_are_the_source_s_own() {
+        let source = || {
+            let disc = DistanceDisc::new([4.0, 5.0], 2.0, 2.0).expect("valid disc");
+            along(PointMass, disc, 2).expect("in range")
+        };
+        let embedded = embedded(source(), 7, &[6, 1, 3, 2]).expect("valid picks");
+        let (x, own) = ([9.0, 2.0, 0.4, 0.3, 9.0, 9.0, 1.0], [1.0, 2.0, 0.3, 0.4]);
+        let (mut found, mut wanted) = (Derivatives::ZERO, Derivatives::ZERO);
+        embedded.evaluate(0.0, &x, &mut found);
+        source().evaluate(0.0, &own, &mut wanted);
+        assert_eq!(found, wanted);
+        let (mut moved, mut expected) = (x, own);
+        assert!(embedded.predict(&mut moved, &[1.0, -1.0], 0.1));
+        source().predict(&mut expected, &[1.0, -1.0], 0.1);
+        assert_eq!([moved[6], moved[1], moved[3], moved[2]], expected);
+        assert_eq!([moved[0], moved[4], moved[5]], [9.0; 3]);
+        let (mut found, mut wanted) = (Ahead::ZERO, Ahead::ZERO);
+        assert!(embedded.ahead(0.0, &x, &[1.0, -1.0], 0.1, &mut found));
+        source().ahead(0.0, &own, &[1.0, -1.0], 0.1, &mut wanted);
+        assert_eq!(found, wanted);
+    }
+
+    #[test]
+    fn picks_are_checked() {
+        let refused = |picks: &[usize]| {
+            let disc = DistanceDisc::new([4.0, 5.0], 2.0, 2.0).expect("valid disc");
+            let source = along(PointMass, disc, 2).expect("in range");
+            embedded(source, 5, picks).err().map(|e| e.to_string())
+        };
+        assert_eq!(refused(&[0, 1, 2]).as_deref(), Some("picks: has 3 components, must have 4"));
+        let wanted = "picks[3]: is 5, must be < 5, the number of states";
+        assert_eq!(refused(&[0, 1, 5, 2]).as_deref(), Some(wanted));
+    }
+}
