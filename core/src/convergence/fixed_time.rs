@@ -30,6 +30,8 @@ pub enum Phase {
     /// Outside again after having been inside, with no recovery time set; the stay constraint pulls
     /// back, without a deadline.
     Left = 4,
+    /// Released: nothing is asked any more ([`End`](crate::filter::End)).
+    Released = 5,
 }
 
 /// What is remembered between samples: plain data, all that a snapshot needs.
@@ -37,6 +39,8 @@ pub enum Phase {
 pub struct FixedTimeState {
     /// Where the barrier stands.
     pub phase: Phase,
+    /// Time in s of the sample from which its window counts ([`Begin`](crate::filter::Begin)).
+    pub start_time: Option<f64>,
     /// Time of the anchor, t₀ in s.
     pub anchor_time: f64,
     /// T in s, counted from the anchor.
@@ -63,6 +67,26 @@ pub struct FixedTimeState {
     /// With a margin, an approach also loses it where a sample shows that held inputs have used up the
     /// margin (h below the profile); without one it is of the continuous-time constraint only.
     pub guaranteed: bool,
+    /// The steps in a row that did not meet its constraint, until now.
+    pub unmet: Option<Unmet>,
+}
+
+/// Steps in a row that did not meet a constraint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unmet {
+    /// How many, ≥ 1.
+    pub steps: u32,
+    /// Time of the first in s.
+    pub since: f64,
+    /// h then, in its own unit.
+    pub h: f64,
+}
+
+impl FixedTimeState {
+    /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.
+    pub fn was_inside(&self) -> bool {
+        self.phase != Phase::Waiting && self.anchor[0] + self.margin >= 0.0
+    }
 }
 
 /// What the constraint asks for at one sample.
@@ -265,6 +289,7 @@ impl FixedTime {
         }
         *state = FixedTimeState {
             phase: Phase::Approach,
+            start_time: state.start_time,
             anchor_time: t,
             deadline,
             recoveries: state.recoveries,
@@ -276,6 +301,7 @@ impl FixedTime {
             fallback,
             arrival: None,
             guaranteed,
+            unmet: state.unmet,
         };
     }
 

@@ -28,5 +28,5 @@ pub mod sampled;
 mod settings;
 pub mod stay;
 
-pub use fixed_time::{Demand, FixedTime, FixedTimeState, Phase, Refusal};
+pub use fixed_time::{Demand, FixedTime, FixedTimeState, Phase, Refusal, Unmet};
 pub use settings::{FixedTimeSettings, Method};

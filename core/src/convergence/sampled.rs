@@ -52,6 +52,11 @@ impl SampledDemand {
     /// Asks for nothing.
     pub const ZERO: Self = Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0 };
 
+    /// Whether it is [`Self::ZERO`].
+    pub fn is_zero(&self) -> bool {
+        self.weights == [0.0; MAX_RELATIVE_DEGREE]
+    }
+
     /// (5): how far e may fall below 0 within the `period` (s), `[h]`, where the pointwise constraint
     /// has the slack `slack` (`[h]`/sⁿ) at its start. For n = 1 the dip is gone at the end of the period.
     pub fn loss(&self, slack: f64, period: f64) -> f64 {

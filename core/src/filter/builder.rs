@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use super::{BarrierSettings, Channel, FilterState, Report, SafetyFilter, Sampling, Workspace};
+use super::{BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Workspace};
 use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
 use crate::convergence::profile::Profile;
@@ -121,7 +121,7 @@ impl FilterBuilder {
         length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
         length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
         let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
-        self.channels.push(Channel { name: name.to_owned(), source, promise });
+        self.channels.push(Channel::new(name, source, promise));
         Ok(self)
     }
 
@@ -149,6 +149,55 @@ impl FilterBuilder {
         };
         let named = |e: Error| e.within(&channel.name);
         channel.promise = channel.promise.clone().with_profile(profile).map_err(named)?;
+        Ok(self)
+    }
+
+    /// When the last barrier added begins and ceases to be enforced. Default: at once and never.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// // In A by 5 s, then in B by 10 s.
+    /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
+    /// let filter = SafetyFilter::builder(4, 2)
+    ///     .barrier("A", PointMass, disc(20.0)?, BarrierSettings::within(5.0))?
+    ///     .window(Begin::AtOnce, End::OnArrival)?
+    ///     .barrier("B", PointMass, disc(-20.0)?, BarrierSettings::within(10.0))?
+    ///     .window(Begin::AfterArrival(0), End::Never)?
+    ///     .build()?;
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// No barrier yet; a time out of range; a barrier to wait for that was not added before.
+    pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
+        let Some(index) = self.channels.len().checked_sub(1) else {
+            return Err(Error::new(ErrorKind::Dimension, "window", "there is no barrier yet to have one"));
+        };
+        let channel = &mut self.channels[index];
+        let named = |e: Error| e.within(&channel.name);
+        let range = |field: &str, message: String| Err(named(Error::new(ErrorKind::Range, field, message)));
+        let mut opens = 0.0;
+        match begin {
+            Begin::AtOnce => {}
+            Begin::At(seconds) => {
+                opens = non_negative("begin", seconds).map_err(named)?;
+                let deadline = channel.promise.settings().deadline;
+                if opens >= deadline {
+                    return range("begin", format!("is {opens}, must be < deadline = {deadline}"));
+                }
+            }
+            Begin::AfterArrival(other) if other >= index => {
+                return range("begin", format!("waits for barrier {other}, must be one added before"));
+            }
+            Begin::AfterArrival(_) => {}
+        }
+        if let End::At(seconds) = end
+            && positive("end", seconds).map_err(named)? <= opens
+        {
+            return range("end", format!("is {seconds}, must be > begin = {opens}"));
+        }
+        (channel.begin, channel.end) = (begin, end);
         Ok(self)
     }
 

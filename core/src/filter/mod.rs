@@ -6,17 +6,20 @@
 //! bit of the result.
 
 mod builder;
+mod channel;
 mod report;
 mod sampling;
 
 pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase, Refusal};
 pub use builder::FilterBuilder;
+use channel::Channel;
+pub use channel::{Begin, End};
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 
 use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;
-use crate::convergence::{FixedTime, FixedTimeState};
+use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length};
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Outcome, Row};
@@ -45,32 +48,6 @@ impl Clone for FilterState {
         let Self { barriers, time, period, input } = source;
         self.barriers.clone_from(barriers);
         (self.time, self.period, self.input) = (*time, *period, *input);
-    }
-}
-
-/// One barrier of a filter.
-struct Channel {
-    name: String,
-    source: Box<dyn DerivativeSource>,
-    promise: FixedTime,
-}
-
-impl Channel {
-    /// Anchors `promise` at time `begin` where it waits for that; and where samples turn out to be further
-    /// apart than was thought then, takes the margin for that into account.
-    fn anchor(
-        &self,
-        promise: &mut FixedTimeState,
-        (begin, delay): (f64, f64),
-        h: &[f64],
-        (period, measured_first): (Option<f64>, bool),
-    ) {
-        let period = period.unwrap_or(0.0);
-        if promise.phase == Phase::Waiting {
-            self.promise.anchor(promise, begin, h, self.promise.settings().deadline - delay, period);
-        } else if measured_first && promise.phase == Phase::Approach && period > promise.period {
-            self.promise.resample(promise, period);
-        }
     }
 }
 
@@ -187,8 +164,14 @@ impl SafetyFilter {
                 channel.source.evaluate(begin, from, derivatives);
             }
             let n = channel.source.relative_degree();
-            let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+            let report_b = &mut report.barriers[i];
             report_b.h = h;
+            if !channel.in_force(&mut next.barriers, i, t, h) {
+                (rows[i], demands[i]) = (Row::ZERO, SampledDemand::ZERO);
+                report_b.remember(&next.barriers[i]);
+                continue;
+            }
+            let promise = &mut next.barriers[i];
             if let Some(status) = defect(derivatives) {
                 report.status = status;
                 continue;
@@ -251,16 +234,23 @@ impl SafetyFilter {
         };
         for (i, row) in rows.iter().enumerate() {
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+            if matches!(promise.phase, Phase::Waiting | Phase::Released) {
+                continue;
+            }
             if let Some(period) = period.filter(|_| report.predicted) {
                 report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period);
             }
             report_b.row = *row;
             report_b.slack = row.slack(u);
-            if !report.status.is_satisfied() && !row.holds(u) {
-                promise.guaranteed = false;
-                report_b.guaranteed = false;
-            }
+            promise.unmet = match promise.unmet {
+                _ if report.status.is_satisfied() || row.holds(u) => None,
+                Some(unmet) => Some(Unmet { steps: unmet.steps.saturating_add(1), ..unmet }),
+                None => Some(Unmet { steps: 1, since: t, h: report_b.h }),
+            };
+            promise.guaranteed &= promise.unmet.is_none();
+            report_b.remember(promise);
         }
+        report.find_deadlocks(t, &next.barriers, u);
         Ok(())
     }
 
@@ -306,7 +296,7 @@ impl SafetyFilter {
     }
 
     /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample: its
-    /// promise starts anew there, from the derivatives h then has. Until then the input of the last sample
+    /// promise starts anew there, from the derivatives h then has, at once. Until then the input of the last sample
     /// keeps the old promise, and the new profile starts with a zero error, so that no guarantee has a gap.
     ///
     /// # Errors
@@ -316,6 +306,7 @@ impl SafetyFilter {
         let channel = self.channel(index)?;
         let named = |e: Error| e.within(&channel.name);
         channel.promise = channel.promise.clone().with_deadline(deadline).map_err(named)?;
+        channel.begin = Begin::AtOnce;
         self.state.barriers[index] = FixedTimeState::default();
         Ok(())
     }

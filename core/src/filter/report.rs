@@ -1,7 +1,7 @@
 //! What a step says about itself.
 
 use crate::convergence::{FixedTimeState, Phase};
-use crate::qp::{Row, Solver};
+use crate::qp::{Row, Solver, dot};
 
 /// How a step ended, and so what the returned input means. The numbers are stable: they leave the
 /// library as the FMU's `status`.
@@ -81,6 +81,15 @@ pub struct BarrierReport {
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
     pub slack: f64,
+    /// Steps in a row that have not met the constraint, this one included.
+    pub unmet_steps: u32,
+    /// Where the constraint is not met: the number of the barrier whose row holds with equality and points
+    /// most against this one's, if there is one.
+    pub blocked_by: Option<usize>,
+    /// Whether the barrier is blocked and has been getting nowhere: its constraint has not been met for a
+    /// tenth of its deadline, in which h has not risen by a hundredth of its size. Another u_ref can lead
+    /// out of it, one that goes around ([`Heading::around`](crate::nominal::Heading::around)).
+    pub deadlocked: bool,
     /// How far h may fall below its promise within the period because the input is held, `[h]`: what
     /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not
     /// look over the period.
@@ -101,6 +110,9 @@ impl BarrierReport {
         recoveries: 0,
         row: Row::ZERO,
         slack: 0.0,
+        unmet_steps: 0,
+        blocked_by: None,
+        deadlocked: false,
         sampling_loss: 0.0,
     };
 
@@ -113,6 +125,7 @@ impl BarrierReport {
         self.margin = promise.margin;
         self.fallback = promise.fallback;
         self.recoveries = promise.recoveries;
+        self.unmet_steps = promise.unmet.map_or(0, |unmet| unmet.steps);
     }
 }
 
@@ -146,6 +159,37 @@ impl Report {
             period: 0.0,
             predicted: false,
             barriers: vec![BarrierReport::BLANK; barriers],
+        }
+    }
+
+    /// The numbers of the barriers whose constraints this step does not meet.
+    pub fn unmet(&self) -> impl Iterator<Item = usize> + '_ {
+        self.barriers.iter().enumerate().filter(|(_, b)| b.unmet_steps > 0).map(|(i, _)| i)
+    }
+
+    /// Finds what blocks the barriers that are not met at `u`, and whether that is a deadlock.
+    pub(super) fn find_deadlocks(&mut self, t: f64, promises: &[FixedTimeState], u: &[f64]) {
+        /// Part of the deadline, and part of |h|, in [`BarrierReport::deadlocked`].
+        const TIME: f64 = 0.1;
+        const PROGRESS: f64 = 0.01;
+        for i in 0..self.barriers.len() {
+            let Some(unmet) = promises[i].unmet else { continue };
+            let (normal, mut worst) = (self.barriers[i].row.normal, 0.0);
+            let mut blocked_by = None;
+            for (j, other) in self.barriers.iter().enumerate() {
+                let tight = other.slack.abs() <= 1e-6 * other.row.size(u);
+                let size = dot(&normal, &normal).sqrt() * dot(&other.row.normal, &other.row.normal).sqrt();
+                let cosine = dot(&normal, &other.row.normal) / size;
+                if j != i && tight && cosine < worst {
+                    (worst, blocked_by) = (cosine, Some(j));
+                }
+            }
+            let b = &mut self.barriers[i];
+            b.blocked_by = blocked_by;
+            b.deadlocked = blocked_by.is_some()
+                && matches!(b.phase, Phase::Approach | Phase::Late)
+                && t - unmet.since >= TIME * promises[i].deadline
+                && b.h - unmet.h <= PROGRESS * unmet.h.abs();
         }
     }
 

@@ -146,6 +146,10 @@ impl Held<'_> {
         let mut ahead = Ahead::ZERO;
         let states = self.x.chunks_exact(self.x.len() / self.channels.len());
         for (((channel, demand), x), row) in self.channels.iter().zip(self.demands).zip(states).zip(rows) {
+            if demand.is_zero() {
+                *row = Row::ZERO;
+                continue;
+            }
             let known = channel.source.ahead(self.t, x, u, self.period, &mut ahead);
             if !known || !ahead.is_finite() {
                 return None;

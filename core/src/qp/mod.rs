@@ -34,10 +34,14 @@ impl Row {
         dot(&self.normal, u) - self.floor
     }
 
-    /// The slack counted as round-off: 1e-12 of the terms that it is the difference of.
+    /// The size of the terms whose difference the slack is: Σ|a_i u_i| + |b|.
+    pub fn size(&self, u: &[f64]) -> f64 {
+        self.normal.iter().zip(u).map(|(a, v)| (a * v).abs()).sum::<f64>() + self.floor.abs()
+    }
+
+    /// The slack counted as round-off: 1e-12 of its [`Self::size`].
     pub fn round_off(&self, u: &[f64]) -> f64 {
-        let terms: f64 = self.normal.iter().zip(u).map(|(a, v)| (a * v).abs()).sum();
-        1e-12 * (terms + self.floor.abs())
+        1e-12 * self.size(u)
     }
 
     /// Whether the row holds at `u` up to [`Self::round_off`].
@@ -47,7 +51,7 @@ impl Row {
 }
 
 /// Σ a_i b_i over the shorter of the two.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 

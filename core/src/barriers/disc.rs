@@ -1,10 +1,4 @@
-//! Reference barriers.
-//!
-//! The two discs below have the same safe set and very different behaviour. The quadratic one is the
-//! paper's: far away its value grows with d², while its gradient at the boundary is only 2R, so a
-//! vehicle that follows a profile of it arrives at enormous speed. The distance-shaped one has a
-//! gradient of length ≤ 1 everywhere; it is the one to use. Both can move at a constant velocity, and
-//! [`Outside`] turns a goal into an obstacle.
+//! Discs: the paper's form and the distance-shaped one, at rest, moving, or around a point that is a state.
 
 use nalgebra::SVector;
 
@@ -44,19 +38,6 @@ impl Centre {
             }
         };
         away(0).squared() + away(1).squared()
-    }
-}
-
-/// What lies outside another barrier's set: h = −h of the inside.
-///
-/// `Outside(DistanceDisc::new(..)?)` is an obstacle: kept clear of if the start is outside, left by the
-/// deadline if not. At the centre of the disc the gradient vanishes.
-#[derive(Clone, Copy, Debug)]
-pub struct Outside<B>(pub B);
-
-impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
-        -self.0.value(t, x)
     }
 }
 

@@ -1,0 +1,95 @@
+//! One barrier of a filter: its derivatives, its promise and when that is in force.
+
+use super::{FixedTimeState, Phase};
+use crate::convergence::FixedTime;
+use crate::lie::DerivativeSource;
+
+/// When a barrier begins to be enforced. Its deadline counts from the filter's first sample in any case, so
+/// that "be in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Begin {
+    /// At the first sample.
+    #[default]
+    AtOnce,
+    /// This many seconds after it, finite, ≥ 0, less than the deadline.
+    At(f64),
+    /// When the barrier of this number, counted from 0 and added before, has arrived.
+    AfterArrival(usize),
+}
+
+/// When a barrier ceases to be enforced ([`Phase::Released`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum End {
+    /// Never.
+    #[default]
+    Never,
+    /// This many seconds after the filter's first sample, finite, > 0.
+    At(f64),
+    /// As soon as h ≥ 0 has been reached.
+    OnArrival,
+}
+
+/// One barrier of a filter.
+pub(super) struct Channel {
+    pub(super) name: String,
+    pub(super) source: Box<dyn DerivativeSource>,
+    pub(super) promise: FixedTime,
+    pub(super) begin: Begin,
+    pub(super) end: End,
+}
+
+/// Round-off of a time that is a sum of steps, as a part of it.
+const SAME_TIME: f64 = 1e-12;
+
+impl Channel {
+    pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
+        let (begin, end) = (Begin::default(), End::default());
+        Self { name: name.to_owned(), source, promise, begin, end }
+    }
+
+    /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it
+    /// where it has ceased to be.
+    pub(super) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
+        let start = *barriers[index].start_time.get_or_insert(t);
+        let reached = |seconds: f64| t - start >= seconds - SAME_TIME * t.abs().max(seconds);
+        let begun = barriers[index].phase != Phase::Waiting
+            || match self.begin {
+                Begin::AtOnce => true,
+                Begin::At(seconds) => reached(seconds),
+                Begin::AfterArrival(other) => barriers[other].arrival.is_some(),
+            };
+        let promise = &mut barriers[index];
+        let ended = match self.end {
+            End::Never => false,
+            End::At(seconds) => reached(seconds),
+            End::OnArrival => begun && (h >= 0.0 || promise.arrival.is_some()),
+        };
+        if ended && promise.phase != Phase::Released {
+            promise.phase = Phase::Released;
+            promise.unmet = None;
+            if h >= 0.0 {
+                promise.arrival.get_or_insert(t);
+            }
+        }
+        begun && !ended
+    }
+
+    /// Anchors `promise` at time `begin` where it waits for that, `delay` after its sample; and where samples
+    /// turn out to be further apart than was thought then, takes the margin for that into account.
+    pub(super) fn anchor(
+        &self,
+        promise: &mut FixedTimeState,
+        (begin, delay): (f64, f64),
+        h: &[f64],
+        (period, measured_first): (Option<f64>, bool),
+    ) {
+        let period = period.unwrap_or(0.0);
+        if promise.phase == Phase::Waiting {
+            let waited = begin - delay - promise.start_time.unwrap_or(begin - delay);
+            let deadline = self.promise.settings().deadline - waited - delay;
+            self.promise.anchor(promise, begin, h, deadline, period);
+        } else if measured_first && promise.phase == Phase::Approach && period > promise.period {
+            self.promise.resample(promise, period);
+        }
+    }
+}
