@@ -210,6 +210,7 @@ fn phase_type() -> EnumerationType {
         ("late", Phase::Late, "the deadline passed outside; the approach goes on"),
         ("stay", Phase::Stay, "inside, and kept there"),
         ("left", Phase::Left, "outside again; pulled back without a deadline"),
+        ("released", Phase::Released, "let go: nothing is asked any more"),
     ]
     .map(|(name, phase, description)| (name, phase as i32, description));
     enumeration(PHASE, "Where a barrier stands with its promise", &items)
@@ -291,6 +292,17 @@ impl Table {
     }
 }
 
+/// The unit of a derivative: `m` over s², `m/s` over s.
+fn over_seconds(unit: &str, degree: usize) -> String {
+    let (above, mut power) = match unit.split_once("/s") {
+        Some((above, "")) => (above, 1),
+        Some((above, power)) => (above, power.parse().unwrap_or(1)),
+        None => (unit, 0),
+    };
+    power += degree;
+    if power == 1 { format!("{above}/s") } else { format!("{above}/s{power}") }
+}
+
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
     VariableKind::Real {
         start,
@@ -325,8 +337,9 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     }
     let enumerated = |t: &str| VariableKind::Enumeration { declared_type: t.into(), start: None };
     table.add("status".into(), "what u means", output, enumerated(STATUS));
-    for barrier in &c.barrier {
-        let (unit, rate_unit) = barrier.units();
+    for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
+        let unit = barrier.unit(c.plant.model);
+        let rate_unit = &over_seconds(unit, degree);
         let name = |field: &str| format!("{}.{field}", barrier.name);
         let flag = || VariableKind::Boolean { start: None };
         let first = table.variables.len();

@@ -184,7 +184,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let mut barriers = Vec::new();
     for (i, section) in c.barrier.iter().enumerate() {
-        let (name, unit) = (&section.name, section.units().0);
+        let (name, unit) = (&section.name, section.unit(c.plant.model));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
         let default_rate = BarrierSettings::default_rate(settings.deadline, step);
         let begun = start.is_some();

@@ -170,11 +170,12 @@ impl<const NX: usize> Barrier<NX> for StateBound {
     }
 }
 
-/// Two neighbouring states of bounded length, such as a speed limit for a velocity:
+/// One state of bounded size, or two neighbouring ones of bounded length, such as a speed limit:
 /// h = √(L² + ε²) − √(x_i² + x_{i+1}² + ε²) with ε = L/2, in their unit.
 #[derive(Clone, Copy, Debug)]
 pub struct NormBound {
     first: usize,
+    count: usize,
     limit: f64,
 }
 
@@ -185,7 +186,16 @@ impl NormBound {
     ///
     /// A limit that is not finite or ≤ 0.
     pub fn new(first: usize, limit: f64) -> Result<Self, Error> {
-        Ok(Self { first, limit: positive("bound", limit)? })
+        Ok(Self { first, count: 2, limit: positive("bound", limit)? })
+    }
+
+    /// State number `state`, counted from 0, of size ≤ `limit` > 0.
+    ///
+    /// # Errors
+    ///
+    /// A limit that is not finite or ≤ 0.
+    pub fn of_one(state: usize, limit: f64) -> Result<Self, Error> {
+        Ok(Self { count: 1, ..Self::new(state, limit)? })
     }
 }
 
@@ -193,12 +203,14 @@ impl<const NX: usize> Barrier<NX> for NormBound {
     /// Not a number for states that the plant does not have.
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         let smoothing = 0.5 * self.limit;
-        match (x.get(self.first), x.get(self.first + 1)) {
-            (Some(a), Some(b)) => {
-                -(a.squared() + b.squared() + smoothing * smoothing).sqrt() + self.limit.hypot(smoothing)
-            }
-            _ => S::from(f64::NAN),
+        if NX < self.count || self.first > NX - self.count {
+            return S::from(f64::NAN);
         }
+        let mut square = x[self.first].squared();
+        if self.count == 2 {
+            square += x[self.first + 1].squared();
+        }
+        -(square + smoothing * smoothing).sqrt() + self.limit.hypot(smoothing)
     }
 }
 
@@ -244,6 +256,7 @@ mod tests {
         assert!(h(&StateBound::at_most(4, 5.0).expect("valid"), x).is_nan());
         let speed = NormBound::new(2, 5.0).expect("valid");
         assert!(h(&speed, x).abs() < 1e-15 && h(&speed, [0.0; 4]) > 0.0);
+        assert_eq!(h(&NormBound::of_one(3, 4.0).expect("valid"), x), 0.0);
         assert!(Barrier::<3>::value(&speed, 0.0, &vector![0.0, 0.0, 1.0]).is_nan());
     }
 

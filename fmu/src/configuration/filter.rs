@@ -3,62 +3,19 @@
 use std::collections::BTreeMap;
 
 use punctual_core::barrier::Barrier;
-use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
-use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
+use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling};
 use punctual_core::lie;
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
+use super::barrier::{BarrierSection, Visitor};
 use super::{
     ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
-
-/// Default margin of a `disc`, as a part of its radius.
-const MARGIN_OF_RADIUS: f64 = 0.01;
-
-/// The shape of a barrier.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ShapeName {
-    /// [`DistanceDisc`]: interior of a disc, smooth and distance-shaped. The one to use.
-    #[default]
-    Disc,
-    /// [`QuadraticDisc`]: interior of a disc in the paper's form R² − d².
-    QuadraticDisc,
-    /// [`Outside`] of a [`DistanceDisc`]: to be kept clear of, or left by the deadline.
-    Obstacle,
-}
-
-impl ShapeName {
-    /// Its name in a configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Disc => "disc",
-            Self::QuadraticDisc => "quadratic_disc",
-            Self::Obstacle => "obstacle",
-        }
-    }
-
-    fn is_distance_shaped(self) -> bool {
-        self != Self::QuadraticDisc
-    }
-}
-
-/// How the deadline is met.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MethodName {
-    /// [`Method::ReferenceProfile`].
-    #[default]
-    ReferenceProfile,
-    /// [`Method::RepeatedRoot`], the paper's.
-    RepeatedRoot,
-}
 
 /// What is done about inputs that are held between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -74,190 +31,45 @@ pub enum SamplingName {
     StepSize,
 }
 
+/// A barrier of a configuration on its way into a filter.
+struct Adding<'a> {
+    configuration: &'a FilterConfiguration,
+    builder: FilterBuilder,
+    index: usize,
+    point: Option<usize>,
+}
+
+impl Visitor for Adding<'_> {
+    type Output = Result<FilterBuilder, ConfigurationError>;
+
+    fn shape<B>(self, barrier: B) -> Self::Output
+    where
+        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
+    {
+        let Self { configuration: c, builder, index, point } = self;
+        let (model, at) = (&c.plant, Place { index, point });
+        match model.model {
+            ModelName::PointMass => c.add_along::<_, _, 4, 8>(builder, at, PointMass, barrier),
+            ModelName::Unicycle => c.add_along::<_, _, 4, 8>(builder, at, Unicycle, barrier),
+            ModelName::Bicycle => c.add_along::<_, _, 4, 8>(builder, at, model.bicycle()?, barrier),
+            ModelName::BicycleSmallSlip => {
+                c.add_along::<_, _, 4, 8>(builder, at, model.small_slip()?, barrier)
+            }
+            ModelName::BicycleSmallSlipRate => {
+                c.add_along::<_, _, 5, 9>(builder, at, model.small_slip()?.with_rate(), barrier)
+            }
+            ModelName::BicycleKinematic => {
+                c.add_along::<_, _, 5, 9>(builder, at, model.kinematic()?, barrier)
+            }
+        }
+    }
+}
+
 /// Which barrier, and the first of the filter's states that say where its point is, if it follows one.
 #[derive(Clone, Copy)]
 struct Place {
     index: usize,
     point: Option<usize>,
-}
-
-/// `[[barrier]]`: a safe set and the deadline for reaching it.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct BarrierSection {
-    /// Its name, a C identifier, unique; prefix of its variables.
-    pub name: String,
-    /// The shape. Default `disc`.
-    #[serde(default)]
-    pub shape: ShapeName,
-    /// Centre in m; of a moving disc where it is at time 0 of the simulation, whenever that starts.
-    pub centre: [f64; 2],
-    /// Velocity of the centre in m/s. Default 0.
-    #[serde(default)]
-    pub velocity: [f64; 2],
-    /// Whether centre and velocity are inputs of the FMU, such as a measured obstacle's, that start with the
-    /// values here, and not parameters. Default false.
-    #[serde(default)]
-    pub centre_input: bool,
-    /// Radius in m, > 0.
-    pub radius: f64,
-    /// `disc` and `obstacle` only: ε in m, ≥ 0. Default 0: the radius.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub smoothing: Option<f64>,
-    /// Deadline T in s after the first step, > 0.
-    pub deadline: f64,
-    /// How it is met. Default `reference_profile`.
-    #[serde(default)]
-    pub method: MethodName,
-    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
-    #[serde(default)]
-    pub rate: f64,
-    /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`. Default: none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub rates: Vec<f64>,
-    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`, 20 / deadline where there are `rates`.
-    #[serde(default)]
-    pub stay_rate: f64,
-    /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added. Default: a
-    /// hundredth of the radius, none for `quadratic_disc`.
-    #[serde(default)]
-    pub margin: Option<f64>,
-    /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
-    #[serde(default)]
-    pub recovery: f64,
-}
-
-impl BarrierSection {
-    fn complete(&mut self, path: &str) -> Result<(), ConfigurationError> {
-        check_identifier(&format!("{path}.name"), &self.name)?;
-        match self.shape {
-            ShapeName::Disc | ShapeName::Obstacle => {
-                self.smoothing.get_or_insert(0.0);
-                self.margin.get_or_insert(MARGIN_OF_RADIUS * self.radius);
-            }
-            ShapeName::QuadraticDisc if self.smoothing.is_some() => {
-                let message = "belongs to the shapes disc and obstacle; quadratic_disc has none";
-                return Err(ConfigurationError::new(format!("{path}.smoothing"), message));
-            }
-            ShapeName::QuadraticDisc => {
-                self.margin.get_or_insert(0.0);
-            }
-        }
-        Ok(())
-    }
-
-    /// The unit of h and that of its second derivative.
-    pub fn units(&self) -> (&'static str, &'static str) {
-        match self.shape {
-            ShapeName::Disc | ShapeName::Obstacle => ("m", "m/s2"),
-            ShapeName::QuadraticDisc => ("m2", "m2/s2"),
-        }
-    }
-
-    fn parameters(&self, index: usize) -> Vec<Parameter<FilterConfiguration>> {
-        let unit = self.units().0;
-        let row = |field: &str, unit, range, description: &str, access: fn(&mut Self) -> &mut f64| {
-            // Configuration files count barriers from 0, as the error messages of serde do; the
-            // components of a vector are counted from 1, as in FMI.
-            let names = (format!("{}.{field}", self.name), format!("barrier[{index}].{field}"));
-            Parameter::new(names, unit, range, description, move |c: &mut FilterConfiguration| {
-                access(&mut c.barrier[index])
-            })
-        };
-        let mut rows = vec![
-            row("deadline", "s", Range::POSITIVE, "time from the first step to be inside", |b| {
-                &mut b.deadline
-            }),
-            row(
-                "rate",
-                "1/s",
-                Range::NON_NEGATIVE,
-                "decay rate of an error against the profile; 0: 20 / deadline",
-                |b| &mut b.rate,
-            ),
-            row(
-                "stay_rate",
-                "1/s",
-                Range::NON_NEGATIVE,
-                "rate of the constraint that keeps it inside; 0: as rate",
-                |b| &mut b.stay_rate,
-            ),
-            row("margin", unit, Range::NON_NEGATIVE, "h to arrive and stay above", |b| {
-                b.margin.get_or_insert(0.0)
-            }),
-            row(
-                "recovery",
-                "s",
-                Range::NON_NEGATIVE,
-                "deadline for coming back after leaving; 0: none",
-                |b| &mut b.recovery,
-            ),
-        ];
-        if !self.centre_input {
-            rows.push(row("centre[1]", "m", Range::FINITE, "centre along x, at time 0", |b| {
-                &mut b.centre[0]
-            }));
-            rows.push(row("centre[2]", "m", Range::FINITE, "centre along y, at time 0", |b| {
-                &mut b.centre[1]
-            }));
-            rows.push(row("velocity[1]", "m/s", Range::FINITE, "velocity of the centre along x", |b| {
-                &mut b.velocity[0]
-            }));
-            rows.push(row("velocity[2]", "m/s", Range::FINITE, "velocity of the centre along y", |b| {
-                &mut b.velocity[1]
-            }));
-        }
-        rows.push(row("radius", "m", Range::POSITIVE, "radius of the disc", |b| &mut b.radius));
-        if self.shape.is_distance_shaped() {
-            rows.push(row(
-                "smoothing",
-                "m",
-                Range::NON_NEGATIVE,
-                "rounding of the distance at the centre; 0: the radius",
-                |b| b.smoothing.get_or_insert(0.0),
-            ));
-        }
-        rows
-    }
-
-    /// The settings of its promise; 0 means "as the others say".
-    ///
-    /// # Errors
-    ///
-    /// Rates out of range.
-    pub fn settings(&self) -> Result<BarrierSettings, punctual_core::Error> {
-        let given = |value: f64| (value != 0.0).then_some(value);
-        let rates = match &self.rates[..] {
-            [] => None,
-            rates => Some(Operator::new(rates)?),
-        };
-        Ok(BarrierSettings {
-            deadline: self.deadline,
-            method: match self.method {
-                MethodName::ReferenceProfile => Method::ReferenceProfile,
-                MethodName::RepeatedRoot => Method::RepeatedRoot,
-            },
-            rate: given(self.rate),
-            rates,
-            stay_rate: given(self.stay_rate),
-            margin: self.margin.unwrap_or(0.0),
-            recovery: given(self.recovery),
-        })
-    }
-
-    /// Its variables that are inputs, with their units, start values and meanings.
-    pub fn inputs(&self) -> Vec<(String, &'static str, f64, &'static str)> {
-        if !self.centre_input {
-            return Vec::new();
-        }
-        let name = |field: &str| format!("{}.{field}", self.name);
-        vec![
-            (name("centre[1]"), "m", self.centre[0], "where the centre is, along x"),
-            (name("centre[2]"), "m", self.centre[1], "where the centre is, along y"),
-            (name("velocity[1]"), "m/s", self.velocity[0], "velocity of the centre along x"),
-            (name("velocity[2]"), "m/s", self.velocity[1], "velocity of the centre along y"),
-        ]
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -320,7 +132,7 @@ impl FilterConfiguration {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
         }
         for i in 0..self.barrier.len() {
-            self.barrier[i].complete(&format!("barrier[{i}]"))?;
+            self.barrier[i].complete(&format!("barrier[{i}]"), self.plant.model)?;
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
             let reserved =
@@ -369,7 +181,7 @@ impl FilterConfiguration {
             }
         }
         for (i, barrier) in self.barrier.iter().enumerate() {
-            rows.extend(barrier.parameters(i));
+            rows.extend(barrier.parameters(i, self.plant.model));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         rows
@@ -394,29 +206,13 @@ impl FilterConfiguration {
         let mut next_point = states;
         let mut builder = SafetyFilter::builder(states + self.points().len(), inputs.len());
         for (i, section) in self.barrier.iter().enumerate() {
-            let path = format!("barrier[{i}]");
-            let core = |e: punctual_core::Error| {
-                ConfigurationError::new(format!("{path}.{}", e.field()), e.message())
-            };
             let point = section.centre_input.then_some(next_point);
             next_point += section.inputs().len();
-            let smoothing = section.smoothing.filter(|s| *s != 0.0).unwrap_or(section.radius);
-            let (centre, radius) = (section.centre, section.radius);
-            let distance_disc = || {
-                let disc = DistanceDisc::new(centre, radius, smoothing)?.moving(section.velocity)?;
-                Ok(if point.is_some() { disc.following(states) } else { disc })
-            };
-            let quadratic_disc = || {
-                let disc = QuadraticDisc::new(centre, radius)?.moving(section.velocity)?;
-                Ok(if point.is_some() { disc.following(states) } else { disc })
-            };
-            builder = match section.shape {
-                ShapeName::Disc => self.add(builder, i, point, distance_disc().map_err(core)?)?,
-                ShapeName::Obstacle => {
-                    self.add(builder, i, point, Outside(distance_disc().map_err(core)?))?
-                }
-                ShapeName::QuadraticDisc => self.add(builder, i, point, quadratic_disc().map_err(core)?)?,
-            };
+            let core = |e| self.refused(i, &punctual_core::Error::within(e, &section.name));
+            let adding = Adding { configuration: self, builder, index: i, point };
+            builder = section.visit(&self.plant.model, states, adding).map_err(core)??;
+            let (begin, end) = self.window(i)?;
+            builder = builder.window(begin, end).map_err(|e| self.refused(i, &e))?;
         }
         let (mut min, mut max) = (Vec::new(), Vec::new());
         for input in inputs {
@@ -440,37 +236,42 @@ impl FilterConfiguration {
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
 
+    /// The relative degree of each barrier; none for a configuration that cannot be built.
+    pub fn relative_degrees(&self) -> Vec<usize> {
+        self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
+    }
+
     /// The start values of the points that are inputs; they follow the states of the plant in the filter's.
     pub fn points(&self) -> Vec<f64> {
         self.barrier.iter().flat_map(BarrierSection::inputs).map(|(_, _, start, _)| start).collect()
     }
 
-    fn add<B>(
-        &self,
-        builder: FilterBuilder,
-        index: usize,
-        point: Option<usize>,
-        barrier: B,
-    ) -> Result<FilterBuilder, ConfigurationError>
-    where
-        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
-    {
-        let model = &self.plant;
-        let at = Place { index, point };
-        match model.model {
-            ModelName::PointMass => self.add_along::<_, _, 4, 8>(builder, at, PointMass, barrier),
-            ModelName::Unicycle => self.add_along::<_, _, 4, 8>(builder, at, Unicycle, barrier),
-            ModelName::Bicycle => self.add_along::<_, _, 4, 8>(builder, at, model.bicycle()?, barrier),
-            ModelName::BicycleSmallSlip => {
-                self.add_along::<_, _, 4, 8>(builder, at, model.small_slip()?, barrier)
+    /// When barrier `index` begins and ceases to be enforced.
+    fn window(&self, index: usize) -> Result<(Begin, End), ConfigurationError> {
+        let section = &self.barrier[index];
+        let refuse = |field: &str, message: String| {
+            Err(ConfigurationError::new(format!("barrier[{index}].{field}"), message))
+        };
+        let begin = match (&section.after, section.begin) {
+            (Some(_), begin) if begin != 0.0 => {
+                return refuse("begin", format!("is {begin}, must be 0 beside `after`"));
             }
-            ModelName::BicycleSmallSlipRate => {
-                self.add_along::<_, _, 5, 9>(builder, at, model.small_slip()?.with_rate(), barrier)
+            (Some(name), _) => match self.barrier[..index].iter().position(|b| b.name == *name) {
+                Some(other) => Begin::AfterArrival(other),
+                None => return refuse("after", format!("is {name:?}, must be the name of a barrier above")),
+            },
+            (None, begin) if begin > 0.0 => Begin::At(begin),
+            (None, _) => Begin::AtOnce,
+        };
+        let end = match (section.until_arrival, section.end) {
+            (true, end) if end != 0.0 => {
+                return refuse("end", format!("is {end}, must be 0 beside `until_arrival`"));
             }
-            ModelName::BicycleKinematic => {
-                self.add_along::<_, _, 5, 9>(builder, at, model.kinematic()?, barrier)
-            }
-        }
+            (true, _) => End::OnArrival,
+            (false, end) if end > 0.0 => End::At(end),
+            (false, _) => End::Never,
+        };
+        Ok((begin, end))
     }
 
     /// Adds `barrier` along `plant`; `EXTENDED` = `NX` + 4 states where it follows a point.

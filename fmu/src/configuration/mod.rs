@@ -4,12 +4,14 @@
 //! travels inside the FMU as `resources/configuration.toml`. Numbers in it are also the FMU's
 //! parameters: [`Parameter`] is the one table of their names, units, ranges and meaning.
 
+mod barrier;
 mod filter;
 mod parameter;
 mod plant;
 mod read;
 
-pub use filter::{BarrierSection, FilterConfiguration, MethodName, SamplingName, ShapeName, UNBOUNDED};
+pub use barrier::{BarrierSection, MethodName, ShapeName};
+pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};
 pub use read::{ConfigurationError, read_toml};

@@ -69,7 +69,33 @@ defects! {
     infinite_centre: FILTER, "[45.0, 44.0]" => "[45.0, inf]", "barrier[0].centre[2]: is inf, must be finite";
     smoothing_of_a_quadratic_disc: FILTER,
         "radius = 2.0" => "radius = 2.0\nshape = \"quadratic_disc\"\nsmoothing = 1.0",
-        "barrier[0].smoothing: belongs to the shapes disc and obstacle; quadratic_disc has none";
+        "barrier[0].smoothing: quadratic_disc has none";
+    a_field_of_another_shape: FILTER, "radius = 2.0" => "radius = 2.0\nnormal = [1.0, 0.0]",
+        "barrier[0].normal: disc has none";
+    an_ellipse_without_axes: FILTER, "radius = 2.0" => "shape = \"ellipse\"",
+        "barrier[0].half_axes: missing, ellipse needs it";
+    a_negative_half_side: FILTER, "radius = 2.0" => "shape = \"rectangle\"\nhalf_sides = [1.0, -1.0]",
+        "barrier[0].half_sides[2]: is -1, must be finite and >= 1e-9";
+    a_normal_without_direction: FILTER, "radius = 2.0" => "shape = \"half_plane\"\nnormal = [0.0, 0.0]",
+        "barrier[0].normal: is [0, 0], must have a direction";
+    a_centre_input_of_an_ellipse: FILTER,
+        "radius = 2.0" => "shape = \"ellipse\"\nhalf_axes = [1.0, 2.0]\ncentre_input = true",
+        "barrier[0].centre_input: ellipse has none";
+    an_unknown_state: FILTER,
+        "centre = [45.0, 44.0]\nradius = 2.0" => "shape = \"at_most\"\nstate = \"w\"\nbound = 1.0",
+        "barrier[0].state: is \"w\", must be one of x_p, y_p, theta, v";
+    after_an_unknown_barrier: FILTER, "radius = 2.0" => "radius = 2.0\nafter = \"A\"",
+        "barrier[0].after: is \"A\", must be the name of a barrier above";
+    begin_after_the_deadline: FILTER, "radius = 2.0" => "radius = 2.0\nbegin = 10.0",
+        "barrier[0].begin: is 10, must be < deadline = 10";
+    end_before_the_begin: FILTER, "radius = 2.0" => "radius = 2.0\nbegin = 5.0\nend = 4.0",
+        "barrier[0].end: is 4, must be > begin = 5";
+    two_ends: FILTER, "radius = 2.0" => "radius = 2.0\nuntil_arrival = true\nend = 4.0",
+        "barrier[0].end: is 4, must be 0 beside `until_arrival`";
+    rates_of_another_number: FILTER, "radius = 2.0" => "radius = 2.0\nrates = [1.0, 2.0, 3.0]",
+        "barrier[0].rates: has 3 components, must have 2, the relative degree";
+    a_rate_beside_rates: FILTER, "radius = 2.0" => "radius = 2.0\nrates = [1.0, 2.0]\nrate = 1.0",
+        "barrier[0].rates: given beside `rate`, which it replaces";
     unknown_input: FILTER, "a = [-9.0, 8.0]" => "b = [-9.0, 8.0]",
         "bounds.b: unknown input, must be one of a, omega";
     nan_bound: FILTER, "[-9.0, 8.0]" => "[nan, 8.0]",
@@ -124,7 +150,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
         (FILTER, "radius = 2.0", "radius = 2.0\nradus = 1.0", ["barrier[0]", "unknown field `radus`"]),
         (FILTER, "[[barrier]]", "[experiment]\nstep = 1.0\n[[barrier]]", ["experiment", "`step_size`"]),
         (FILTER, "kind = \"filter\"", "kind = \"filter\"\nkey = 1", ["unknown field `key`", "`bounds`"]),
-        (FILTER, "radius = 2.0", "", ["barrier[0]", "missing field `radius`"]),
+        (FILTER, "radius = 2.0", "", ["barrier[0].radius", "missing, disc needs it"]),
         (FILTER, "radius = 2.0", "radius = \"2\"", ["barrier[0].radius", "expected f64"]),
         (FILTER, "[45.0, 44.0]", "[45.0]", ["barrier[0].centre", "length 2"]),
         (FILTER, "\"unicycle\"", "\"bike\"", ["plant.model", "`bicycle`"]),
@@ -217,7 +243,7 @@ fn defaults_are_those_of_the_documentation() {
     let barrier = &c.barrier[0];
     assert_eq!((barrier.rate, barrier.stay_rate, barrier.smoothing), (0.0, 0.0, Some(0.0)), "by default");
     assert_eq!(barrier.margin, Some(0.02), "a hundredth of the radius");
-    assert_eq!(barrier.velocity, [0.0; 2], "at rest");
+    assert_eq!(barrier.velocity, Some([0.0; 2]), "at rest");
     assert_eq!((c.name.as_str(), c.direct_feedthrough, c.correction_limit), ("filter", true, 1e6));
     let Configuration::Plant(c) =
         Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle\"").unwrap()

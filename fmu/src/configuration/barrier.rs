@@ -1,0 +1,443 @@
+//! `[[barrier]]`: a safe set, the deadline for reaching it, and when that is in force.
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::{
+    DistanceDisc, Ellipse, HalfPlane, NormBound, Outside, QuadraticDisc, Rectangle, StateBound,
+};
+use punctual_core::convergence::operator::Operator;
+use punctual_core::filter::{BarrierSettings, Method};
+use serde::{Deserialize, Serialize};
+
+use super::{ConfigurationError, FilterConfiguration, ModelName, Parameter, Range, check_identifier};
+
+/// Default margin as a part of the radius, or of the smaller half axis or side.
+const MARGIN_OF_SIZE: f64 = 0.01;
+
+/// How the deadline is met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodName {
+    /// [`Method::ReferenceProfile`].
+    #[default]
+    ReferenceProfile,
+    /// [`Method::RepeatedRoot`], the paper's.
+    RepeatedRoot,
+}
+
+/// The shape of a barrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeName {
+    /// [`DistanceDisc`]: interior of a disc, smooth and distance-shaped. The one to use.
+    #[default]
+    Disc,
+    /// [`QuadraticDisc`]: interior of a disc in the paper's form R² − d².
+    QuadraticDisc,
+    /// [`Outside`] of a [`DistanceDisc`]: to be kept clear of, or left by the deadline.
+    Obstacle,
+    /// [`Ellipse`]: its interior.
+    Ellipse,
+    /// [`Outside`] of an [`Ellipse`].
+    EllipticObstacle,
+    /// [`Rectangle`]: its interior, corners rounded inwards.
+    Rectangle,
+    /// [`Outside`] of a [`Rectangle`] that contains the true one.
+    RectangularObstacle,
+    /// [`HalfPlane`]: one side of a line.
+    HalfPlane,
+    /// [`StateBound`]: a state that is at most the bound.
+    AtMost,
+    /// [`StateBound`]: a state that is at least the bound.
+    AtLeast,
+    /// [`NormBound`]: the speed, in either direction.
+    SpeedLimit,
+}
+
+/// A field that some shapes have and others not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Field {
+    Centre,
+    Velocity,
+    Radius,
+    Smoothing,
+    HalfAxes,
+    HalfSides,
+    Angle,
+    Normal,
+    State,
+    Bound,
+}
+
+impl Field {
+    const ALL: [(Self, &'static str); 10] = [
+        (Self::Centre, "centre"),
+        (Self::Velocity, "velocity"),
+        (Self::Radius, "radius"),
+        (Self::Smoothing, "smoothing"),
+        (Self::HalfAxes, "half_axes"),
+        (Self::HalfSides, "half_sides"),
+        (Self::Angle, "angle"),
+        (Self::Normal, "normal"),
+        (Self::State, "state"),
+        (Self::Bound, "bound"),
+    ];
+}
+
+impl ShapeName {
+    /// Its name in a configuration.
+    pub fn name(self) -> &'static str {
+        self.row().0
+    }
+
+    /// Name in a configuration, and fields: one row for each shape.
+    fn row(self) -> (&'static str, &'static [Field]) {
+        use Field::{Angle, Bound, Centre, HalfAxes, HalfSides, Normal, Radius, Smoothing, State, Velocity};
+        const DISC: &[Field] = &[Centre, Velocity, Radius, Smoothing];
+        match self {
+            Self::Disc => ("disc", DISC),
+            Self::QuadraticDisc => ("quadratic_disc", &[Centre, Velocity, Radius]),
+            Self::Obstacle => ("obstacle", DISC),
+            Self::Ellipse => ("ellipse", &[Centre, HalfAxes, Angle]),
+            Self::EllipticObstacle => ("elliptic_obstacle", &[Centre, HalfAxes, Angle]),
+            Self::Rectangle => ("rectangle", &[Centre, HalfSides, Angle]),
+            Self::RectangularObstacle => ("rectangular_obstacle", &[Centre, HalfSides, Angle]),
+            Self::HalfPlane => ("half_plane", &[Centre, Normal]),
+            Self::AtMost => ("at_most", &[State, Bound]),
+            Self::AtLeast => ("at_least", &[State, Bound]),
+            Self::SpeedLimit => ("speed_limit", &[Bound]),
+        }
+    }
+
+    fn has(self, field: Field) -> bool {
+        self.row().1.contains(&field)
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// `[[barrier]]`: a safe set and the deadline for reaching it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BarrierSection {
+    /// Its name, a C identifier, unique; prefix of its variables.
+    pub name: String,
+    /// The shape. Default `disc`.
+    #[serde(default)]
+    pub shape: ShapeName,
+    /// Discs, ellipses, rectangles: centre in m; of a moving disc where it is at time 0 of the simulation,
+    /// whenever that starts. Half-plane: a point of its line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre: Option<[f64; 2]>,
+    /// Discs: velocity of the centre in m/s. Default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<[f64; 2]>,
+    /// Discs: whether centre and velocity are inputs of the FMU, such as a measured obstacle's, that start
+    /// with the values here, and not parameters. Default false.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub centre_input: bool,
+    /// Discs: radius in m, > 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+    /// `disc` and `obstacle`: ε in m, ≥ 0. Default 0: the radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub smoothing: Option<f64>,
+    /// Ellipses: half axes in m, > 0, the first of them at `angle` from the x axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_axes: Option<[f64; 2]>,
+    /// Rectangles: half sides in m, > 0, the first of them at `angle` from the x axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_sides: Option<[f64; 2]>,
+    /// Ellipses and rectangles: in rad. Default 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
+    /// Half-plane: a vector that points into it, of any length but 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 2]>,
+    /// `at_most` and `at_least`: the name of the state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<String>,
+    /// `at_most`, `at_least`: bound in the unit of the state; `speed_limit`: in m/s, > 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
+    /// Deadline T in s after the first step, > 0.
+    pub deadline: f64,
+    /// How it is met. Default `reference_profile`.
+    #[serde(default)]
+    pub method: MethodName,
+    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
+    #[serde(default)]
+    pub rate: f64,
+    /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rates: Vec<f64>,
+    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`, 20 / deadline where there are `rates`.
+    #[serde(default)]
+    pub stay_rate: f64,
+    /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added. Default: a
+    /// hundredth of the radius, half axis or half side (the smaller), none for the other shapes.
+    #[serde(default)]
+    pub margin: Option<f64>,
+    /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
+    #[serde(default)]
+    pub recovery: f64,
+    /// Time in s after the first step from which it is enforced, ≥ 0, < deadline. Default 0.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub begin: f64,
+    /// The barrier, above in the file, whose arrival it waits for. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub after: Option<String>,
+    /// Time in s after the first step at which it is let go, > begin. Default 0: never.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub end: f64,
+    /// Whether it is let go when it has been reached. Default false.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub until_arrival: bool,
+}
+
+/// Does something with the shape of a barrier.
+pub(super) trait Visitor {
+    type Output;
+    fn shape<B>(self, barrier: B) -> Self::Output
+    where
+        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static;
+}
+
+impl BarrierSection {
+    pub(super) fn complete(&mut self, path: &str, model: ModelName) -> Result<(), ConfigurationError> {
+        check_identifier(&format!("{path}.name"), &self.name)?;
+        let refuse =
+            |field: &str, message: String| Err(ConfigurationError::new(format!("{path}.{field}"), message));
+        let (shape, fields) = self.shape.row();
+        for (field, name) in Field::ALL {
+            let given = match field {
+                Field::Centre => self.centre.is_some(),
+                Field::Velocity => self.velocity.is_some() || self.centre_input,
+                Field::Radius => self.radius.is_some(),
+                Field::Smoothing => self.smoothing.is_some(),
+                Field::HalfAxes => self.half_axes.is_some(),
+                Field::HalfSides => self.half_sides.is_some(),
+                Field::Angle => self.angle.is_some(),
+                Field::Normal => self.normal.is_some(),
+                Field::State => self.state.is_some(),
+                Field::Bound => self.bound.is_some(),
+            };
+            let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle);
+            if given && !fields.contains(&field) {
+                let name = if name == "velocity" && self.centre_input { "centre_input" } else { name };
+                return refuse(name, format!("{shape} has none"));
+            }
+            if !given && !optional && fields.contains(&field) {
+                return refuse(name, format!("missing, {shape} needs it"));
+            }
+        }
+        if self.shape.has(Field::Velocity) {
+            self.velocity.get_or_insert([0.0; 2]);
+        }
+        if self.shape.has(Field::Smoothing) {
+            self.smoothing.get_or_insert(0.0);
+        }
+        if self.shape.has(Field::Angle) {
+            self.angle.get_or_insert(0.0);
+        }
+        if let Some(state) = &self.state
+            && model.states().iter().all(|s| s.name != *state)
+        {
+            let names: Vec<_> = model.states().iter().map(|s| s.name).collect();
+            return refuse("state", format!("is {state:?}, must be one of {}", names.join(", ")));
+        }
+        let sides = self.half_axes.or(self.half_sides).map(|[a, b]| a.min(b));
+        let size = match self.shape {
+            ShapeName::QuadraticDisc => None,
+            _ => self.radius.or(sides),
+        };
+        // A size out of range is refused by its own name.
+        self.margin.get_or_insert(MARGIN_OF_SIZE * size.unwrap_or(0.0).max(0.0));
+        Ok(())
+    }
+
+    /// The unit of h.
+    pub fn unit(&self, model: ModelName) -> &'static str {
+        match self.shape {
+            ShapeName::QuadraticDisc => "m2",
+            ShapeName::SpeedLimit => "m/s",
+            ShapeName::AtMost | ShapeName::AtLeast => {
+                let state = model.states().iter().find(|s| Some(s.name) == self.state.as_deref());
+                state.map_or("1", |s| s.unit)
+            }
+            _ => "m",
+        }
+    }
+
+    pub(super) fn parameters(&self, index: usize, model: ModelName) -> Vec<Parameter<FilterConfiguration>> {
+        let unit = self.unit(model);
+        let mut rows = Vec::new();
+        let mut row = |field: &str, unit, range, description: &str, access: fn(&mut Self) -> &mut f64| {
+            // Configuration files count barriers from 0, as the error messages of serde do; the
+            // components of a vector are counted from 1, as in FMI.
+            let names = (format!("{}.{field}", self.name), format!("barrier[{index}].{field}"));
+            rows.push(Parameter::new(names, unit, range, description, move |c: &mut FilterConfiguration| {
+                access(&mut c.barrier[index])
+            }));
+        };
+        let (positive, non_negative, finite) = (Range::POSITIVE, Range::NON_NEGATIVE, Range::FINITE);
+        row("deadline", "s", positive, "time from the first step to be inside", |b| &mut b.deadline);
+        row(
+            "rate",
+            "1/s",
+            non_negative,
+            "decay rate of an error against the profile; 0: 20 / deadline",
+            |b| &mut b.rate,
+        );
+        row(
+            "stay_rate",
+            "1/s",
+            non_negative,
+            "rate of the constraint that keeps it inside; 0: as rate",
+            |b| &mut b.stay_rate,
+        );
+        row("margin", unit, non_negative, "h to arrive and stay above", |b| b.margin.get_or_insert(0.0));
+        row("recovery", "s", non_negative, "deadline for coming back after leaving; 0: none", |b| {
+            &mut b.recovery
+        });
+        if self.begin != 0.0 {
+            row("begin", "s", non_negative, "time from the first step to be enforced from", |b| &mut b.begin);
+        }
+        if self.end != 0.0 {
+            row("end", "s", non_negative, "time from the first step to be let go; 0: never", |b| &mut b.end);
+        }
+        if self.shape == ShapeName::HalfPlane {
+            row("centre[1]", "m", finite, "x of a point of the line", |b| first(&mut b.centre));
+            row("centre[2]", "m", finite, "y of a point of the line", |b| second(&mut b.centre));
+        } else if self.shape.has(Field::Centre) && !self.centre_input {
+            row("centre[1]", "m", finite, "centre along x, at time 0", |b| first(&mut b.centre));
+            row("centre[2]", "m", finite, "centre along y, at time 0", |b| second(&mut b.centre));
+        }
+        if self.shape.has(Field::Velocity) && !self.centre_input {
+            row("velocity[1]", "m/s", finite, "velocity of the centre along x", |b| first(&mut b.velocity));
+            row("velocity[2]", "m/s", finite, "velocity of the centre along y", |b| second(&mut b.velocity));
+        }
+        if self.shape.has(Field::Radius) {
+            row("radius", "m", positive, "radius of the disc", |b| b.radius.get_or_insert(0.0));
+        }
+        if self.shape.has(Field::Smoothing) {
+            row(
+                "smoothing",
+                "m",
+                non_negative,
+                "rounding of the distance at the centre; 0: the radius",
+                |b| b.smoothing.get_or_insert(0.0),
+            );
+        }
+        if self.shape.has(Field::HalfAxes) {
+            row("half_axes[1]", "m", positive, "half axis at the angle", |b| first(&mut b.half_axes));
+            row("half_axes[2]", "m", positive, "half axis across", |b| second(&mut b.half_axes));
+        }
+        if self.shape.has(Field::HalfSides) {
+            row("half_sides[1]", "m", positive, "half side at the angle", |b| first(&mut b.half_sides));
+            row("half_sides[2]", "m", positive, "half side across", |b| second(&mut b.half_sides));
+        }
+        if self.shape.has(Field::Angle) {
+            row("angle", "rad", finite, "from the x axis", |b| b.angle.get_or_insert(0.0));
+        }
+        if self.shape.has(Field::Normal) {
+            row("normal[1]", "1", finite, "x of a vector into the half-plane", |b| first(&mut b.normal));
+            row("normal[2]", "1", finite, "y of a vector into the half-plane", |b| second(&mut b.normal));
+        }
+        if self.shape.has(Field::Bound) {
+            let range = if self.shape == ShapeName::SpeedLimit { positive } else { finite };
+            row("bound", unit, range, "the bound", |b| b.bound.get_or_insert(0.0));
+        }
+        rows
+    }
+
+    /// The settings of its promise; 0 means "as the others say".
+    ///
+    /// # Errors
+    ///
+    /// Rates out of range.
+    pub fn settings(&self) -> Result<BarrierSettings, punctual_core::Error> {
+        let given = |value: f64| (value != 0.0).then_some(value);
+        let rates = match &self.rates[..] {
+            [] => None,
+            rates => Some(Operator::new(rates)?),
+        };
+        Ok(BarrierSettings {
+            deadline: self.deadline,
+            method: match self.method {
+                MethodName::ReferenceProfile => Method::ReferenceProfile,
+                MethodName::RepeatedRoot => Method::RepeatedRoot,
+            },
+            rate: given(self.rate),
+            rates,
+            stay_rate: given(self.stay_rate),
+            margin: self.margin.unwrap_or(0.0),
+            recovery: given(self.recovery),
+        })
+    }
+
+    /// Its variables that are inputs, with their units, start values and meanings.
+    pub fn inputs(&self) -> Vec<(String, &'static str, f64, &'static str)> {
+        if !self.centre_input {
+            return Vec::new();
+        }
+        let name = |field: &str| format!("{}.{field}", self.name);
+        let (centre, velocity) = (self.centre.unwrap_or_default(), self.velocity.unwrap_or_default());
+        vec![
+            (name("centre[1]"), "m", centre[0], "where the centre is, along x"),
+            (name("centre[2]"), "m", centre[1], "where the centre is, along y"),
+            (name("velocity[1]"), "m/s", velocity[0], "velocity of the centre along x"),
+            (name("velocity[2]"), "m/s", velocity[1], "velocity of the centre along y"),
+        ]
+    }
+
+    /// Hands the shape to `visitor`, along a plant of `states` states; a centre that is an input is at the
+    /// states behind them.
+    pub(super) fn visit<V: Visitor>(
+        &self,
+        model: &ModelName,
+        states: usize,
+        visitor: V,
+    ) -> Result<V::Output, punctual_core::Error> {
+        let (centre, velocity) = (self.centre.unwrap_or_default(), self.velocity.unwrap_or_default());
+        let (radius, bound) = (self.radius.unwrap_or_default(), self.bound.unwrap_or_default());
+        let angle = self.angle.unwrap_or_default();
+        let disc = || {
+            let smoothing = self.smoothing.filter(|s| *s != 0.0).unwrap_or(radius);
+            let disc = DistanceDisc::new(centre, radius, smoothing)?.moving(velocity)?;
+            Ok::<_, punctual_core::Error>(if self.centre_input { disc.following(states) } else { disc })
+        };
+        let ellipse = || Ellipse::new(centre, self.half_axes.unwrap_or_default(), angle);
+        let rectangle = || Rectangle::new(centre, self.half_sides.unwrap_or_default(), angle);
+        let index = |name: &str| model.states().iter().position(|s| s.name == name);
+        let state = self.state.as_deref().and_then(index).unwrap_or(usize::MAX);
+        Ok(match self.shape {
+            ShapeName::Disc => visitor.shape(disc()?),
+            ShapeName::Obstacle => visitor.shape(Outside(disc()?)),
+            ShapeName::QuadraticDisc => {
+                let disc = QuadraticDisc::new(centre, radius)?.moving(velocity)?;
+                visitor.shape(if self.centre_input { disc.following(states) } else { disc })
+            }
+            ShapeName::Ellipse => visitor.shape(ellipse()?),
+            ShapeName::EllipticObstacle => visitor.shape(Outside(ellipse()?)),
+            ShapeName::Rectangle => visitor.shape(rectangle()?),
+            ShapeName::RectangularObstacle => visitor.shape(Outside(rectangle()?.around())),
+            ShapeName::HalfPlane => visitor.shape(HalfPlane::new(self.normal.unwrap_or_default(), centre)?),
+            ShapeName::AtMost => visitor.shape(StateBound::at_most(state, bound)?),
+            ShapeName::AtLeast => visitor.shape(StateBound::at_least(state, bound)?),
+            ShapeName::SpeedLimit => match index("v") {
+                Some(speed) => visitor.shape(NormBound::of_one(speed, bound)?),
+                None => visitor.shape(NormBound::new(index("v_x").unwrap_or(usize::MAX), bound)?),
+            },
+        })
+    }
+}
+
+fn first(pair: &mut Option<[f64; 2]>) -> &mut f64 {
+    &mut pair.get_or_insert([0.0; 2])[0]
+}
+
+fn second(pair: &mut Option<[f64; 2]>) -> &mut f64 {
+    &mut pair.get_or_insert([0.0; 2])[1]
+}
