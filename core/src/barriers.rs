@@ -31,8 +31,13 @@ impl Centre {
     }
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
+    #[inline]
     fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
-        let away = |i: usize| x[i] - (t * self.velocity[i] + self.start[i]);
+        let away = |i: usize| {
+            let from_start = x[i] - self.start[i];
+            // At rest there is nothing to multiply.
+            if self.velocity[i] == 0.0 { from_start } else { from_start - t * self.velocity[i] }
+        };
         away(0).squared() + away(1).squared()
     }
 }
@@ -45,6 +50,7 @@ impl Centre {
 pub struct Outside<B>(pub B);
 
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.0.value(t, x)
     }
@@ -82,6 +88,7 @@ impl QuadraticDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
@@ -94,8 +101,9 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceDisc {
     centre: Centre,
-    radius: f64,
     smoothing: f64,
+    /// √(R² + ε²).
+    level: f64,
 }
 
 impl DistanceDisc {
@@ -106,11 +114,9 @@ impl DistanceDisc {
     ///
     /// A coordinate that is not finite, a radius or smoothing that is not finite or ≤ 0.
     pub fn new(centre: [f64; 2], radius: f64, smoothing: f64) -> Result<Self, Error> {
-        Ok(Self {
-            centre: Centre::at_rest(centre)?,
-            radius: positive("radius", radius)?,
-            smoothing: positive("smoothing", smoothing)?,
-        })
+        let centre = Centre::at_rest(centre)?;
+        let level = positive("radius", radius)?.hypot(positive("smoothing", smoothing)?);
+        Ok(Self { centre, smoothing, level })
     }
 
     /// The same disc with its centre moving at `velocity` (m/s): where it was given at t = 0 on the
@@ -125,8 +131,8 @@ impl DistanceDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
-        -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt()
-            + self.radius.hypot(self.smoothing)
+        -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
     }
 }
