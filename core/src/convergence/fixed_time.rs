@@ -1,5 +1,7 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
+use std::array::from_fn;
+
 use super::comparison::{Stack, lower_bound, lower_terms};
 use super::first_order::Exponent;
 use super::hermite::HermiteProfile;
@@ -159,17 +161,32 @@ impl FixedTime {
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
     /// returns what the constraint asks for there.
     ///
-    /// The first call anchors, as [`Self::anchor`] with the configured deadline does. Arrival is the first sample with h ≥ 0; the stay constraint takes over
-    /// at the first sample at which h ≥ μ *and* it is invariant from there ([`stay::is_invariant`]).
+    /// The first call anchors, as [`Self::anchor`] with the configured deadline does. Arrival is the first
+    /// sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and* it is
+    /// invariant from there ([`stay::is_invariant`]).
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+        // With n known to the compiler the short loops of the formulas unroll.
+        match self.n {
+            1 => self.advance_degree::<1>(state, t, h),
+            2 => self.advance_degree::<2>(state, t, h),
+            3 => self.advance_degree::<3>(state, t, h),
+            4 => self.advance_degree::<4>(state, t, h),
+            5 => self.advance_degree::<5>(state, t, h),
+            6 => self.advance_degree::<6>(state, t, h),
+            7 => self.advance_degree::<7>(state, t, h),
+            _ => self.advance_degree::<8>(state, t, h),
+        }
+    }
+
+    /// [`Self::advance`] for n = `N`.
+    fn advance_degree<const N: usize>(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
         let FixedTimeSettings { stay_rate, margin, .. } = self.settings;
         if state.phase == Phase::Waiting {
             self.anchor(state, t, h, self.settings.deadline);
         }
-        let mut e = [0.0; MAX_RELATIVE_DEGREE];
-        e[..self.n].copy_from_slice(&h[..self.n]);
+        let mut e = [0.0; N];
+        e.copy_from_slice(&h[..N]);
         e[0] -= margin;
-        let e = &e[..self.n];
 
         if let Some(recovery) = self.settings.recovery
             && state.phase == Phase::Stay
@@ -184,7 +201,7 @@ impl FixedTime {
             state.arrival = Some(t);
         }
         match state.phase {
-            _ if stay::is_invariant(stay_rate, e) => {
+            _ if stay::is_invariant(stay_rate, &e) => {
                 state.phase = Phase::Stay;
                 state.guaranteed = true;
             }
@@ -201,8 +218,8 @@ impl FixedTime {
         }
 
         let (floor, profile) = match state.phase {
-            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, e), 0.0),
-            _ => self.approach(state, elapsed, e),
+            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, &e), 0.0),
+            _ => self.approach(state, elapsed, &e),
         };
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
@@ -251,8 +268,9 @@ impl FixedTime {
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
-    fn approach(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64]) -> (f64, f64) {
-        let anchor = &state.anchor[..self.n];
+    #[inline]
+    fn approach<const N: usize>(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64; N]) -> (f64, f64) {
+        let anchor = &state.anchor[..N];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
             Method::FirstOrder(exponent) => {
@@ -264,19 +282,16 @@ impl FixedTime {
             }
             Method::ReferenceProfile => {
                 let r = HermiteProfile::new(anchor, state.deadline).evaluate(elapsed);
-                let mut error = [0.0; MAX_RELATIVE_DEGREE];
-                for k in 0..self.n {
-                    error[k] = e[k] - r[k];
-                }
-                let error = &error[..self.n];
+                let error: [f64; N] = from_fn(|k| e[k] - r[k]);
                 // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
                 let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + self.settings.margin);
                 if self.settings.margin > 0.0 && error[0] < -self.settings.margin - scale {
                     state.guaranteed = false;
                 }
                 // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed |= elapsed < state.deadline && stay::is_invariant(state.rate, error);
-                (r[self.n] - lower_terms(state.rate, error), r[0])
+                state.guaranteed =
+                    state.guaranteed || elapsed < state.deadline && stay::is_invariant(state.rate, &error);
+                (r[N] - lower_terms(state.rate, &error), r[0])
             }
         }
     }

@@ -82,11 +82,9 @@ impl FixedTime {
             *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
         }
         // What h is compared with: μ + r and its derivatives.
+        let profile = follows.then(|| HermiteProfile::new(&state.anchor[..n], state.deadline));
         let target = |elapsed: f64| {
-            let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
-            if follows {
-                r = HermiteProfile::new(&state.anchor[..n], state.deadline).evaluate(elapsed);
-            }
+            let mut r = profile.map_or([0.0; MAX_RELATIVE_DEGREE + 1], |profile| profile.evaluate(elapsed));
             r[0] += self.settings.margin;
             r
         };
