@@ -3,13 +3,17 @@
 
 use std::hint::black_box;
 
+use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
 use punctual_core::plants::{PointMass, Unicycle};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
 mod support;
 
-const CASES: [(&str, fn(u32)); 11] = [
+/// A name and the work, to be done a number of times.
+type Case = (&'static str, fn(u32));
+
+const CASES: [Case; 11] = [
     ("by-hand", by_hand),
     ("step-point-mass", |times| step(goal(PointMass), [0.0; 2], times)),
     ("step-unicycle", |times| step(goal(Unicycle), [0.0; 2], times)),
@@ -30,7 +34,7 @@ fn by_hand(times: u32) {
     }
 }
 
-fn step(builder: punctual_core::filter::FilterBuilder, u_ref: [f64; 2], times: u32) {
+fn step(builder: FilterBuilder, u_ref: [f64; 2], times: u32) {
     let mut filter = anchored(builder);
     let mut u = [0.0; 2];
     for _ in 0..times {
