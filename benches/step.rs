@@ -1,7 +1,8 @@
 //! Cost of one filter step and of its parts: `cargo bench --bench step`.
 //!
 //! The states are on the way to the disc, where the row is active, so that every step solves its
-//! quadratic programme.
+//! quadratic programme; those with obstacles also from a reference input that needs no solving. "by
+//! hand" is what the first step computes, written out for that one plant, barrier and order.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
@@ -9,76 +10,88 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use punctual_core::MAX_INPUTS;
-use punctual_core::barriers::DistanceDisc;
-use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Status};
 use punctual_core::lie::{self, Derivatives};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::{Bounds, Row, solve};
+use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
-/// A time and state at which the row is active after anchoring at the origin at time 0.
-const T: f64 = 4.0;
-const X: [f64; 4] = [15.0, 15.5, 0.8, 6.0];
-
-fn disc() -> DistanceDisc {
-    DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc")
-}
+mod support;
 
 fn bicycle() -> Bicycle {
     Bicycle::new(10.0).expect("valid bicycle")
 }
 
-fn builder<P>(plant: P) -> FilterBuilder
-where
-    P: ControlAffine<4, 2> + Send + 'static,
-{
-    SafetyFilter::builder(4, 2)
-        .barrier("goal", plant, disc(), BarrierSettings::within(10.0))
-        .expect("valid settings")
-}
-
-/// Times `step` at one sample again and again.
-fn bench_filter(c: &mut Criterion, name: &str, builder: FilterBuilder) {
-    let mut filter = builder.build().expect("valid filter");
+/// Times `step` at one sample again and again; `status` is what it must answer.
+fn bench_filter(c: &mut Criterion, name: &str, builder: FilterBuilder, u_ref: [f64; 2], status: Status) {
+    let mut filter = anchored(builder);
+    let start = filter.state().clone();
     let mut u = [0.0; 2];
-    filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
-    let anchored = filter.state().clone();
-    let report = filter.step(T, &X, &[0.0; 2], &mut u).expect("right dimensions");
-    assert_eq!(report.status, Status::Filtered, "{name}");
-    filter.restore(&anchored).expect("as many barriers");
+    let report = filter.step(T, &X, &u_ref, &mut u).expect("right dimensions");
+    assert_eq!(report.status, status, "{name}");
+    filter.restore(&start).expect("as many barriers");
     c.bench_function(name, |b| {
         b.iter(|| {
-            let report = filter.step(black_box(T), black_box(&X), black_box(&[0.0; 2]), &mut u);
+            let report = filter.step(black_box(T), black_box(&X), black_box(&u_ref), &mut u);
             report.expect("right dimensions").status
         });
     });
 }
 
 fn steps(c: &mut Criterion) {
-    bench_filter(c, "step/point mass", builder(PointMass));
-    bench_filter(c, "step/unicycle", builder(Unicycle));
-    bench_filter(c, "step/bicycle", builder(bicycle()));
-    let bounded = builder(bicycle()).bounds(&[-60.0, -20.0], &[60.0, 20.0]).expect("valid bounds");
-    bench_filter(c, "step/bicycle, bounded", bounded);
-    let two = builder(bicycle()).barrier("again", bicycle(), disc(), BarrierSettings::within(9.0));
-    bench_filter(c, "step/bicycle, two barriers", two.expect("valid settings"));
+    let by_hand = ByHand::anchored();
+    let mut u = [0.0; 2];
+    anchored(goal(PointMass)).step(T, &X, &[0.0; 2], &mut u).expect("right dimensions");
+    for (found, wanted) in by_hand.step(T, &X, &[0.0; 2]).iter().zip(u) {
+        // A few dozen operations on numbers of order 10.
+        assert!((found - wanted).abs() < 1e-12, "by hand {found}, by the filter {wanted}");
+    }
+    c.bench_function("step/by hand", |b| {
+        b.iter(|| by_hand.step(black_box(T), black_box(&X), black_box(&[0.0; 2])));
+    });
+
+    let mut filtered = |name, builder| bench_filter(c, name, builder, [0.0; 2], Status::Filtered);
+    filtered("step/point mass", goal(PointMass));
+    filtered("step/unicycle", goal(Unicycle));
+    filtered("step/bicycle", goal(bicycle()));
+    let bounded = goal(bicycle()).bounds(&[-60.0, -20.0], &[60.0, 20.0]).expect("valid bounds");
+    filtered("step/bicycle, bounded", bounded);
+    let two = goal(bicycle()).barrier("again", bicycle(), disc(), BarrierSettings::within(9.0));
+    filtered("step/bicycle, two barriers", two.expect("valid settings"));
+    filtered("step/10 obstacles", goal_and_obstacles(10));
+    filtered("step/60 obstacles", goal_and_obstacles(60));
+    for (name, obstacles) in [("step/safe, 10 obstacles", 10), ("step/safe, 60 obstacles", 60)] {
+        bench_filter(c, name, goal_and_obstacles(obstacles), SAFE, Status::Unchanged);
+    }
 }
 
 fn jets(c: &mut Criterion) {
     let cases = [
-        ("jets/point mass", lie::along(PointMass, disc(), 2)),
-        ("jets/unicycle", lie::along(Unicycle, disc(), 2)),
-        ("jets/bicycle", lie::along(bicycle(), disc(), 2)),
-        ("jets/bicycle, order 8", lie::along(bicycle(), disc(), 8)),
+        ("jets/point mass", lie::along(PointMass, disc(), 2), &X[..]),
+        ("jets/unicycle", lie::along(Unicycle, disc(), 2), &X),
+        ("jets/bicycle", lie::along(bicycle(), disc(), 2), &X),
+        ("jets/integrators, order 2", lie::along(Integrators::<4>, disc(), 2), &Integrators::<4>::state()),
+        ("jets/integrators, order 4", lie::along(Integrators::<8>, disc(), 4), &Integrators::<8>::state()),
+        ("jets/integrators, order 8", lie::along(Integrators::<16>, disc(), 8), &Integrators::<16>::state()),
+        ("jets/bicycle, order 8", lie::along(bicycle(), disc(), 8), &X),
     ];
-    for (name, source) in cases {
+    for (name, source, x) in cases {
         let source = source.expect("a relative degree in range");
         let mut out = Derivatives::ZERO;
         c.bench_function(name, |b| {
             b.iter(|| {
-                source.evaluate(black_box(T), black_box(&X), &mut out);
+                source.evaluate(black_box(T), black_box(x), &mut out);
                 out.row[0]
             });
+        });
+    }
+}
+
+fn promises(c: &mut Criterion) {
+    for (name, n) in [("promise/order 2", 2), ("promise/order 4", 4), ("promise/order 8", 8)] {
+        let (promise, mut state, h) = promise(n);
+        c.bench_function(name, |b| {
+            b.iter(|| promise.advance(black_box(&mut state), black_box(T), black_box(&h[..n])));
         });
     }
 }
@@ -107,5 +120,5 @@ fn programmes(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, steps, jets, programmes);
+criterion_group!(benches, steps, jets, promises, programmes);
 criterion_main!(benches);

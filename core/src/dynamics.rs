@@ -40,6 +40,7 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     fn input_map<S: Scalar>(&self, x: &SVector<S, NX>) -> SMatrix<S, NX, NU>;
 
     /// f(x) + g(x) u.
+    #[inline]
     fn derivative<S: Scalar>(&self, x: &SVector<S, NX>, u: &SVector<S, NU>) -> SVector<S, NX> {
         let mut dx = self.drift(x);
         let g = self.input_map(x);
@@ -92,6 +93,7 @@ impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<E
 where
     P: ControlAffine<NX, NU>,
 {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
         const { assert!(EXTENDED == NX + 1, "one state more than the plant inside") };
         let inner = SVector::<S, NX>::from_fn(|i, _| x[i]);
@@ -100,6 +102,7 @@ where
         SVector::from_fn(|i, _| if i < NX { f[i] + held(i) } else { S::zero() })
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
         let g = self.plant.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
         SMatrix::from_fn(|i, j| match (i < NX, j == self.input) {

@@ -2,8 +2,8 @@
 //!
 //! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one
 //! after the other from `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series
-//! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. The components of u are dual numbers, value 0 and derivative 1
-//! along their own direction, so that at relative degree n
+//! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. Series are taken at u = 0 with their derivatives along u
+//! ([`Response`]), so that at relative degree n
 //!
 //! ```text
 //! h⁽ᵏ⁾ = L_fᵏ h                               k = 0 … n, the value part       (1)
@@ -20,6 +20,7 @@ mod embedded;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
+use std::array::from_fn;
 use std::marker::PhantomData;
 
 use nalgebra::SVector;
@@ -27,7 +28,7 @@ use nalgebra::SVector;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind};
-use crate::jet::{Dual, Taylor};
+use crate::jet::{Response, Taylor};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
@@ -42,20 +43,42 @@ pub fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
     barrier: &B,
     t: f64,
     x: &SVector<f64, NX>,
-) -> Taylor<Dual<NU>, K>
+) -> Response<NU, K>
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let u = SVector::<Taylor<Dual<NU>, K>, NU>::from_fn(|i, _| Taylor::constant(Dual::variable(0.0, i)));
-    let mut series = SVector::<Taylor<Dual<NU>, K>, NX>::from_fn(|i, _| Taylor::from(x[i]));
-    for k in 0..K - 1 {
-        let dx = plant.derivative(&series, &u);
-        for i in 0..NX {
-            series[i].coefficients[k + 1] = dx[i].coefficients[k] * (1.0 / (k + 1) as f64);
-        }
+    const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
+    let mut series = SVector::<Response<NU, K>, NX>::from_fn(|i, _| Response::from(x[i]));
+    macro_rules! extend_to {
+        ($($j:literal),*) => {
+            $(if const { $j < K } {
+                extend::<P, NX, NU, K, $j>(plant, &mut series);
+            })*
+        };
     }
-    barrier.value(Taylor::time(t), &series)
+    extend_to!(1, 2, 3, 4, 5, 6, 7, 8);
+    barrier.value(Response::time(t), &series)
+}
+
+/// Coefficient `J` of the state from those below: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where
+/// products of u with derivatives of g along u vanish. All series are cut off at what they are known to.
+#[inline]
+fn extend<P, const NX: usize, const NU: usize, const K: usize, const J: usize>(
+    plant: &P,
+    series: &mut SVector<Response<NU, K>, NX>,
+) where
+    P: ControlAffine<NX, NU>,
+{
+    let known = SVector::<Response<NU, J>, NX>::from_fn(|i, _| series[i].truncated());
+    let f = plant.drift(&known);
+    let g = plant.input_map(&SVector::<Taylor<f64, J>, NX>::from_fn(|i, _| known[i].series));
+    let part = 1.0 / J as f64;
+    for i in 0..NX {
+        let (value, along) = f[i].coefficient(J - 1);
+        let gradient = from_fn(|m| (along[m] + g[(i, m)].coefficients[J - 1]) * part);
+        series[i].set_coefficient(J, (value * part, gradient));
+    }
 }
 
 /// Derivatives of one barrier at one instant, as plain numbers.
@@ -75,8 +98,11 @@ impl Derivatives {
         Self { drift: [0.0; MAX_RELATIVE_DEGREE + 1], row: [0.0; MAX_INPUTS], lower_sensitivity: 0.0 };
 
     /// Whether every number is finite.
+    #[inline]
     pub fn is_finite(&self) -> bool {
-        self.drift.iter().chain(&self.row).all(|v| v.is_finite()) && self.lower_sensitivity.is_finite()
+        // Without a branch per number.
+        let all = |values: &[f64]| values.iter().fold(true, |all, v| all & v.is_finite());
+        all(&self.drift) & all(&self.row) & self.lower_sensitivity.is_finite()
     }
 }
 
@@ -134,16 +160,18 @@ where
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
         let x = SVector::from_column_slice(x);
-        let series: Taylor<Dual<NU>, K> = barrier_series(&self.plant, &self.barrier, t, &x);
+        let h: Response<NU, K> = barrier_series(&self.plant, &self.barrier, t, &x);
         *out = Derivatives::ZERO;
+        let mut factorial = 1.0;
         for k in 0..K {
-            let derivative = series.derivative(k);
-            out.drift[k] = derivative.value;
+            factorial *= k.max(1) as f64;
+            let (value, gradient) = h.coefficient(k);
+            out.drift[k] = value * factorial;
             if k == K - 1 {
-                out.row[..NU].copy_from_slice(&derivative.gradient);
+                out.row[..NU].copy_from_slice(&gradient.map(|d| d * factorial));
             } else {
                 // A sum and not a maximum: `f64::max` would drop a NaN.
-                out.lower_sensitivity += derivative.gradient.iter().map(|d| d.abs()).sum::<f64>();
+                out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>() * factorial;
             }
         }
     }

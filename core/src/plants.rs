@@ -50,10 +50,12 @@ impl Signals for PointMass {
 }
 
 impl ControlAffine<4, 2> for PointMass {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         SVector::from([x[2], x[3], S::zero(), S::zero()])
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
         let mut g = SMatrix::zeros();
         g[(2, 0)] = S::one();
@@ -74,11 +76,13 @@ impl Signals for Unicycle {
 }
 
 impl ControlAffine<4, 2> for Unicycle {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         let (sin, cos) = x[2].sin_cos();
         SVector::from([x[3] * cos, x[3] * sin, S::zero(), S::zero()])
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
         let mut g = SMatrix::zeros();
         g[(3, 0)] = S::one();
@@ -112,10 +116,12 @@ impl Signals for Bicycle {
 }
 
 impl ControlAffine<4, 2> for Bicycle {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         Unicycle.drift(x)
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
         let mut g = SMatrix::zeros();
         g[(3, 0)] = S::one();
@@ -157,10 +163,12 @@ impl Signals for SmallSlipBicycle {
 }
 
 impl ControlAffine<4, 2> for SmallSlipBicycle {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         Unicycle.drift(x)
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
         let (sin, cos) = x[2].sin_cos();
         let mut g = SMatrix::zeros();
@@ -184,10 +192,12 @@ impl Signals for SmallSlipBicycleWithRate {
 }
 
 impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
         self.0.drift(x)
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
         self.0.input_map(x)
     }
@@ -225,12 +235,14 @@ impl Signals for KinematicBicycle {
 }
 
 impl ControlAffine<5, 2> for KinematicBicycle {
+    #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
         let beta = (x[4].tan() * (self.l_r / (self.l_f + self.l_r))).atan();
         let (sin, cos) = (x[2] + beta).sin_cos();
         SVector::from([x[3] * cos, x[3] * sin, x[3] * beta.sin() / self.l_r, S::zero(), S::zero()])
     }
 
+    #[inline]
     fn input_map<S: Scalar>(&self, _x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
         let mut g = SMatrix::zeros();
         g[(3, 0)] = S::one();

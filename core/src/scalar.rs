@@ -55,18 +55,21 @@ pub trait Scalar:
 
     /// Sine of an angle in radians.
     #[must_use]
+    #[inline]
     fn sin(self) -> Self {
         self.sin_cos().0
     }
 
     /// Cosine of an angle in radians.
     #[must_use]
+    #[inline]
     fn cos(self) -> Self {
         self.sin_cos().1
     }
 
     /// Tangent of an angle in radians.
     #[must_use]
+    #[inline]
     fn tan(self) -> Self {
         let (sin, cos) = self.sin_cos();
         sin / cos
@@ -74,12 +77,14 @@ pub trait Scalar:
 
     /// `self · self`.
     #[must_use]
+    #[inline]
     fn squared(self) -> Self {
         self * self
     }
 
     /// `self` to an integer power, by repeated multiplication: exact at 0 and for negative `self`.
     #[must_use]
+    #[inline]
     fn powi(self, exponent: i32) -> Self {
         let mut result = Self::one();
         let mut base = self;
@@ -98,24 +103,31 @@ pub trait Scalar:
 }
 
 impl Scalar for f64 {
+    #[inline]
     fn value(self) -> f64 {
         self
     }
+    #[inline]
     fn sqrt(self) -> Self {
         f64::sqrt(self)
     }
+    #[inline]
     fn exp(self) -> Self {
         f64::exp(self)
     }
+    #[inline]
     fn ln(self) -> Self {
         f64::ln(self)
     }
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         f64::sin_cos(self)
     }
+    #[inline]
     fn atan(self) -> Self {
         f64::atan(self)
     }
+    #[inline]
     fn powf(self, exponent: f64) -> Self {
         f64::powf(self, exponent)
     }

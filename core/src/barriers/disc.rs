@@ -30,11 +30,16 @@ impl Centre {
     }
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
+    #[inline]
     fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
         let away = |i: usize| {
-            x[i] - match self {
-                Self::Given { start, velocity } => t * velocity[i] + start[i],
-                Self::State(first) => x[first + i],
+            match self {
+                Self::Given { start, velocity } => {
+                    let from_start = x[i] - start[i];
+                    // At rest there is nothing to multiply.
+                    if velocity[i] == 0.0 { from_start } else { from_start - t * velocity[i] }
+                }
+                Self::State(first) => x[i] - x[first + i],
             }
         };
         away(0).squared() + away(1).squared()
@@ -80,6 +85,7 @@ impl QuadraticDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
@@ -92,8 +98,9 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceDisc {
     centre: Centre,
-    radius: f64,
     smoothing: f64,
+    /// √(R² + ε²).
+    level: f64,
 }
 
 impl DistanceDisc {
@@ -104,11 +111,9 @@ impl DistanceDisc {
     ///
     /// A coordinate that is not finite, a radius or smoothing that is not finite or ≤ 0.
     pub fn new(centre: [f64; 2], radius: f64, smoothing: f64) -> Result<Self, Error> {
-        Ok(Self {
-            centre: Centre::at_rest(centre)?,
-            radius: positive("radius", radius)?,
-            smoothing: positive("smoothing", smoothing)?,
-        })
+        let centre = Centre::at_rest(centre)?;
+        let level = positive("radius", radius)?.hypot(positive("smoothing", smoothing)?);
+        Ok(Self { centre, smoothing, level })
     }
 
     /// The same disc with its centre moving at `velocity` (m/s): where it was given at t = 0 on the
@@ -130,8 +135,8 @@ impl DistanceDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
-        -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt()
-            + self.radius.hypot(self.smoothing)
+        -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
     }
 }

@@ -33,6 +33,7 @@ use crate::scalar::Scalar;
 pub struct Outside<B>(pub B);
 
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
+    #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.0.value(t, x)
     }

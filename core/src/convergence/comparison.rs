@@ -19,29 +19,57 @@ use crate::MAX_RELATIVE_DEGREE;
 /// One number per derivative order below n, `[e]`/s^k; zeros from n on.
 pub type Stack = [f64; MAX_RELATIVE_DEGREE];
 
-/// The binomial coefficient C(n, k), exact for the small n used here.
+/// `PASCAL[n][k]` = C(n, k), exact; zeros for k > n.
+const PASCAL: [[f64; MAX_RELATIVE_DEGREE + 1]; MAX_RELATIVE_DEGREE + 1] = {
+    let mut c = [[0.0; MAX_RELATIVE_DEGREE + 1]; MAX_RELATIVE_DEGREE + 1];
+    let mut n = 0;
+    while n < c.len() {
+        c[n][0] = 1.0;
+        let mut k = 1;
+        while k <= n {
+            c[n][k] = c[n - 1][k - 1] + c[n - 1][k];
+            k += 1;
+        }
+        n += 1;
+    }
+    c
+};
+
+/// The binomial coefficient C(n, k), 0 for k > n.
+///
+/// # Panics
+///
+/// If n or k is above [`MAX_RELATIVE_DEGREE`].
+#[inline]
 pub fn binomial(n: usize, k: usize) -> f64 {
-    (0..k.min(n - k)).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64)
+    PASCAL[n][k]
 }
 
 /// k! as a float.
+#[inline]
 pub fn factorial(k: usize) -> f64 {
     (1..=k).map(|i| i as f64).product()
 }
 
 /// The part of (D + a)ⁿ e below the highest derivative: Σ_{j<n} C(n, j) a^{n−j} e⁽ʲ⁾, where
 /// `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾ and its length is n.
+#[inline]
 pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
     let n = e.len();
     e.iter().enumerate().fold(0.0, |sum, (j, &ej)| (sum + binomial(n, j) * ej) * rate)
+}
+
+/// A_k = k! c_k = Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0) for `k` below the length of `e`.
+#[inline]
+pub fn scaled_coefficient(rate: f64, e: &[f64], k: usize) -> f64 {
+    (0..=k).fold(0.0, |sum, j| sum * rate + binomial(k, j) * e[j])
 }
 
 /// The coefficients c_0 … c_{n−1} of P in (L); `e` holds e⁽⁰⁾(0) … e⁽ⁿ⁻¹⁾(0).
 pub fn coefficients(rate: f64, e: &[f64]) -> Stack {
     let mut c = [0.0; MAX_RELATIVE_DEGREE];
     for k in 0..e.len() {
-        let sum = (0..=k).fold(0.0, |sum, j| sum * rate + binomial(k, j) * e[j]);
-        c[k] = sum / factorial(k);
+        c[k] = scaled_coefficient(rate, e, k) / factorial(k);
     }
     c
 }

@@ -1,9 +1,11 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
+use std::array::from_fn;
 use std::fmt;
 use std::sync::Arc;
 
 use super::comparison::{Stack, lower_bound, lower_terms};
+use super::hermite::HermiteProfile;
 use super::profile::{self, Derivatives, Hermite, Profile, ProfileError};
 use super::repeated_root::{self, NoAdmissibleRate};
 use super::settings::{FixedTimeSettings, Method};
@@ -187,6 +189,21 @@ impl FixedTime {
     /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
     /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+        // With n known to the compiler the short loops of the formulas unroll.
+        match self.n {
+            1 => self.advance_degree::<1>(state, t, h),
+            2 => self.advance_degree::<2>(state, t, h),
+            3 => self.advance_degree::<3>(state, t, h),
+            4 => self.advance_degree::<4>(state, t, h),
+            5 => self.advance_degree::<5>(state, t, h),
+            6 => self.advance_degree::<6>(state, t, h),
+            7 => self.advance_degree::<7>(state, t, h),
+            _ => self.advance_degree::<8>(state, t, h),
+        }
+    }
+
+    /// [`Self::advance`] for n = `N`.
+    fn advance_degree<const N: usize>(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
         if state.phase == Phase::Waiting {
             self.anchor(state, t, h, self.settings.deadline, 0.0);
         }
@@ -198,16 +215,15 @@ impl FixedTime {
             state.recoveries += 1;
         }
         let FixedTimeState { stay_rate, margin, deadline, .. } = *state;
-        let mut e = [0.0; MAX_RELATIVE_DEGREE];
-        e[..self.n].copy_from_slice(&h[..self.n]);
+        let mut e = [0.0; N];
+        e.copy_from_slice(&h[..N]);
         e[0] -= margin;
-        let e = &e[..self.n];
         let elapsed = (t - state.anchor_time).max(0.0);
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
         }
         match state.phase {
-            _ if stay::is_invariant(stay_rate, e) => {
+            _ if stay::is_invariant(stay_rate, &e) => {
                 state.phase = Phase::Stay;
                 state.guaranteed = true;
             }
@@ -224,8 +240,8 @@ impl FixedTime {
         }
 
         let (floor, profile) = match state.phase {
-            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, e), 0.0),
-            _ => self.approach(state, elapsed, e),
+            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, &e), 0.0),
+            _ => self.approach(state, elapsed, &e),
         };
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
@@ -332,8 +348,9 @@ impl FixedTime {
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
-    fn approach(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64]) -> (f64, f64) {
-        let anchor = &state.anchor[..self.n];
+    #[inline]
+    fn approach<const N: usize>(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64; N]) -> (f64, f64) {
+        let anchor = &state.anchor[..N];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
             Method::FirstOrder(exponent) => {
@@ -344,24 +361,27 @@ impl FixedTime {
                 (exponent.floor(anchor[0], deadline, e[0]), bound)
             }
             Method::ReferenceProfile => {
-                let r = self.profile(state, elapsed);
-                let mut error = [0.0; MAX_RELATIVE_DEGREE];
-                for k in 0..self.n {
-                    error[k] = e[k] - r[k];
-                }
-                let error = &error[..self.n];
+                let r = match &self.own {
+                    Some(_) => self.profile(state, elapsed),
+                    None => HermiteProfile::new(anchor, state.deadline).evaluate(elapsed),
+                };
+                let error: [f64; N] = from_fn(|k| e[k] - r[k]);
                 // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
                 let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
                 if state.margin > 0.0 && error[0] < -state.margin - scale {
                     state.guaranteed = false;
                 }
-                let (terms, invariant) = match &self.settings.rates {
-                    Some(rates) => (rates.lower_terms(error), rates.is_invariant(error)),
-                    None => (lower_terms(state.rate, error), stay::is_invariant(state.rate, error)),
+                let terms = match &self.settings.rates {
+                    Some(rates) => rates.lower_terms(&error),
+                    None => lower_terms(state.rate, &error),
+                };
+                let invariant = || match &self.settings.rates {
+                    Some(rates) => rates.is_invariant(&error),
+                    None => stay::is_invariant(state.rate, &error),
                 };
                 // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed |= elapsed < state.deadline && invariant;
-                (r[self.n] - terms, r[0])
+                state.guaranteed = state.guaranteed || elapsed < state.deadline && invariant();
+                (r[N] - terms, r[0])
             }
         }
     }

@@ -13,7 +13,7 @@
 //! ever: e(T) ≥ 0 and e ≥ 0 after it, for every n, every T > 0 and all initial data, with no root to find.
 //! The factored form keeps its relative accuracy near s = 1, where the monomial form cancels.
 
-use super::comparison::{Stack, binomial, factorial};
+use super::comparison::Stack;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// The profile (H) for one anchor.
@@ -27,36 +27,51 @@ pub struct HermiteProfile {
 impl HermiteProfile {
     /// The profile from the derivatives `e` (length n, 1 to [`MAX_RELATIVE_DEGREE`], `[e]`/s^j) to zero
     /// at `deadline` > 0 seconds.
+    #[inline(always)]
     pub fn new(e: &[f64], deadline: f64) -> Self {
         let n = e.len();
         let mut q = [0.0; MAX_RELATIVE_DEGREE];
-        for (k, qk) in q[..n].iter_mut().enumerate() {
-            *qk = (0..=k)
-                .map(|j| e[j] * deadline.powi(j as i32) / factorial(j) * binomial(n - 1 + k - j, k - j))
-                .sum();
+        let mut scale = 1.0;
+        for j in 0..n {
+            q[j] = e[j] * scale;
+            scale *= deadline / (j + 1) as f64;
+        }
+        // The binomial coefficients in (H) are those of (1 − s)⁻ⁿ: n sums over all terms before.
+        for _ in 0..n {
+            for k in 1..n {
+                q[k] += q[k - 1];
+            }
         }
         Self { n, deadline, q }
     }
 
     /// r and its first n derivatives at `elapsed` = τ ≥ 0, `[e]`/s^k; entries above n are 0.
+    #[inline(always)]
     pub fn evaluate(&self, elapsed: f64) -> [f64; MAX_RELATIVE_DEGREE + 1] {
         let n = self.n;
         let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
         if elapsed >= self.deadline {
             return r;
         }
-        let s = elapsed / self.deadline;
-        // Derivatives with respect to s of the two factors, then Leibniz' rule.
-        let mut ends = [0.0; MAX_RELATIVE_DEGREE + 1];
-        let mut q = [0.0; MAX_RELATIVE_DEGREE + 1];
-        for k in 0..=n {
-            let falling = factorial(n) / factorial(n - k);
-            ends[k] = if k % 2 == 0 { falling } else { -falling } * (1.0 - s).powi((n - k) as i32);
-            q[k] = (k..n).rev().fold(0.0, |sum, i| sum * s + self.q[i] * factorial(i) / factorial(i - k));
+        let per_deadline = 1.0 / self.deadline;
+        let (s, left) = (elapsed * per_deadline, (self.deadline - elapsed) * per_deadline);
+        // Coefficients of powers of σ: q(s + σ) by repeated division, then n factors (1 − s) − σ.
+        r[..n].copy_from_slice(&self.q[..n]);
+        for k in 1..n {
+            for i in (k - 1..n - 1).rev() {
+                r[i] += s * r[i + 1];
+            }
         }
-        for (k, rk) in r[..=n].iter_mut().enumerate() {
-            let sum: f64 = (0..=k).map(|i| binomial(k, i) * ends[i] * q[k - i]).sum();
-            *rk = sum / self.deadline.powi(k as i32);
+        for _ in 0..n {
+            for k in (1..=n).rev() {
+                r[k] = left * r[k] - r[k - 1];
+            }
+            r[0] *= left;
+        }
+        let mut scale = 1.0;
+        for k in 1..=n {
+            scale *= k as f64 * per_deadline;
+            r[k] *= scale;
         }
         r
     }

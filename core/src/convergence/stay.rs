@@ -9,20 +9,21 @@
 //! induction the rates ≥ 0 with all c_k ≥ 0 are a ray [a_min, ∞), and there is none if and only if the
 //! first derivative that is not zero is negative. Every rate above [`smallest_rate`] will do as well.
 
-use super::comparison::coefficients;
+use super::comparison::scaled_coefficient;
 use super::polynomial::first;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
-/// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all c_k ≥ 0.
+/// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
+#[inline]
 pub fn is_invariant(rate: f64, e: &[f64]) -> bool {
-    coefficients(rate, e)[..e.len()].iter().all(|&c| c >= 0.0)
+    (0..e.len()).all(|k| scaled_coefficient(rate, e, k) >= 0.0)
 }
 
 /// The smallest rate a ≥ 0 in 1/s with [`is_invariant`]; `None` if no finite rate has it. For n = 2,
 /// max(0, −ė/e).
 ///
 /// The rate returned satisfies [`is_invariant`] to the last bit; the number below it does not, but for
-/// round-off of the c_k.
+/// round-off of the A_k.
 ///
 /// ```
 /// use punctual_core::convergence::stay::smallest_rate;

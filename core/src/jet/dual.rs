@@ -21,6 +21,7 @@ impl<const M: usize> Dual<M> {
     /// # Panics
     ///
     /// If `direction` ≥ `M`.
+    #[inline]
     pub fn variable(value: f64, direction: usize) -> Self {
         let mut gradient = [0.0; M];
         gradient[direction] = 1.0;
@@ -120,6 +121,7 @@ impl<const M: usize> Div<f64> for Dual<M> {
 derived_operators!([const M: usize] Dual<M>);
 
 impl<const M: usize> Scalar for Dual<M> {
+    #[inline]
     fn value(self) -> f64 {
         self.value
     }

@@ -25,11 +25,13 @@ pub struct Taylor<C, const K: usize> {
 
 impl<C: Scalar, const K: usize> Taylor<C, K> {
     /// A constant: all coefficients but the first are 0.
+    #[inline]
     pub fn constant(value: C) -> Self {
         Self { coefficients: from_fn(|k| if k == 0 { value } else { C::zero() }) }
     }
 
     /// Time itself at `t`: `t + τ`.
+    #[inline]
     pub fn time(t: f64) -> Self {
         Self {
             coefficients: from_fn(|k| match k {
@@ -45,6 +47,7 @@ impl<C: Scalar, const K: usize> Taylor<C, K> {
     /// # Panics
     ///
     /// If `k` ≥ `K`.
+    #[inline]
     pub fn derivative(&self, k: usize) -> C {
         self.coefficients[k] * (1..=k).map(|i| i as f64).product::<f64>()
     }
@@ -115,12 +118,14 @@ impl<C: Scalar, const K: usize> Div for Taylor<C, K> {
     fn div(self, other: Self) -> Self {
         let (a, b) = (&self.coefficients, &other.coefficients);
         let mut q = [C::zero(); K];
-        for k in 0..K {
+        q[0] = a[0] / b[0];
+        let reciprocal = C::one() / b[0];
+        for k in 1..K {
             let mut rest = a[k];
             for i in 0..k {
                 rest -= q[i] * b[k - i];
             }
-            q[k] = rest / b[0];
+            q[k] = rest * reciprocal;
         }
         Self { coefficients: q }
     }
@@ -163,8 +168,28 @@ impl<C: Scalar, const K: usize> Div<f64> for Taylor<C, K> {
 derived_operators!([C: Scalar, const K: usize] Taylor<C, K>);
 
 impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
+    #[inline]
     fn value(self) -> f64 {
         self.coefficients[0].value()
+    }
+
+    /// Each pair of a Cauchy product once.
+    #[inline]
+    fn squared(self) -> Self {
+        let a = &self.coefficients;
+        Self {
+            coefficients: from_fn(|k| {
+                if k == 0 {
+                    return a[0].squared();
+                }
+                let mut sum = a[0] * a[k];
+                for i in 1..k.div_ceil(2) {
+                    sum += a[i] * a[k - i];
+                }
+                sum = sum * 2.0;
+                if k % 2 == 0 { sum + a[k / 2].squared() } else { sum }
+            }),
+        }
     }
 
     /// From `y² = a`.
@@ -173,12 +198,13 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let a = &self.coefficients;
         let mut y = [C::zero(); K];
         y[0] = a[0].sqrt();
+        let half = C::from(0.5) / y[0];
         for k in 1..K {
             let mut rest = a[k];
             for i in 1..k {
                 rest -= y[i] * y[k - i];
             }
-            y[k] = rest / (y[0] * 2.0);
+            y[k] = rest * half;
         }
         Self { coefficients: y }
     }
@@ -190,7 +216,7 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let mut y = [C::zero(); K];
         y[0] = a[0].exp();
         for k in 1..K {
-            y[k] = Self::derivative_product(a, &y, k, 1) / k as f64;
+            y[k] = Self::derivative_product(a, &y, k, 1) * (1.0 / k as f64);
         }
         Self { coefficients: y }
     }
@@ -201,8 +227,9 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let a = &self.coefficients;
         let mut y = [C::zero(); K];
         y[0] = a[0].ln();
+        let slope = C::one() / a[0];
         for k in 1..K {
-            y[k] = (a[k] - Self::derivative_product(&y, a, k, 0) / k as f64) / a[0];
+            y[k] = (a[k] - Self::derivative_product(&y, a, k, 0) * (1.0 / k as f64)) * slope;
         }
         Self { coefficients: y }
     }
@@ -214,8 +241,8 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let (mut s, mut c) = ([C::zero(); K], [C::zero(); K]);
         (s[0], c[0]) = a[0].sin_cos();
         for k in 1..K {
-            s[k] = Self::derivative_product(a, &c, k, 1) / k as f64;
-            c[k] = -Self::derivative_product(a, &s, k, 1) / k as f64;
+            s[k] = Self::derivative_product(a, &c, k, 1) * (1.0 / k as f64);
+            c[k] = -Self::derivative_product(a, &s, k, 1) * (1.0 / k as f64);
         }
         (Self { coefficients: s }, Self { coefficients: c })
     }
@@ -227,8 +254,9 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let d = (self * self + 1.0).coefficients;
         let mut y = [C::zero(); K];
         y[0] = a[0].atan();
+        let slope = C::one() / d[0];
         for k in 1..K {
-            y[k] = (a[k] - Self::derivative_product(&y, &d, k, 0) / k as f64) / d[0];
+            y[k] = (a[k] - Self::derivative_product(&y, &d, k, 0) * (1.0 / k as f64)) * slope;
         }
         Self { coefficients: y }
     }
@@ -239,12 +267,13 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let a = &self.coefficients;
         let mut y = [C::zero(); K];
         y[0] = a[0].powf(exponent);
+        let reciprocal = C::one() / a[0];
         for k in 1..K {
             let mut sum = C::zero();
             for i in 1..=k {
                 sum += a[i] * y[k - i] * (i as f64 * (exponent + 1.0) - k as f64);
             }
-            y[k] = sum / (a[0] * k as f64);
+            y[k] = sum * reciprocal * (1.0 / k as f64);
         }
         Self { coefficients: y }
     }

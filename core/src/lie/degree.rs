@@ -9,6 +9,8 @@
 //! where a gradient vanishes by accident (the centre of a disc, standing still), so where an order is
 //! not the lowest found, two neighbours of the sample are asked as well.
 
+use std::array::from_fn;
+
 use nalgebra::SVector;
 
 use super::barrier_series;
@@ -16,7 +18,7 @@ use crate::MAX_RELATIVE_DEGREE;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, RelativeDegree};
-use crate::jet::{Dual, Taylor};
+use crate::jet::Response;
 
 /// Number of Taylor coefficients taken: every order that is supported.
 const K: usize = MAX_RELATIVE_DEGREE + 1;
@@ -196,18 +198,18 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let series: Taylor<Dual<NU>, K> = barrier_series(plant, barrier, t, x);
-    let c = &series.coefficients;
-    if !c.iter().all(|c| c.value.is_finite() && c.gradient.iter().all(|d| d.is_finite())) {
+    let series: Response<NU, K> = barrier_series(plant, barrier, t, x);
+    let c: [_; K] = from_fn(|k| series.coefficient(k));
+    if !c.iter().all(|(value, gradient)| value.is_finite() && gradient.iter().all(|d| d.is_finite())) {
         return None;
     }
     // Gradients of different orders have different units; the time in which the changes of h along the
     // drift change themselves makes them comparable. (Not h itself: it may have any offset.)
-    let changes = || (1..K).filter(|&k| c[k].value != 0.0);
-    let ratio = |j: usize, k: usize| (c[j].value / c[k].value).abs().powf(1.0 / (k - j) as f64);
+    let changes = || (1..K).filter(|&k| c[k].0 != 0.0);
+    let ratio = |j: usize, k: usize| (c[j].0 / c[k].0).abs().powf(1.0 / (k - j) as f64);
     let time = changes().next().and_then(|j| changes().skip(1).map(|k| ratio(j, k)).reduce(f64::min));
     let time = time.map_or(1.0, |time| time.clamp(1e-6, 1e6));
-    let scaled = |k: usize, i: usize| c[k].gradient[i].abs() * time.powi(k as i32);
+    let scaled = |k: usize, i: usize| c[k].1[i].abs() * time.powi(k as i32);
     let mut found = [None; NU];
     for (i, found) in found.iter_mut().enumerate() {
         let largest = (0..K).map(|k| scaled(k, i)).fold(0.0, f64::max);

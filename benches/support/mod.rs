@@ -1,0 +1,136 @@
+//! What the benchmarks measure: the cases, and the same step written by hand.
+
+#![allow(dead_code, reason = "each benchmark uses a part")]
+
+use punctual_core::barriers::{DistanceDisc, Outside};
+use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::PointMass;
+use punctual_core::scalar::Scalar;
+
+/// A time and state at which the row is active after anchoring at the origin at time 0.
+pub(crate) const T: f64 = 4.0;
+pub(crate) const X: [f64; 4] = [15.0, 15.5, 0.8, 6.0];
+pub(crate) const DEADLINE: f64 = 10.0;
+/// A reference input at [`X`] that every row allows.
+pub(crate) const SAFE: [f64; 2] = [30.0, 30.0];
+
+const CENTRE: [f64; 2] = [45.0, 45.0];
+const RADIUS: f64 = 2.0;
+const SMOOTHING: f64 = 2.0;
+
+pub(crate) fn disc() -> DistanceDisc {
+    DistanceDisc::new(CENTRE, RADIUS, SMOOTHING).expect("valid disc")
+}
+
+/// One goal, reached within [`DEADLINE`].
+pub(crate) fn goal<P>(plant: P) -> FilterBuilder
+where
+    P: ControlAffine<4, 2> + Send + 'static,
+{
+    SafetyFilter::builder(4, 2)
+        .barrier("goal", plant, disc(), BarrierSettings::within(DEADLINE))
+        .expect("valid settings")
+}
+
+/// The goal of a point mass and `obstacles` discs beside its way.
+pub(crate) fn goal_and_obstacles(obstacles: usize) -> FilterBuilder {
+    (0..obstacles).fold(goal(PointMass), |builder, i| {
+        let (column, line) = ((i % 10) as f64, (i / 10) as f64);
+        let disc = DistanceDisc::new([-20.0 + 8.0 * column, 60.0 + 8.0 * line], RADIUS, SMOOTHING);
+        let obstacle = Outside(disc.expect("valid disc"));
+        builder
+            .barrier(&format!("obstacle {i}"), PointMass, obstacle, BarrierSettings::within(DEADLINE))
+            .expect("valid settings")
+    })
+}
+
+/// The filter, anchored at rest at the origin at time 0.
+pub(crate) fn anchored(builder: FilterBuilder) -> SafetyFilter {
+    let mut filter = builder.build().expect("valid filter");
+    filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
+    filter
+}
+
+/// A promise for relative degree `n` with its state on the way, and derivatives of h there.
+pub(crate) fn promise(n: usize) -> (FixedTime, FixedTimeState, [f64; 8]) {
+    let promise = FixedTime::new(n, FixedTimeSettings::within(DEADLINE)).expect("valid settings");
+    let h = [-30.0, 4.0, 0.3, 0.1, 0.05, 0.1, -0.2, 0.3];
+    let mut state = FixedTimeState::default();
+    promise.advance(&mut state, 0.0, &h[..n]);
+    (promise, state, h)
+}
+
+/// A point mass in the plane behind integrators: pairs (position, velocity, …) and the last
+/// derivative as input. The relative degree of a barrier on the position is `NX`/2.
+#[derive(Clone, Copy)]
+pub(crate) struct Integrators<const NX: usize>;
+
+impl<const NX: usize> Integrators<NX> {
+    /// A state on the way to the disc.
+    pub(crate) fn state() -> [f64; NX] {
+        std::array::from_fn(|i| if i < 4 { X[i] } else { 0.3 - 0.05 * i as f64 })
+    }
+}
+
+impl<const NX: usize> ControlAffine<NX, 2> for Integrators<NX> {
+    #[inline]
+    fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX> {
+        SVector::from_fn(|i, _| if i + 2 < NX { x[i + 2] } else { S::zero() })
+    }
+
+    #[inline]
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, NX>) -> SMatrix<S, NX, 2> {
+        SMatrix::from_fn(|i, j| if i + 2 == NX + j { S::one() } else { S::zero() })
+    }
+}
+
+/// What [`goal`] with [`PointMass`] computes, by hand: derivatives of one barrier, one profile of
+/// order 2, one row.
+pub(crate) struct ByHand {
+    anchor: [f64; 2],
+    rate: f64,
+}
+
+impl ByHand {
+    /// Anchored at rest at the origin at time 0.
+    pub(crate) fn anchored() -> Self {
+        let (h, dh, _, _) = Self::derivatives(&[0.0; 4]);
+        Self { anchor: [h, dh], rate: FixedTimeSettings::within(DEADLINE).rate }
+    }
+
+    /// h, ḣ, ḧ at u = 0 and ∂ḧ/∂u.
+    #[inline]
+    fn derivatives(x: &[f64; 4]) -> (f64, f64, f64, [f64; 2]) {
+        let away = [x[0] - CENTRE[0], x[1] - CENTRE[1]];
+        let root = (away[0] * away[0] + away[1] * away[1] + SMOOTHING * SMOOTHING).sqrt();
+        let per_root = 1.0 / root;
+        let normal = [-away[0] * per_root, -away[1] * per_root];
+        let dh = normal[0] * x[2] + normal[1] * x[3];
+        let ddh = (dh * dh - x[2] * x[2] - x[3] * x[3]) * per_root;
+        (RADIUS.hypot(SMOOTHING) - root, dh, ddh, normal)
+    }
+
+    /// The safe input.
+    pub(crate) fn step(&self, t: f64, x: &[f64; 4], u_ref: &[f64; 2]) -> [f64; 2] {
+        let (h, dh, ddh, a) = Self::derivatives(x);
+        let ([h0, dh0], rate) = (self.anchor, self.rate);
+        let [mut r, mut dr, mut ddr] = [0.0; 3];
+        if t < DEADLINE {
+            let s = t / DEADLINE;
+            let left = 1.0 - s;
+            r = left * left * (h0 * (1.0 + 2.0 * s) + dh0 * DEADLINE * s);
+            dr = left * (dh0 * (1.0 - 3.0 * s) - h0 * 6.0 * s / DEADLINE);
+            ddr = (h0 * (12.0 * s - 6.0) / DEADLINE + dh0 * (6.0 * s - 4.0)) / DEADLINE;
+        }
+        let floor = ddr - rate * (2.0 * (dh - dr) + rate * (h - r)) - ddh;
+        let missing = floor - (a[0] * u_ref[0] + a[1] * u_ref[1]);
+        if missing <= 0.0 {
+            return *u_ref;
+        }
+        let multiplier = missing / (a[0] * a[0] + a[1] * a[1]);
+        [u_ref[0] + multiplier * a[0], u_ref[1] + multiplier * a[1]]
+    }
+}
