@@ -28,7 +28,7 @@ fn programmes(c: &mut Criterion) {
     bounds.min[..2].fill(-1.25);
     bounds.max[..2].fill(1.25);
     let mut tight = bounds;
-    tight.max[0] = 0.5;
+    tight.max[0] = 0.9;
     let two = vec![row([0.7, 0.3], 0.8), row([-0.2, 1.0], 0.5)];
     let contradictory = vec![row([1.0, 0.1], 2.0), row([-1.0, 0.0], 0.5)];
     let cases = [

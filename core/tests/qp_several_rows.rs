@@ -262,7 +262,7 @@ fn weights_make_an_input_dear() {
     let mut workspace = Workspace::default();
     workspace.solve(&p, &mut u);
     assert!((u[0] - 4.0).abs() <= 4e-15 && (u[1] - 1.0).abs() <= 1e-15, "{u:?}");
-    let active: Vec<Active> = workspace.active(&p).collect();
+    let active: Vec<Active> = workspace.active().to_vec();
     assert_eq!(active.len(), 1);
     assert!(active[0].constraint == Constraint::Row(0) && (active[0].multiplier - 4.0).abs() <= 4e-15);
     let residuals = workspace.residuals(&p, &u);

@@ -31,9 +31,9 @@
 //! D. Goldfarb and A. Idnani, A numerically stable dual method for solving strictly convex quadratic
 //! programs, Mathematical Programming 27 (1983), doi 10.1007/BF02591962.
 
-use super::factors::{Factors, Projection, Vector};
+use super::factors::{Factors, Projection, dot};
 use super::{Active, Constraint, Enforcement, Outcome, Problem, Row, power_of_two};
-use crate::{MAX_INPUTS, MAX_ROWS};
+use crate::MAX_ROWS;
 
 /// A violation up to this part of the terms of its slack is round-off.
 const ROUND_OFF: f64 = 1e-14;
@@ -65,10 +65,10 @@ impl Slot {
 
 /// A row or bound about to become active.
 #[derive(Clone, Copy)]
-struct Entering {
+struct Entering<const N: usize> {
     slot: Slot,
     /// Its normal as δ sees it, or its negative for a soft row that holds more than it must.
-    normal: Vector,
+    normal: [f64; N],
     norm: f64,
     /// By how much it is violated, > 0.
     violation: f64,
@@ -84,19 +84,20 @@ enum End {
     Stuck,
 }
 
-/// The memory of the method; nothing in it survives from one solve to the next.
+/// The memory of the method, for at most N inputs; nothing in it survives from one solve to the next.
 #[derive(Clone, Copy)]
-pub(super) struct DualActiveSet {
+pub(super) struct DualActiveSet<const N: usize> {
     dim: usize,
     len: usize,
-    slots: [Slot; MAX_INPUTS + 1],
-    factors: Factors,
+    slots: [Slot; N],
+    factors: Factors<N>,
     /// 1/√W and √W.
-    reach: Vector,
-    weight: Vector,
+    reach: [f64; N],
+    weight: [f64; N],
+    u_ref: [f64; N],
     /// u_ref, moved by the soft rows at their largest multiplier.
-    origin: Vector,
-    u: Vector,
+    origin: [f64; N],
+    u: [f64; N],
     /// Sets of rows, a bit each: at their largest multiplier; active; taken part in; kept as they are.
     saturated: u64,
     active: u64,
@@ -112,16 +113,17 @@ pub(super) struct DualActiveSet {
     pub(super) lost: u64,
 }
 
-impl DualActiveSet {
+impl<const N: usize> DualActiveSet<N> {
     pub(super) const EMPTY: Self = Self {
         dim: 0,
         len: 0,
-        slots: [Slot::EMPTY; MAX_INPUTS + 1],
+        slots: [Slot::EMPTY; N],
         factors: Factors::EMPTY,
-        reach: [1.0; MAX_INPUTS],
-        weight: [1.0; MAX_INPUTS],
-        origin: [0.0; MAX_INPUTS],
-        u: [0.0; MAX_INPUTS],
+        reach: [1.0; N],
+        weight: [1.0; N],
+        u_ref: [0.0; N],
+        origin: [0.0; N],
+        u: [0.0; N],
         saturated: 0,
         active: 0,
         enabled: 0,
@@ -164,7 +166,8 @@ impl DualActiveSet {
     }
 
     /// Forgets the active rows, for `dim` inputs.
-    pub(super) fn clear(&mut self, dim: usize) {
+    #[inline(always)]
+    fn clear(&mut self, dim: usize) {
         (self.dim, self.len) = (dim, 0);
         (self.saturated, self.active, self.bounds) = (0, 0, 0);
         (self.relaxed, self.lost, self.rounds) = (0, 0, 0);
@@ -172,24 +175,24 @@ impl DualActiveSet {
         self.factors.clear(dim);
     }
 
+    #[inline(always)]
     fn start(&mut self, p: &Problem, u: &[f64]) {
         let n = u.len();
         self.clear(n);
         self.limit = 100 + 20 * (p.rows.len() + 2 * n) as u32;
-        self.origin[..n].copy_from_slice(p.u_ref);
-        self.u[..n].copy_from_slice(p.u_ref);
-        match p.weights {
-            None => {
-                self.reach[..n].fill(1.0);
-                self.weight[..n].fill(1.0);
-            }
-            Some(weights) => {
-                for i in 0..n {
-                    self.weight[i] = weights[i].sqrt();
-                    self.reach[i] = 1.0 / self.weight[i];
-                }
+        for i in 0..N {
+            self.u_ref[i] = if i < n { p.u_ref[i] } else { 0.0 };
+            // Components that do not exist do not move.
+            self.reach[i] = if i < n { 1.0 } else { 0.0 };
+            self.weight[i] = 1.0;
+        }
+        if let Some(weights) = p.weights {
+            for i in 0..n {
+                self.weight[i] = weights[i].sqrt();
+                self.reach[i] = 1.0 / self.weight[i];
             }
         }
+        (self.origin, self.u) = (self.u_ref, self.u_ref);
         // The bounds that the reference exceeds.
         for i in 0..n {
             if self.u[i] < p.bounds.min[i] {
@@ -223,7 +226,7 @@ impl DualActiveSet {
             }
             tolerance = ROUND_OFF;
         }
-        if self.u[..self.dim].iter().all(|v| v.is_finite()) { End::Met } else { End::Stuck }
+        if self.u.iter().all(|v| v.is_finite()) { End::Met } else { End::Stuck }
     }
 
     /// The hard rows one after the other, those before kept; then the soft ones.
@@ -275,7 +278,7 @@ impl DualActiveSet {
 
     /// Raises the multiplier of `e` until it holds. Rows `kept` and bounds are not violated on the
     /// way; with `None` they may be.
-    fn enter(&mut self, p: &Problem, mut e: Entering, kept: Option<u64>) -> End {
+    fn enter(&mut self, p: &Problem, mut e: Entering<N>, kept: Option<u64>) -> End {
         let parametric = kept.is_some();
         // Of its own multiplier: how far it has come, and how far it may.
         let mut moved = 0.0;
@@ -321,7 +324,7 @@ impl DualActiveSet {
             }
             moved += step;
             if (parametric || matches!(event, Event::Holds)) && free {
-                for i in 0..self.dim {
+                for i in 0..N {
                     self.u[i] += step * projection.outside[i] * self.reach[i];
                 }
             }
@@ -372,7 +375,7 @@ impl DualActiveSet {
     }
 
     /// What is left to do where the active rows forbid `e`: r_j ≤ 0 for all that are not fixed.
-    fn capped(&mut self, p: &Problem, e: &Entering, r: &Vector, noise: f64, parametric: bool) -> End {
+    fn capped(&mut self, p: &Problem, e: &Entering<N>, r: &[f64; N], noise: f64, parametric: bool) -> End {
         // What its violation is the difference of: its own terms and those of the certificate.
         let mut terms = self.terms(p, &e.slot);
         for (slot, r) in self.slots[..self.len].iter().zip(r) {
@@ -389,58 +392,56 @@ impl DualActiveSet {
     }
 
     /// The row or bound that is violated most, by the distance to it.
-    fn most_violated(&mut self, p: &Problem, tolerance: f64) -> Option<Entering> {
-        let n = self.dim;
-        let mut worst: Option<Entering> = None;
-        let mut distance = 0.0;
+    #[inline(always)]
+    fn most_violated(&mut self, p: &Problem, tolerance: f64) -> Option<Entering<N>> {
+        let mut worst: Option<Entering<N>> = None;
+        // The distance of the worst, as a fraction.
+        let (mut violation, mut norm) = (0.0, 1.0);
         for (k, row) in p.rows.iter().enumerate() {
-            let slack = dot(&row.normal[..n], &self.u[..n]) - row.floor;
+            let slack = dot(&row.normal[..N], &self.u) - row.floor;
             // Not a number, or overflow, is looked at closely too.
-            if (0.0..f64::INFINITY).contains(&slack)
-                || (self.enabled & !self.active & !self.saturated) >> k & 1 == 0
-            {
+            if (0.0..f64::INFINITY).contains(&slack) {
                 continue;
             }
-            if let Some(e) = self.row_entering(p, k, tolerance)
-                && e.violation > distance * e.norm
+            if (self.enabled & !self.active & !self.saturated) >> k & 1 == 1
+                && let Some(e) = self.row_entering(p, k, tolerance)
+                && e.violation * norm > violation * e.norm
             {
-                distance = e.violation / e.norm;
+                (violation, norm) = (e.violation, e.norm);
                 worst = Some(e);
             }
         }
-        for i in 0..n {
-            let (low, high) = (p.bounds.min[i], p.bounds.max[i]);
+        for i in 0..self.dim {
             let v = self.u[i];
-            if low <= v && v <= high || self.bounds >> (2 * i) & 3 != 0 {
+            if p.bounds.min[i] <= v && v <= p.bounds.max[i] || self.bounds >> (2 * i) & 3 != 0 {
                 continue;
             }
-            let bound = if v < low { Constraint::Lower(i) } else { Constraint::Upper(i) };
+            let bound = if v < p.bounds.min[i] { Constraint::Lower(i) } else { Constraint::Upper(i) };
             let e = self.bound_entering(p, bound);
-            if e.violation > distance && e.violation > tolerance * self.terms(p, &e.slot) {
-                distance = e.violation;
+            if e.violation * norm > violation && e.violation > tolerance * self.terms(p, &e.slot) {
+                (violation, norm) = (e.violation, 1.0);
                 worst = Some(e);
             }
         }
-        if self.saturated != 0 {
-            for k in ones(self.saturated & self.enabled) {
-                let (slot, mut normal, norm) = self.constraint(p, Constraint::Row(k));
-                let room = self.slack(p, &slot);
-                if room > tolerance * self.terms(p, &slot) && room > distance * norm {
-                    normal.iter_mut().for_each(|a| *a = -*a);
-                    distance = room / norm;
-                    worst = Some(Entering { slot, normal, norm, violation: room, reversed: true });
-                }
+        for k in ones(self.saturated & self.enabled) {
+            let (slot, normal, length) = self.constraint(p, Constraint::Row(k));
+            let room = self.slack(p, &slot);
+            if room > tolerance * self.terms(p, &slot) && room * norm > violation * length {
+                (violation, norm) = (room, length);
+                let normal = normal.map(|a| -a);
+                worst = Some(Entering { slot, normal, norm, violation, reversed: true });
             }
         }
         worst
     }
 
     /// Row `k` where it is violated by more than `tolerance`; one that vanishes is marked as lost.
-    fn row_entering(&mut self, p: &Problem, k: usize, tolerance: f64) -> Option<Entering> {
-        if p.rows[k].slack(&self.u[..self.dim]) >= 0.0 {
+    #[inline(always)]
+    fn row_entering(&mut self, p: &Problem, k: usize, tolerance: f64) -> Option<Entering<N>> {
+        if p.rows[k].slack(&self.u) >= 0.0 {
             return None;
         }
-        if power_of_two(&p.rows[k].normal).is_none() {
+        if power_of_two(&p.rows[k].normal[..N]).is_none() {
             self.lost |= u64::from(p.rows[k].floor > 0.0) << k;
             self.enabled &= !(1 << k);
             return None;
@@ -457,7 +458,7 @@ impl DualActiveSet {
         violated.then_some(Entering { slot, normal, norm, violation, reversed: false })
     }
 
-    fn bound_entering(&self, p: &Problem, bound: Constraint) -> Entering {
+    fn bound_entering(&self, p: &Problem, bound: Constraint) -> Entering<N> {
         let (slot, normal, norm) = self.constraint(p, bound);
         Entering { slot, normal, norm, violation: -self.slack(p, &slot), reversed: false }
     }
@@ -466,18 +467,17 @@ impl DualActiveSet {
     fn first_reached(
         &self,
         p: &Problem,
-        projection: &Projection,
+        projection: &Projection<N>,
         kept: u64,
         step: f64,
     ) -> Option<(f64, Constraint)> {
-        let n = self.dim;
         let z = &projection.outside;
         let length = projection.square.sqrt();
         let (mut step, mut first) = (step, None);
         for k in ones(kept & !self.active) {
-            let Some(_) = power_of_two(&p.rows[k].normal) else { continue };
+            let Some(_) = power_of_two(&p.rows[k].normal[..N]) else { continue };
             let (slot, normal, norm) = self.constraint(p, Constraint::Row(k));
-            let slope = -dot(&normal[..n], &z[..n]);
+            let slope = -dot(&normal, z);
             if slope > NO_SLOPE * norm * length {
                 let at = self.slack(p, &slot).max(0.0) / slope;
                 if at < step {
@@ -485,7 +485,7 @@ impl DualActiveSet {
                 }
             }
         }
-        for i in 0..n {
+        for i in 0..self.dim {
             if self.bounds >> (2 * i) & 3 != 0 || z[i].abs() <= NO_SLOPE * length {
                 continue;
             }
@@ -500,15 +500,16 @@ impl DualActiveSet {
     }
 
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
-    fn constraint(&self, p: &Problem, constraint: Constraint) -> (Slot, Vector, f64) {
+    #[inline(always)]
+    fn constraint(&self, p: &Problem, constraint: Constraint) -> (Slot, [f64; N], f64) {
         let mut slot = Slot { constraint, ..Slot::EMPTY };
         let mut norm = 1.0;
         if let Constraint::Row(k) = constraint {
-            slot.scale = power_of_two(&p.rows[k].normal).unwrap_or(1.0);
+            slot.scale = power_of_two(&p.rows[k].normal[..N]).unwrap_or(1.0);
         }
         let normal = self.normal(p, &slot);
         if let Constraint::Row(k) = constraint {
-            norm = dot(&normal[..self.dim], &normal[..self.dim]).sqrt();
+            norm = dot(&normal, &normal).sqrt();
             if let Some(Enforcement::Soft { penalty }) = p.enforcement.get(k) {
                 slot.cap = penalty / norm;
             }
@@ -516,11 +517,11 @@ impl DualActiveSet {
         (slot, normal, norm)
     }
 
-    fn normal(&self, p: &Problem, slot: &Slot) -> Vector {
-        let mut normal = [0.0; MAX_INPUTS];
+    fn normal(&self, p: &Problem, slot: &Slot) -> [f64; N] {
+        let mut normal = [0.0; N];
         match slot.constraint {
             Constraint::Row(k) => {
-                for i in 0..self.dim {
+                for i in 0..N {
                     normal[i] = p.rows[k].normal[i] * slot.scale * self.reach[i];
                 }
             }
@@ -535,11 +536,11 @@ impl DualActiveSet {
         self.slack_at(p, slot, &self.u)
     }
 
-    fn slack_at(&self, p: &Problem, slot: &Slot, u: &Vector) -> f64 {
+    fn slack_at(&self, p: &Problem, slot: &Slot, u: &[f64; N]) -> f64 {
         match slot.constraint {
             Constraint::Row(k) => {
                 let Row { normal, floor } = &p.rows[k];
-                let value: f64 = (0..self.dim).map(|i| normal[i] * slot.scale * u[i]).sum();
+                let value: f64 = (0..N).map(|i| normal[i] * slot.scale * u[i]).sum();
                 value - floor * slot.scale
             }
             Constraint::Lower(i) => (u[i] - p.bounds.min[i]) * self.weight[i],
@@ -548,12 +549,13 @@ impl DualActiveSet {
     }
 
     /// The size of the terms of the slack, those at u_ref included, from which u is computed.
+    #[inline(always)]
     fn terms(&self, p: &Problem, slot: &Slot) -> f64 {
-        let largest = |i: usize| self.u[i].abs().max(p.u_ref[i].abs());
+        let largest = |i: usize| f64::max(self.u[i].abs(), self.u_ref[i].abs());
         match slot.constraint {
             Constraint::Row(k) => {
                 let Row { normal, floor } = &p.rows[k];
-                (0..self.dim).map(|i| (normal[i] * slot.scale).abs() * largest(i)).sum::<f64>()
+                (0..N).map(|i| (normal[i] * slot.scale).abs() * largest(i)).sum::<f64>()
                     + (floor * slot.scale).abs()
             }
             Constraint::Lower(i) => (p.bounds.min[i].abs() + largest(i)) * self.weight[i],
@@ -561,7 +563,8 @@ impl DualActiveSet {
         }
     }
 
-    fn join(&mut self, p: &Problem, slot: Slot, projection: &Projection) {
+    #[inline(always)]
+    fn join(&mut self, p: &Problem, slot: Slot, projection: &Projection<N>) {
         self.slots[self.len] = slot;
         self.len += 1;
         self.factors.append(projection);
@@ -577,6 +580,7 @@ impl DualActiveSet {
         self.stale = true;
     }
 
+    #[inline(always)]
     fn mark(&mut self, constraint: Constraint, active: bool) {
         let toggle = |set: u32, bit: usize| if active { set | 1 << bit } else { set & !(1 << bit) };
         match constraint {
@@ -600,10 +604,10 @@ impl DualActiveSet {
         if let Constraint::Row(k) = slot.constraint {
             self.saturated = if there { self.saturated | 1 << k } else { self.saturated & !(1 << k) };
         }
-        self.origin[..self.dim].copy_from_slice(p.u_ref);
+        self.origin = self.u_ref;
         for k in ones(self.saturated) {
             let (slot, normal, _) = self.constraint(p, Constraint::Row(k));
-            for i in 0..self.dim {
+            for i in 0..N {
                 self.origin[i] += slot.cap * normal[i] * self.reach[i];
             }
         }
@@ -611,12 +615,12 @@ impl DualActiveSet {
 
     /// Computes u and the multipliers from the active rows.
     fn refresh(&mut self, p: &Problem) {
-        let mut y = [0.0; MAX_INPUTS];
+        let mut y = [0.0; N];
         for (y, slot) in y.iter_mut().zip(&self.slots[..self.len]) {
             *y = -self.slack_at(p, slot, &self.origin);
         }
         self.factors.solve_transposed(&mut y);
-        for i in 0..self.dim {
+        for i in 0..N {
             self.u[i] = self.origin[i] + self.reach[i] * self.factors.component(i, &y);
         }
         self.factors.solve(&mut y);
@@ -645,6 +649,7 @@ impl DualActiveSet {
     }
 
     /// Whether the rows have moved u by no more than the correction limit.
+    #[inline(always)]
     fn within_limit(&self, p: &Problem) -> bool {
         let moved = |i: usize| self.u[i] - p.bounds.clamp(i, p.u_ref[i]);
         let square: f64 = (0..self.dim).map(|i| moved(i) * moved(i)).sum();
@@ -656,7 +661,7 @@ impl DualActiveSet {
     }
 
     /// The active rows and bounds with their multipliers, then the soft rows at their largest.
-    pub(super) fn active<'a>(&'a self, p: &'a Problem) -> impl Iterator<Item = Active> + 'a {
+    pub(super) fn active(&self, p: &Problem) -> impl Iterator<Item = Active> {
         let slots = self.slots[..self.len].iter().map(|slot| {
             let unit = match slot.constraint {
                 Constraint::Row(_) => slot.scale,
@@ -669,29 +674,6 @@ impl DualActiveSet {
             Active { constraint: slot.constraint, multiplier: slot.cap * slot.scale }
         });
         slots.chain(saturated)
-    }
-
-    /// Takes over an answer found without this method: the multiplier of the first row, and the bounds that
-    /// hold `u`.
-    pub(super) fn take_over(&mut self, p: &Problem, u: &[f64], multiplier: f64) {
-        self.clear(u.len());
-        self.weight[..u.len()].fill(1.0);
-        let mut push = |constraint, multiplier: f64| {
-            if multiplier > 0.0 {
-                self.slots[self.len] = Slot { constraint, multiplier, ..Slot::EMPTY };
-                self.len += 1;
-            }
-        };
-        push(Constraint::Row(0), multiplier);
-        for (i, &v) in u.iter().enumerate() {
-            let pull = p.rows.first().map_or(0.0, |row| multiplier * row.normal[i]);
-            let held = p.weights.map_or(1.0, |w| w[i]) * (v - p.u_ref[i]) - pull;
-            if held > 0.0 && v == p.bounds.min[i] {
-                push(Constraint::Lower(i), held);
-            } else if held < 0.0 && v == p.bounds.max[i] {
-                push(Constraint::Upper(i), -held);
-            }
-        }
     }
 }
 
@@ -728,8 +710,4 @@ fn next_hard(p: &Problem, done: u64) -> Option<usize> {
     };
     let open = (0..p.rows.len()).filter(|k| done >> k & 1 == 0);
     open.filter_map(|k| Some((priority(k)?, k))).min().map(|(_, k)| k)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

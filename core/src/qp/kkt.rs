@@ -19,7 +19,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    pub(super) fn of(p: &Problem, u: &[f64], active: impl Iterator<Item = Active>) -> Self {
+    pub(super) fn of(p: &Problem, u: &[f64], active: &[Active]) -> Self {
         let mut sum = [0.0; MAX_INPUTS];
         let mut size: f64 = 0.0;
         for (i, v) in u.iter().enumerate() {
@@ -28,7 +28,7 @@ impl Residuals {
         }
         let (mut least, mut largest) = (0.0_f64, 0.0_f64);
         let mut complementarity: f64 = 0.0;
-        for Active { constraint, multiplier } in active {
+        for &Active { constraint, multiplier } in active {
             let part = |value: f64, terms: f64| if value == 0.0 { 0.0 } else { value / terms };
             let (norm, apart) = match constraint {
                 Constraint::Row(k) => {
