@@ -59,7 +59,7 @@ fn programmes(c: &mut Criterion) {
             });
         }
         if backend == Backend::DualActiveSet {
-            let (rows, bounds, _) = (&cases[3].1, &cases[3].2, ());
+            let (_, rows, bounds) = &cases[3];
             let p = Problem::new(rows, bounds, &u_ref, 1e6);
             let mut u = [0.0; 2];
             workspace.solve(&p, &mut u);

@@ -1,6 +1,8 @@
 //! The active-set method against enumeration in double-double arithmetic: `PUNCTUAL_QP_CASES` random
 //! programmes of every class, a few thousand by default. Prints the largest errors (`--nocapture`).
 
+#![allow(clippy::print_stdout, reason = "the figures are read from the output")]
+
 mod enumeration;
 mod quadratic;
 

@@ -23,8 +23,8 @@
 //! of priority, and the multiplier of each is raised with all rows before it kept: the same walk with one
 //! more event, a kept row that is reached becomes active. It ends where the row holds, or where the
 //! kept rows cap it: then δ is already the least violation nearest to u_ref, and the rows of the
-//! certificate stay active from then on. Soft rows follow at the end, all at once. A row after which δ
-//! exceeds the correction limit is taken back.
+//! certificate stay active from then on. Soft rows follow at the end, all at once. A row after which u
+//! has moved beyond the correction limit is taken back (the soft ones together).
 //!
 //! # References
 //!
@@ -98,7 +98,7 @@ pub(super) struct DualActiveSet<const N: usize> {
     /// u_ref, moved by the soft rows at their largest multiplier.
     origin: [f64; N],
     u: [f64; N],
-    /// Sets of rows, a bit each: at their largest multiplier; active; taken part in; kept as they are.
+    /// Sets of rows, a bit each: at their largest multiplier; active; taken part in.
     saturated: u64,
     active: u64,
     enabled: u64,
@@ -237,14 +237,13 @@ impl<const N: usize> DualActiveSet<N> {
         let mut kept = 0_u64;
         while let Some(k) = next_hard(p, done) {
             done |= 1 << k;
-            let Some(mut entering) = self.row_entering(p, k, 0.0) else {
+            let Some(entering) = self.row_entering(p, k, 0.0) else {
                 // It holds, or says nothing about u.
                 if self.lost >> k & 1 == 0 {
                     kept |= 1 << k;
                 }
                 continue;
             };
-            entering.slot.multiplier = 0.0;
             let before = *self;
             let end = self.enter(p, entering, Some(kept));
             if matches!(end, End::Stuck) || !self.within_limit(p) {
@@ -337,12 +336,9 @@ impl<const N: usize> DualActiveSet<N> {
                         e.normal = self.normal(p, &e.slot);
                     }
                     e.slot.multiplier = moved;
-                    if e.reversed {
-                        let projection = self.factors.project(&e.normal, e.norm);
-                        self.join(p, e.slot, &projection);
-                    } else {
-                        self.join(p, e.slot, &projection);
-                    }
+                    let projection =
+                        if e.reversed { self.factors.project(&e.normal, e.norm) } else { projection };
+                    self.join(p, e.slot, &projection);
                     if self.stale || parametric || e.reversed {
                         self.refresh(p);
                     } else {

@@ -10,7 +10,7 @@
 //! - one row, W = 1: closed form, with or without bounds (module `single_row`).
 //! - else: a dual active-set method (module `dual_active_set`), exact up to round-off.
 //!
-//! None of these allocates. clarabel (module `interior_point`), which does, can be chosen instead.
+//! None of these allocates. A wrong answer would show in [`Workspace::residuals`]. clarabel (module `interior_point`), which does, can be chosen instead.
 //!
 //! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible:
 //! each in the order of priority (then of the list) as little as those before it allow, and among the inputs
