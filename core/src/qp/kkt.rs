@@ -20,55 +20,53 @@ pub struct Residuals {
 
 impl Residuals {
     pub(super) fn of(p: &Problem, u: &[f64], active: &[Active]) -> Self {
-        let mut sum = [0.0; MAX_INPUTS];
-        let mut size: f64 = 0.0;
-        for (i, v) in u.iter().enumerate() {
-            sum[i] = p.weights.map_or(1.0, |w| w[i]) * (v - p.u_ref[i]);
-            size = size.max(sum[i].abs());
+        let m = u.len();
+        let weight = |i: usize| p.weights.map_or(1.0, |w| w[i]);
+        // W (u − u_ref) − Σ λ a and the terms of it.
+        let mut rest = [0.0; MAX_INPUTS];
+        let mut size = [0.0; MAX_INPUTS];
+        for i in 0..m {
+            rest[i] = weight(i) * (u[i] - p.u_ref[i]);
+            size[i] = weight(i) * (u[i].abs() + p.u_ref[i].abs());
         }
         let (mut least, mut largest) = (0.0_f64, 0.0_f64);
-        let mut complementarity: f64 = 0.0;
         for &Active { constraint, multiplier } in active {
-            let part = |value: f64, terms: f64| if value == 0.0 { 0.0 } else { value / terms };
-            let (norm, apart) = match constraint {
-                Constraint::Row(k) => {
-                    let row = &p.rows[k];
-                    let mut norm: f64 = 0.0;
-                    for (s, a) in sum[..u.len()].iter_mut().zip(&row.normal) {
-                        *s -= multiplier * a;
-                        size = size.max((multiplier * a).abs());
-                        norm = norm.max(a.abs());
-                    }
-                    // A soft row at its largest multiplier may be violated.
-                    let soft = matches!(p.enforcement.get(k), Some(Enforcement::Soft { .. }));
-                    let apart = if soft { row.slack(u).max(0.0) } else { row.slack(u).abs() };
-                    (norm, part(apart, terms(row, u)))
-                }
-                Constraint::Lower(i) => {
-                    sum[i] -= multiplier;
-                    (1.0, part((u[i] - p.bounds.min[i]).abs(), u[i].abs() + p.bounds.min[i].abs()))
-                }
-                Constraint::Upper(i) => {
-                    sum[i] += multiplier;
-                    (1.0, part((u[i] - p.bounds.max[i]).abs(), u[i].abs() + p.bounds.max[i].abs()))
-                }
+            let mut pull = |i: usize, a: f64| {
+                rest[i] -= multiplier * a;
+                size[i] += (multiplier * a).abs();
+                least = least.min(multiplier * a.abs());
+                largest = largest.max((multiplier * a).abs());
             };
-            least = least.min(multiplier * norm);
-            largest = largest.max(multiplier.abs() * norm);
-            complementarity = complementarity.max(apart);
+            match constraint {
+                Constraint::Row(k) => (0..m).for_each(|i| pull(i, p.rows[k].normal[i])),
+                Constraint::Lower(i) => pull(i, 1.0),
+                Constraint::Upper(i) => pull(i, -1.0),
+            }
         }
-        let violation =
-            p.rows.iter().filter(|row| row.slack(u) < 0.0).map(|row| -row.slack(u) / terms(row, u));
+        // u is known to the round-off of these terms, as a length of √W u.
+        let length = (0..m).fold(0.0, |s: f64, i| s.max(size[i] / weight(i).sqrt()));
+        let part = |row: &Row, slack: f64| {
+            let terms = |s: f64, i: usize| s + (row.normal[i] / weight(i).sqrt()).abs() * length;
+            if slack == 0.0 { 0.0 } else { slack / (0..m).fold(row.floor.abs(), terms) }
+        };
+        let violation = p.rows.iter().map(|row| part(row, -row.slack(u).min(0.0)));
+        let apart = active.iter().map(|a| match a.constraint {
+            Constraint::Row(k) => {
+                // A soft row at its largest multiplier may be violated.
+                let soft = matches!(p.enforcement.get(k), Some(Enforcement::Soft { .. }));
+                let slack = p.rows[k].slack(u);
+                part(&p.rows[k], if soft { slack.max(0.0) } else { slack.abs() })
+            }
+            Constraint::Lower(i) => (u[i] - p.bounds.min[i]).abs() * weight(i).sqrt() / length,
+            Constraint::Upper(i) => (u[i] - p.bounds.max[i]).abs() * weight(i).sqrt() / length,
+        });
+        let largest_of = |v: &[f64; MAX_INPUTS]| v.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
+        let relative = |value: f64, to: f64| if value == 0.0 { 0.0 } else { value / to };
         Self {
-            stationarity: sum.iter().fold(0.0, |s: f64, v| s.max(v.abs())) / size.max(f64::MIN_POSITIVE),
+            stationarity: relative(largest_of(&rest), largest_of(&size)),
             violation: violation.fold(0.0, f64::max),
-            negativity: -least / largest.max(f64::MIN_POSITIVE),
-            complementarity,
+            negativity: relative(-least, largest),
+            complementarity: apart.fold(0.0, f64::max),
         }
     }
-}
-
-/// The size of the terms of a slack.
-fn terms(row: &Row, u: &[f64]) -> f64 {
-    row.normal.iter().zip(u).fold(row.floor.abs(), |s, (a, v)| s + (a * v).abs())
 }

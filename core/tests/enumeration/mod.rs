@@ -111,7 +111,8 @@ impl Exact {
 
     /// The size of what a slack at `u`, computed from the point `from`, is the difference of.
     fn terms(&self, u: &Point, from: &Point) -> f64 {
-        (0..3).fold(self.floor.0.abs(), |s, i| s + self.normal[i].abs() * (u[i].0.abs() + from[i].0.abs()))
+        let size = u.iter().chain(from).fold(0.0, |s: f64, v| s.max(v.0.abs()));
+        self.normal.iter().fold(self.floor.0.abs(), |s, a| s + a.abs() * size)
     }
 
     fn holds(&self, u: &Point, from: &Point, tolerance: f64) -> bool {
