@@ -1,10 +1,11 @@
-//! The quadratic programme with several rows, against the enumeration of active sets.
+//! The quadratic programme with several rows: against exact enumeration, its properties, known answers.
 
+mod enumeration;
 mod quadratic;
 
 use proptest::prelude::*;
 use punctual_core::MAX_ROWS;
-use punctual_core::nalgebra::{DMatrix, DVector};
+use punctual_core::nalgebra::DVector;
 use punctual_core::qp::{
     Active, Backend, Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solver, Workspace, solve,
 };
@@ -14,6 +15,9 @@ const NO_LIMIT: f64 = 1e6;
 
 /// Error of the active-set method: round-off, magnified by rows that are nearly parallel.
 const ROUND_OFF: f64 = 1e-9;
+
+/// The same for a known sine of their angle.
+const EXACT: f64 = 1e-12;
 
 /// Error of the interior-point method on u: it stops at a duality gap of 1e-8 (relative), and a gap δ
 /// of ½‖u − u_ref‖² bounds the argument only by √(2δ) = 1.4e-4.
@@ -38,32 +42,6 @@ fn all_rows(rows: &[Row], b: &Bounds, m: usize) -> Vec<(DVector<f64>, f64)> {
         }
     }
     list
-}
-
-/// The minimiser by brute force: every set of at most m independent rows active; the best of the
-/// candidates that violate nothing. `None` if there is none.
-fn enumerated(rows: &[(DVector<f64>, f64)], u_ref: &DVector<f64>) -> Option<DVector<f64>> {
-    let m = u_ref.len();
-    let mut best: Option<DVector<f64>> = None;
-    for set in 0_u32..1 << rows.len() {
-        let active: Vec<usize> = (0..rows.len()).filter(|k| set >> k & 1 == 1).collect();
-        if active.len() > m {
-            continue;
-        }
-        let mut u = u_ref.clone();
-        if !active.is_empty() {
-            let a = DMatrix::from_fn(active.len(), m, |k, j| rows[active[k]].0[j]);
-            let missing =
-                DVector::from_fn(active.len(), |k, _| rows[active[k]].1 - rows[active[k]].0.dot(u_ref));
-            let Some(lambda) = (&a * a.transpose()).lu().solve(&missing) else { continue };
-            u += a.transpose() * lambda;
-        }
-        let feasible = rows.iter().all(|(a, floor)| a.dot(&u) - floor >= -1e-9);
-        if feasible && best.as_ref().is_none_or(|v| (&u - u_ref).norm() < (v - u_ref).norm()) {
-            best = Some(u);
-        }
-    }
-    best
 }
 
 /// Rows of length 1 to 4, two to four of them, in two or three inputs, maybe bounded.
@@ -102,13 +80,15 @@ proptest! {
         prop_assert!(b.contain(&u), "{u:?}");
         let found = DVector::from_column_slice(&u);
         let least_slack = list.iter().map(|(a, floor)| a.dot(&found) - floor).fold(f64::INFINITY, f64::min);
-        match enumerated(&list, &reference) {
+        let from = std::array::from_fn(|i| u_ref.get(i).map_or(0.0, |v| *v).into());
+        match enumeration::minimiser(&enumeration::constraints(&rows, &b, m), m, &from, 1e-24) {
             Some(wanted) => {
-                prop_assert_eq!(solution.outcome, Outcome::Optimal, "wanted {:?}", wanted);
+                prop_assert_eq!(solution.outcome, Outcome::Optimal, "wanted {:?}", wanted.u);
                 prop_assert!(least_slack >= -ROUND_OFF * (1.0 + found.norm()), "slack {least_slack:e}");
-                let size = 1.0 + (&wanted - &reference).norm();
-                let error = (&found - &wanted).norm();
-                prop_assert!(error <= ROUND_OFF * size, "{found} {wanted} error {error:e}, size {size}");
+                let sine = wanted.sine;
+                let wanted = DVector::from_fn(m, |i, _| wanted.u[i].value());
+                let (error, size) = ((&found - &wanted).norm(), 1.0 + (&wanted - &reference).norm());
+                prop_assert!(error <= EXACT * size / sine, "{found} {wanted} error {error:e}, sine {sine}");
             }
             None => {
                 // Nearly parallel rows can meet farther out than enumeration resolves.
