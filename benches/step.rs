@@ -1,19 +1,18 @@
 //! Cost of one filter step and of its parts: `cargo bench --bench step`.
 //!
-//! The states are on the way to the disc, where the row is active, so that every step solves its
-//! quadratic programme; those with obstacles also from a reference input that needs no solving. "by
-//! hand" is what the first step computes, written out for that one plant, barrier and order.
+//! The quadratic programme by itself: `programme.rs`. The states are on the way to the disc, where the row
+//! is active, so that every step solves its quadratic programme; those with obstacles also from a reference
+//! input that needs no solving. "by hand" is what the first step computes, written out for that one plant,
+//! barrier and order.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use punctual_core::MAX_INPUTS;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Status};
 use punctual_core::lie::{self, Derivatives};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
-use punctual_core::qp::{Bounds, Row, solve};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
 mod support;
@@ -96,29 +95,5 @@ fn promises(c: &mut Criterion) {
     }
 }
 
-fn programmes(c: &mut Criterion) {
-    let row = |normal: [f64; 2], floor| {
-        let mut row = Row { normal: [0.0; MAX_INPUTS], floor };
-        row.normal[..2].copy_from_slice(&normal);
-        row
-    };
-    let mut bounds = Bounds::NONE;
-    bounds.min[..2].fill(-1.0);
-    bounds.max[..2].fill(1.0);
-    let one = [row([0.7, 0.3], 0.8)];
-    let two = [row([0.7, 0.3], 0.8), row([-0.2, 1.0], 0.5)];
-    for (name, rows, bounds) in [
-        ("programme/one row", &one[..], Bounds::NONE),
-        ("programme/one row, bounded", &one[..], bounds),
-        ("programme/two rows", &two[..], Bounds::NONE),
-        ("programme/two rows, bounded", &two[..], bounds),
-    ] {
-        let mut u = [0.0; 2];
-        c.bench_function(name, |b| {
-            b.iter(|| solve(black_box(rows), &bounds, black_box(&[0.1, -0.2]), 1e6, &mut u).iterations);
-        });
-    }
-}
-
-criterion_group!(benches, steps, jets, promises, programmes);
+criterion_group!(benches, steps, jets, promises);
 criterion_main!(benches);

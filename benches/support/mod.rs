@@ -98,7 +98,7 @@ impl ByHand {
     /// Anchored at rest at the origin at time 0.
     pub(crate) fn anchored() -> Self {
         let (h, dh, _, _) = Self::derivatives(&[0.0; 4]);
-        Self { anchor: [h, dh], rate: FixedTimeSettings::within(DEADLINE).rate }
+        Self { anchor: [h, dh], rate: FixedTimeSettings::default_rate(DEADLINE, 0.0) }
     }
 
     /// h, ḣ, ḧ at u = 0 and ∂ḧ/∂u.

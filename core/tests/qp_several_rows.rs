@@ -1,21 +1,27 @@
-//! The quadratic programme with several rows, against the enumeration of active sets.
+//! The quadratic programme with several rows: against exact enumeration, its properties, known answers.
 
+mod enumeration;
 mod quadratic;
 
 use proptest::prelude::*;
-use punctual_core::nalgebra::{DMatrix, DVector};
-use punctual_core::qp::{Bounds, Outcome, Row, Solver, solve};
+use punctual_core::MAX_ROWS;
+use punctual_core::nalgebra::DVector;
+use punctual_core::qp::{
+    Active, Backend, Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solver, Workspace, solve,
+};
 use quadratic::{bounds, config, row};
 
 const NO_LIMIT: f64 = 1e6;
 
+/// Error of the active-set method: round-off, magnified by rows that are nearly parallel.
+const ROUND_OFF: f64 = 1e-9;
+
+/// The same for a known sine of their angle.
+const EXACT: f64 = 1e-12;
+
 /// Error of the interior-point method on u: it stops at a duality gap of 1e-8 (relative), and a gap δ
 /// of ½‖u − u_ref‖² bounds the argument only by √(2δ) = 1.4e-4.
 const GAP: f64 = 1.4e-4;
-
-/// Violation allowed to a row of unit length: the feasibility tolerance of 1e-8, with room for the
-/// problem's numbers of order 10.
-const FEASIBILITY: f64 = 1e-6;
 
 /// The rows and the finite bounds, as one list of unit rows.
 fn all_rows(rows: &[Row], b: &Bounds, m: usize) -> Vec<(DVector<f64>, f64)> {
@@ -36,32 +42,6 @@ fn all_rows(rows: &[Row], b: &Bounds, m: usize) -> Vec<(DVector<f64>, f64)> {
         }
     }
     list
-}
-
-/// The minimiser by brute force: every set of at most m independent rows active; the best of the
-/// candidates that violate nothing. `None` if there is none.
-fn enumerated(rows: &[(DVector<f64>, f64)], u_ref: &DVector<f64>) -> Option<DVector<f64>> {
-    let m = u_ref.len();
-    let mut best: Option<DVector<f64>> = None;
-    for set in 0_u32..1 << rows.len() {
-        let active: Vec<usize> = (0..rows.len()).filter(|k| set >> k & 1 == 1).collect();
-        if active.len() > m {
-            continue;
-        }
-        let mut u = u_ref.clone();
-        if !active.is_empty() {
-            let a = DMatrix::from_fn(active.len(), m, |k, j| rows[active[k]].0[j]);
-            let missing =
-                DVector::from_fn(active.len(), |k, _| rows[active[k]].1 - rows[active[k]].0.dot(u_ref));
-            let Some(lambda) = (&a * a.transpose()).lu().solve(&missing) else { continue };
-            u += a.transpose() * lambda;
-        }
-        let feasible = rows.iter().all(|(a, floor)| a.dot(&u) - floor >= -1e-9);
-        if feasible && best.as_ref().is_none_or(|v| (&u - u_ref).norm() < (v - u_ref).norm()) {
-            best = Some(u);
-        }
-    }
-    best
 }
 
 /// Rows of length 1 to 4, two to four of them, in two or three inputs, maybe bounded.
@@ -100,19 +80,20 @@ proptest! {
         prop_assert!(b.contain(&u), "{u:?}");
         let found = DVector::from_column_slice(&u);
         let least_slack = list.iter().map(|(a, floor)| a.dot(&found) - floor).fold(f64::INFINITY, f64::min);
-        match enumerated(&list, &reference) {
+        let from = std::array::from_fn(|i| u_ref.get(i).map_or(0.0, |v| *v).into());
+        match enumeration::minimiser(&enumeration::constraints(&rows, &b, m), m, &from, 1e-24) {
             Some(wanted) => {
-                prop_assert_eq!(solution.outcome, Outcome::Optimal, "wanted {:?}", wanted);
-                prop_assert!(least_slack >= -FEASIBILITY * (1.0 + found.norm()), "slack {least_slack:e}");
-                // Far from u_ref the gap is relative to the cost.
-                let size = 1.0 + (&wanted - &reference).norm();
-                let error = (&found - &wanted).norm();
-                prop_assert!(error <= GAP * size, "{found} {wanted} error {error:e}, size {size}");
+                prop_assert_eq!(solution.outcome, Outcome::Optimal, "wanted {:?}", wanted.u);
+                prop_assert!(least_slack >= -ROUND_OFF * (1.0 + found.norm()), "slack {least_slack:e}");
+                let sine = wanted.sine;
+                let wanted = DVector::from_fn(m, |i, _| wanted.u[i].value());
+                let (error, size) = ((&found - &wanted).norm(), 1.0 + (&wanted - &reference).norm());
+                prop_assert!(error <= EXACT * size / sine, "{found} {wanted} error {error:e}, sine {sine}");
             }
             None => {
                 // Nearly parallel rows can meet farther out than enumeration resolves.
                 if solution.outcome == Outcome::Optimal {
-                    prop_assert!(least_slack >= -FEASIBILITY * (1.0 + found.norm()), "slack {least_slack:e}");
+                    prop_assert!(least_slack >= -ROUND_OFF * (1.0 + found.norm()), "slack {least_slack:e}");
                 } else {
                     prop_assert_eq!(solution.outcome, Outcome::Infeasible);
                 }
@@ -138,6 +119,36 @@ proptest! {
         let solution = solve(&rows, &b, &u_ref, limit, &mut u);
         prop_assert!(u.iter().all(|v| v.is_finite()), "{u:?} {solution:?}");
         prop_assert!(b.contain(&u), "{u:?} {solution:?}");
+    }
+
+    /// The interior-point method finds the same within its own accuracy.
+    #[test]
+    fn both_methods_agree((rows, b, u_ref) in several()) {
+        let p = Problem::new(&rows, &b, &u_ref, NO_LIMIT);
+        let (mut u, mut v) = (vec![f64::NAN; u_ref.len()], vec![f64::NAN; u_ref.len()]);
+        let one = Workspace::default().solve(&p, &mut u);
+        let two = Workspace::new(Backend::InteriorPoint).solve(&p, &mut v);
+        if one.outcome == Outcome::Optimal {
+            prop_assert_eq!(two.outcome, Outcome::Optimal);
+            let (u, v) = (DVector::from_vec(u), DVector::from_vec(v));
+            let size = 1.0 + (&u - DVector::from_vec(u_ref)).norm();
+            prop_assert!((&u - &v).norm() <= GAP * size, "{u} {v}");
+        }
+    }
+
+    /// The order of rows that can all be met does not matter.
+    #[test]
+    fn permuting_rows_changes_round_off_only((mut rows, b, u_ref) in several()) {
+        let (mut u, mut v) = (vec![f64::NAN; u_ref.len()], vec![f64::NAN; u_ref.len()]);
+        let one = solve(&rows, &b, &u_ref, NO_LIMIT, &mut u);
+        rows.reverse();
+        let two = solve(&rows, &b, &u_ref, NO_LIMIT, &mut v);
+        prop_assert_eq!(one.outcome, two.outcome);
+        if one.outcome == Outcome::Optimal {
+            let (u, v) = (DVector::from_vec(u), DVector::from_vec(v));
+            let size = 1.0 + u.norm();
+            prop_assert!((&u - &v).norm() <= ROUND_OFF * size, "{u} {v}");
+        }
     }
 
     /// A row twice, or in other units, is the same problem.
@@ -171,18 +182,86 @@ fn rows_that_the_bounds_forbid_are_violated_least() {
     let mut u = [f64::NAN; 2];
     let rows = [row(&[1.0, 0.0], 5.0), row(&[0.0, -2.0], 5.0)];
     let solution = solve(&rows, &bounds(&[-1.0; 2], &[1.0; 2]), &[0.25, 0.5], NO_LIMIT, &mut u);
-    assert_eq!((solution.outcome, solution.solver), (Outcome::Infeasible, Solver::InteriorPoint));
-    assert!((u[0] - 1.0).abs() < GAP && (u[1] + 1.0).abs() < GAP, "{u:?}");
+    assert_eq!((solution.outcome, solution.solver), (Outcome::Infeasible, Solver::DualActiveSet));
+    assert_eq!(u, [1.0, -1.0]);
 }
 
 #[test]
-fn contradictory_rows_share_the_violation() {
-    // u₁ ≥ 1 and u₁ ≤ −1: every u₁ between has the same total violation, 2; the nearest to u_ref wins.
+fn of_contradictory_rows_the_first_is_met() {
+    // u₁ ≥ 1 and u₁ ≤ −1.
     let mut u = [f64::NAN; 2];
     let rows = [row(&[1.0, 0.0], 1.0), row(&[-1.0, 0.0], 1.0)];
-    let solution = solve(&rows, &Bounds::NONE, &[0.25, 7.0], NO_LIMIT, &mut u);
-    assert_eq!(solution.outcome, Outcome::Infeasible);
-    assert!(u[0].abs() <= 1.0 + GAP && (u[1] - 7.0).abs() <= 0.01, "{u:?}");
+    let p = Problem::new(&rows, &Bounds::NONE, &[0.25, 7.0], NO_LIMIT);
+    let mut workspace = Workspace::default();
+    assert_eq!((workspace.solve(&p, &mut u).outcome, u), (Outcome::Infeasible, [1.0, 7.0]));
+    assert_eq!([0, 1].map(|i| workspace.is_relaxed(i)), [false, true]);
+    // Unless the other has priority.
+    let enforcement = [1, 0].map(|priority| Enforcement::Hard { priority });
+    let p = Problem { enforcement: &enforcement, ..p };
+    assert_eq!((workspace.solve(&p, &mut u).outcome, u), (Outcome::Infeasible, [-1.0, 7.0]));
+    assert_eq!([0, 1].map(|i| workspace.is_relaxed(i)), [true, false]);
+}
+
+/// A row that is given up is still met as far as it can be, and rows after it still count.
+#[test]
+fn a_relaxed_row_stays_at_its_least_violation() {
+    let rows = [row(&[1.0, 0.0], 5.0), row(&[0.0, 1.0], 3.0), row(&[-1.0, 0.0], -0.5)];
+    let p = Problem::new(&rows, &Bounds::NONE, &[0.0; 2], NO_LIMIT);
+    let b = bounds(&[-2.0; 2], &[2.0, f64::INFINITY]);
+    let mut u = [f64::NAN; 2];
+    let mut workspace = Workspace::default();
+    let outcome = workspace.solve(&Problem { bounds: &b, ..p }, &mut u).outcome;
+    // u₁ = 2 as close to 5 as it gets; u₂ = 3; u₁ ≤ 0.5 comes last.
+    assert_eq!((outcome, u), (Outcome::Infeasible, [2.0, 3.0]));
+    assert_eq!([0, 1, 2].map(|i| workspace.is_relaxed(i)), [true, false, true]);
+}
+
+/// A soft row pulls with its penalty and no more, whatever the unit of the row.
+#[test]
+fn a_soft_row_yields_beyond_its_penalty() {
+    for (penalty, wanted) in [(5.0, 3.0), (3.0, 3.0), (2.0, 2.0), (0.5, 0.5)] {
+        for unit in [1.0, 1e-6, 1e6] {
+            let rows = [row(&[unit, 0.0], 3.0 * unit)];
+            let enforcement = [Enforcement::Soft { penalty }];
+            let p = Problem::new(&rows, &Bounds::NONE, &[0.0; 2], NO_LIMIT);
+            let p = Problem { enforcement: &enforcement, ..p };
+            let mut u = [f64::NAN; 2];
+            assert_eq!(Workspace::default().solve(&p, &mut u).outcome, Outcome::Optimal);
+            assert!((u[0] - wanted).abs() <= 1e-15 * wanted && u[1] == 0.0, "{penalty} {unit}: {u:?}");
+        }
+    }
+}
+
+/// min (u₁² + 4 u₂²) under u₁ + u₂ ≥ 5: the dear input moves a quarter as far.
+#[test]
+fn weights_make_an_input_dear() {
+    let rows = [row(&[1.0, 1.0], 5.0), row(&[0.0, 1.0], -1.0)];
+    let p = Problem::new(&rows, &Bounds::NONE, &[0.0; 2], NO_LIMIT);
+    let p = Problem { weights: Some(&[1.0, 4.0]), ..p };
+    let mut u = [f64::NAN; 2];
+    let mut workspace = Workspace::default();
+    workspace.solve(&p, &mut u);
+    assert!((u[0] - 4.0).abs() <= 4e-15 && (u[1] - 1.0).abs() <= 1e-15, "{u:?}");
+    let active: Vec<Active> = workspace.active().to_vec();
+    assert_eq!(active.len(), 1);
+    assert!(active[0].constraint == Constraint::Row(0) && (active[0].multiplier - 4.0).abs() <= 4e-15);
+    let residuals = workspace.residuals(&p, &u);
+    assert!(residuals.stationarity <= 1e-15 && residuals.complementarity <= 1e-15, "{residuals:?}");
+}
+
+#[test]
+fn more_rows_than_fit_are_met_up_to_the_largest_number() {
+    // Tangents of a circle of radius 1 seen from outside.
+    let rows: Vec<Row> = (0..MAX_ROWS)
+        .map(|k| {
+            let angle = k as f64 * std::f64::consts::TAU / MAX_ROWS as f64;
+            row(&[angle.cos(), angle.sin()], -1.0)
+        })
+        .collect();
+    let mut u = [f64::NAN; 2];
+    let solution = solve(&rows, &Bounds::NONE, &[3.0, 4.0], NO_LIMIT, &mut u);
+    assert_eq!((solution.outcome, solution.solver), (Outcome::Optimal, Solver::DualActiveSet));
+    assert!(rows.iter().all(|row| row.holds(&u)) && (u[0].hypot(u[1]) - 1.0).abs() < 2e-3, "{u:?}");
 }
 
 /// A barrier that cannot be influenced does not switch the others off.
@@ -193,7 +272,7 @@ fn a_vanishing_row_leaves_the_others_in_force() {
         let rows = [vanishing, row(&[1.0, 0.0], 3.0)];
         let solution = solve(&rows, &Bounds::NONE, &[0.5, 0.5], NO_LIMIT, &mut u);
         assert_eq!(solution.outcome, Outcome::Degenerate, "{vanishing:?}");
-        assert!((u[0] - 3.0).abs() < GAP && (u[1] - 0.5).abs() < GAP, "{vanishing:?} {u:?}");
+        assert!(u == [3.0, 0.5], "{vanishing:?} {u:?}");
     }
     // The others hold already: the reference is left as it is.
     for vanishing in [row(&[0.0, 0.0], 1.0), row(&[1e-310, 0.0], 1.0), row(&[1e-200, 1e-200], 1.0)] {

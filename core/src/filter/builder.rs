@@ -3,7 +3,6 @@
 use nalgebra::SVector;
 
 use super::{BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Workspace};
-use crate::MAX_INPUTS;
 use crate::barrier::Barrier;
 use crate::convergence::profile::Profile;
 use crate::convergence::sampled::SampledDemand;
@@ -11,7 +10,8 @@ use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource, Derivatives};
-use crate::qp::{Bounds, Row};
+use crate::qp::{self, Bounds, Row};
+use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// Collects barriers and bounds for a [`SafetyFilter`].
 pub struct FilterBuilder {
@@ -273,13 +273,19 @@ impl FilterBuilder {
     ///
     /// # Errors
     ///
-    /// No barrier; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
+    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
     /// a given sampling period, or that a source cannot predict over.
     pub fn build(self) -> Result<SafetyFilter, Error> {
         let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling, delay } = self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if channels.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
+        }
+        if channels.len() > MAX_ROWS {
+            return dimension(
+                "barriers",
+                format!("has {} entries, must have at most {MAX_ROWS}", channels.len()),
+            );
         }
         if state_dim == 0 {
             return dimension("x", "has 0 components, must have at least 1".to_owned());
@@ -312,6 +318,7 @@ impl FilterBuilder {
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],
             report: Report::new(channels.len()),
+            programme: qp::Workspace::default(),
         };
         let deadlines = channels.iter().map(|c| c.promise.settings().deadline);
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));

@@ -22,7 +22,7 @@ use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length};
 use crate::lie::{DerivativeSource, Derivatives};
-use crate::qp::{self, Bounds, Outcome, Row};
+use crate::qp::{self, Bounds, Outcome, Problem, Row};
 use sampling::Held;
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -60,6 +60,7 @@ struct Workspace {
     /// The state from which each barrier is held, one after the other.
     predicted: Vec<f64>,
     report: Report,
+    programme: qp::Workspace,
 }
 
 /// Turns barriers with deadlines into a filter on the input: `min ½‖u − u_ref‖²` under one row per
@@ -103,7 +104,7 @@ impl SafetyFilter {
     /// - `u_ref`: the input wanted by whoever is in control.
     /// - `u`: receives the safe input: always finite and within the bounds.
     ///
-    /// Does not allocate with one barrier. Numerical outcomes (infeasible, degenerate, not-a-number
+    /// Does not allocate. Numerical outcomes (infeasible, degenerate, not-a-number
     /// inputs) are the report's [`Status`], never an error.
     ///
     /// # Errors
@@ -141,7 +142,8 @@ impl SafetyFilter {
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
         let (begin, acting) = (t + self.delay, self.acting());
-        let Workspace { derivatives, rows, demands, next, predicted, report } = &mut self.workspace;
+        let Workspace { derivatives, rows, demands, next, predicted, report, programme } =
+            &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
         if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
@@ -208,14 +210,14 @@ impl SafetyFilter {
             let (t, x) = (begin, &predicted[..]);
             let held = Held { channels, demands, t, x, period, bounds, u_ref, correction_limit: limit };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
-            held.solve(rows, last, u)
+            held.solve(rows, last, programme, u)
         });
         report.predicted = held.is_some();
         let solution = held.unwrap_or_else(|| {
             for (row, b) in rows.iter_mut().zip(&report.barriers) {
                 *row = b.row;
             }
-            qp::solve(rows, &self.bounds, u_ref, limit, u)
+            programme.solve(&Problem::new(rows, &self.bounds, u_ref, limit), u)
         });
         if matches!(self.sampling, Sampling::Measured { .. }) && self.state.time.is_some_and(|last| t > last)
         {

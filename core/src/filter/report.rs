@@ -138,7 +138,7 @@ pub struct Report {
     pub status: Status,
     /// Which method solved the quadratic programme.
     pub solver: Solver,
-    /// Iterations of the interior-point method, else 0.
+    /// Rounds of the active-set method, iterations of the interior-point method, else 0.
     pub iterations: u32,
     /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.
     pub period: f64,

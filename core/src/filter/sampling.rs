@@ -15,7 +15,7 @@ use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;
 use crate::error::{Error, positive};
 use crate::lie::Ahead;
-use crate::qp::{self, Bounds, Outcome, Row, Solution, Solver};
+use crate::qp::{Bounds, Outcome, Problem, Row, Solution, Solver, Workspace};
 
 /// How the filter accounts for inputs that are held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,11 +104,17 @@ impl Held<'_> {
     /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
     /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
     /// them, where a source cannot predict or its prediction is not finite.
-    pub(super) fn solve(&self, rows: &mut [Row], last: Option<&[f64]>, u: &mut [f64]) -> Option<Solution> {
+    pub(super) fn solve(
+        &self,
+        rows: &mut [Row],
+        last: Option<&[f64]>,
+        programme: &mut Workspace,
+        u: &mut [f64],
+    ) -> Option<Solution> {
         let m = u.len();
         let mut pointwise = [0.0; MAX_INPUTS];
         let pointwise = &mut pointwise[..m];
-        let first = qp::solve(rows, self.bounds, self.u_ref, self.correction_limit, pointwise);
+        let first = programme.solve(&self.problem(rows), pointwise);
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
         }
@@ -120,7 +126,7 @@ impl Held<'_> {
         let mut guess = [0.0; MAX_INPUTS];
         for start in [Some(&*pointwise), last].into_iter().flatten() {
             guess[..m].copy_from_slice(start);
-            if let Some(found) = self.newton(&mut guess[..m], rows)
+            if let Some(found) = self.newton(&mut guess[..m], rows, programme)
                 && best.as_ref().is_none_or(|b| found.better_than(b))
             {
                 u.copy_from_slice(&guess[..m]);
@@ -137,6 +143,10 @@ impl Held<'_> {
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
+    }
+
+    fn problem<'b>(&'b self, rows: &'b [Row]) -> Problem<'b> {
+        Problem::new(rows, self.bounds, self.u_ref, self.correction_limit)
     }
 
     /// Writes the sampled rows linearised at `u` and returns the largest violation, 0 if all are met, in
@@ -186,7 +196,7 @@ impl Held<'_> {
     }
 
     /// Newton's method from `u`.
-    fn newton(&self, u: &mut [f64], rows: &mut [Row]) -> Option<Guess> {
+    fn newton(&self, u: &mut [f64], rows: &mut [Row], programme: &mut Workspace) -> Option<Guess> {
         let m = u.len();
         let mut violation = self.violation(u, rows)?;
         let mut found = Guess {
@@ -199,7 +209,7 @@ impl Held<'_> {
         let mut target = [0.0; MAX_INPUTS];
         for _ in 0..ITERATIONS {
             let target = &mut target[..m];
-            let solution = qp::solve(rows, self.bounds, self.u_ref, self.correction_limit, target);
+            let solution = programme.solve(&self.problem(rows), target);
             found.outcome = solution.outcome;
             found.solver = solution.solver;
             found.iterations += solution.iterations;

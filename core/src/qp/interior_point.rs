@@ -1,4 +1,5 @@
-//! Several rows: the interior-point solver clarabel. The only file that names it.
+//! The interior-point solver clarabel, for comparison. The only file that names it. It takes every row as
+//! hard and knows no weights.
 //!
 //! Settings are pinned: equilibration is off, because clarabel fixes its scaling from the first data
 //! it sees; here rows are scaled to unit length and u to the least correction instead. A solver is

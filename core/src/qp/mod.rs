@@ -1,20 +1,38 @@
 //! The quadratic programme `min ½‖u − u_ref‖²` under affine rows and bounds: linear algebra only.
 //!
 //! ```text
-//! minimise ½‖u − u_ref‖²  subject to  a_iᵀ u ≥ b_i (i = 1 … m),  u_min ≤ u ≤ u_max
+//! minimise ½ (u − u_ref)ᵀ W (u − u_ref)  subject to  a_iᵀ u ≥ b_i (i = 1 … m),  u_min ≤ u ≤ u_max
 //! ```
 //!
-//! - u_ref feasible: it is returned unchanged, bit for bit.
-//! - one row: closed form, with or without bounds (module `single_row`), no allocation.
-//! - several rows: an interior-point method (module `interior_point`), which allocates.
+//! with a diagonal W > 0, the identity by default.
 //!
-//! Bounds are never relaxed. Rows that cannot be met within them are violated as little as possible,
-//! and the status says so.
+//! - u_ref feasible: it is returned unchanged, bit for bit.
+//! - one row, W = 1: closed form, with or without bounds (module `single_row`).
+//! - else: a dual active-set method (module `dual_active_set`), exact up to round-off.
+//!
+//! None of these allocates. A wrong answer would show in [`Workspace::residuals`]. clarabel (module `interior_point`), which does, can be chosen instead.
+//!
+//! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible:
+//! each in the order of priority (then of the list) as little as those before it allow, and among the inputs
+//! that do so the one nearest to u_ref is returned. Soft rows ([`Enforcement::Soft`]) yield to every hard
+//! one. The outcome says which it was, [`Workspace::is_relaxed`] which rows.
+//!
+//! A row whose normal vanishes, or that would move u by more than the correction limit, is degenerate:
+//! where there are several rows it is left out and the others are met.
+//!
+//! There is no warm start: problems of the intended size need one to three rounds from u_ref, and where the
+//! active rows are not unique another start would change the last bits of the answer.
 
+mod dual_active_set;
+mod factors;
 mod interior_point;
+mod kkt;
 mod single_row;
 
-use crate::MAX_INPUTS;
+pub use kkt::Residuals;
+
+use crate::{MAX_INPUTS, MAX_ROWS};
+use dual_active_set::DualActiveSet;
 
 /// One row aᵀu ≥ b.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,15 +73,19 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// `row` times the power of two that brings the largest component of its normal to 1 ..< 2: exact, and
-/// out of reach of overflow. `None` where the normal vanishes (is zero or subnormal).
-fn scaled(row: &Row) -> Option<Row> {
+/// The power of two that brings the largest component of `normal` to 1 ..< 2: multiplying by it is exact.
+/// `None` where the normal vanishes (is zero or subnormal).
+fn power_of_two(normal: &[f64]) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
-    let largest = row.normal.iter().fold(0.0, |s: f64, a| s.max(a.abs()));
-    if largest < f64::MIN_POSITIVE {
-        return None;
-    }
-    let scale = 1.0 / f64::from_bits(largest.to_bits() & EXPONENT);
+    // Exponents compare, and change sign, as whole numbers; 2^1023 has no normal inverse and goes to 2 ..< 4.
+    let largest = normal.iter().fold(0, |s, a| (a.to_bits() & EXPONENT).max(s));
+    const ONE: u64 = 1 << 52;
+    (largest > 0).then(|| f64::from_bits((EXPONENT - ONE).saturating_sub(largest).max(ONE)))
+}
+
+/// `row` times [`power_of_two`]: out of reach of overflow.
+fn scaled(row: &Row) -> Option<Row> {
+    let scale = power_of_two(&row.normal)?;
     Some(Row { normal: row.normal.map(|a| a * scale), floor: row.floor * scale })
 }
 
@@ -97,16 +119,72 @@ impl Bounds {
     }
 }
 
-/// Which method produced the answer.
+/// How strictly a row is enforced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Enforcement {
+    /// Met wherever bounds and the rows of higher priority allow. The smaller number goes first; of equal
+    /// ones the row listed first.
+    Hard {
+        /// 0 first.
+        priority: u32,
+    },
+    /// Exact (L1) penalty: the row yields once it costs more than this distance in u. Its multiplier, for a
+    /// normal of length 1, does not exceed `penalty`.
+    Soft {
+        /// In units of u (of √W u where there are weights), > 0.
+        penalty: f64,
+    },
+}
+
+/// One programme.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a> {
+    /// At most [`MAX_ROWS`].
+    pub rows: &'a [Row],
+    /// Never relaxed.
+    pub bounds: &'a Bounds,
+    /// Finite, 1 to [`MAX_INPUTS`] components.
+    pub u_ref: &'a [f64],
+    /// The diagonal of W, finite and > 0, in 1/(unit of u)²; `None` for ones.
+    pub weights: Option<&'a [f64]>,
+    /// Of each row; rows beyond its end are hard with priority 0.
+    pub enforcement: &'a [Enforcement],
+    /// How far, > 0 in units of u, the rows may move u from the reference within its bounds: one that needs
+    /// more is degenerate.
+    pub correction_limit: f64,
+}
+
+impl<'a> Problem<'a> {
+    /// Hard rows of equal priority, W = 1.
+    pub fn new(rows: &'a [Row], bounds: &'a Bounds, u_ref: &'a [f64], correction_limit: f64) -> Self {
+        Self { rows, bounds, u_ref, weights: None, enforcement: &[], correction_limit }
+    }
+}
+
+/// Which method solves problems that no closed form does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// The dual active-set method: exact up to round-off, no allocation.
+    #[default]
+    DualActiveSet,
+    /// The interior-point method clarabel, for comparison: accurate to about 1e-6 of the correction. It
+    /// takes rows as hard, relaxes them together where they cannot be met, and ignores weights.
+    InteriorPoint,
+}
+
+/// Which method produced the answer. The numbers are stable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Solver {
     /// None was needed: u_ref was feasible.
     #[default]
-    Unchanged,
+    Unchanged = 0,
     /// The closed form for one row.
-    ClosedForm,
+    ClosedForm = 1,
     /// The interior-point method.
-    InteriorPoint,
+    InteriorPoint = 2,
+    /// The dual active-set method.
+    DualActiveSet = 3,
 }
 
 /// What the returned input is.
@@ -114,12 +192,13 @@ pub enum Solver {
 pub enum Outcome {
     /// The minimiser.
     Optimal,
-    /// A row cannot be met within the bounds: the bounded input of least violation.
+    /// A hard row cannot be met within the bounds: the bounded input of least violation.
     Infeasible,
     /// A row cannot be met because its normal is too small: meeting it would change u by more than the
-    /// correction limit. The bounded input of least violation; u_ref where there are no bounds.
+    /// correction limit. One row alone: the bounded input of least violation, u_ref where there are no
+    /// bounds. Several: the row is left out, the others are met as they can be.
     Degenerate,
-    /// The interior-point method did not converge: u_ref within its bounds.
+    /// The method did not converge: u_ref within its bounds.
     Failed,
 }
 
@@ -130,26 +209,171 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Which method produced it.
     pub solver: Solver,
-    /// Iterations of the interior-point method, else 0.
+    /// Rounds of the active-set method or iterations of the interior-point method, else 0.
     pub iterations: u32,
 }
 
-/// Solves the programme into `u`, which has the length of `u_ref` (finite, 1 to [`MAX_INPUTS`]).
-///
-/// `correction_limit` > 0 bounds how far the rows may move u from the reference within its bounds: one
-/// that needs more is degenerate.
-pub fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], correction_limit: f64, u: &mut [f64]) -> Solution {
-    for (i, (ui, r)) in u.iter_mut().zip(u_ref).enumerate() {
-        *ui = bounds.clamp(i, *r);
+/// What can be active.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Constraint {
+    /// A row, by its place in the list.
+    Row(usize),
+    /// The lower bound of a component.
+    Lower(usize),
+    /// The upper bound of a component.
+    Upper(usize),
+}
+
+/// One active row or bound: W (u − u_ref) is the sum of all normals times their multipliers. The normal of
+/// an upper bound is −1 in its component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Active {
+    /// Which one.
+    pub constraint: Constraint,
+    /// For the normal as given. ≥ 0 up to round-off, but for the rows and bounds that forbid a hard row.
+    pub multiplier: f64,
+}
+
+/// The memory of a solve, to be used again and again. Nothing in it changes the next answer.
+#[derive(Clone)]
+pub struct Workspace {
+    backend: Backend,
+    // The method for the number of inputs, rounded up: a third of the time of the last one for two inputs.
+    two: DualActiveSet<2>,
+    four: DualActiveSet<4>,
+    any: DualActiveSet<MAX_INPUTS>,
+    active: [Active; MAX_ROWS + MAX_INPUTS],
+    active_len: usize,
+    relaxed: u64,
+    lost: u64,
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new(Backend::default())
     }
-    if rows.iter().all(|row| row.slack(u) >= 0.0) {
-        return Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 };
-    }
-    match rows {
-        [row] => {
-            let outcome = single_row::solve(row, bounds, u_ref, correction_limit, u);
-            Solution { outcome, solver: Solver::ClosedForm, iterations: 0 }
+}
+
+impl Workspace {
+    /// For any problem, with this method where there is no closed form.
+    pub const fn new(backend: Backend) -> Self {
+        Self {
+            backend,
+            two: DualActiveSet::EMPTY,
+            four: DualActiveSet::EMPTY,
+            any: DualActiveSet::EMPTY,
+            active: [Active { constraint: Constraint::Row(0), multiplier: 0.0 }; MAX_ROWS + MAX_INPUTS],
+            active_len: 0,
+            relaxed: 0,
+            lost: 0,
         }
-        _ => interior_point::solve(rows, bounds, u_ref, correction_limit, u),
     }
+
+    /// Solves into `u`, which has the length of `u_ref`. The result is finite and within the bounds.
+    ///
+    /// # Panics
+    ///
+    /// More than [`MAX_ROWS`] rows.
+    pub fn solve(&mut self, p: &Problem, u: &mut [f64]) -> Solution {
+        assert!(p.rows.len() <= MAX_ROWS, "{} rows, must be at most {MAX_ROWS}", p.rows.len());
+        for (i, (ui, r)) in u.iter_mut().zip(p.u_ref).enumerate() {
+            *ui = p.bounds.clamp(i, *r);
+        }
+        (self.active_len, self.relaxed, self.lost) = (0, 0, 0);
+        if p.rows.iter().all(|row| row.slack(u) >= 0.0) {
+            self.take_over(p, u, 0.0);
+            return Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 };
+        }
+        let soft = || p.enforcement.iter().any(|e| matches!(e, Enforcement::Soft { .. }));
+        if let [row] = p.rows
+            && p.weights.is_none()
+            && !soft()
+        {
+            let (outcome, multiplier) = single_row::solve(row, p.bounds, p.u_ref, p.correction_limit, u);
+            match outcome {
+                Outcome::Optimal => self.take_over(p, u, multiplier),
+                Outcome::Infeasible => self.relaxed = 1,
+                Outcome::Degenerate | Outcome::Failed => self.lost = 1,
+            }
+            return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
+        }
+        if self.backend == Backend::InteriorPoint {
+            return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
+        }
+        let Self { two, four, any, active, active_len, relaxed, lost, .. } = self;
+        let (outcome, iterations);
+        macro_rules! solve_with {
+            ($method:ident) => {{
+                (outcome, iterations) = $method.solve(p, u);
+                (*relaxed, *lost) = ($method.relaxed, $method.lost);
+                for (to, found) in active.iter_mut().zip($method.active(p)) {
+                    *to = found;
+                    *active_len += 1;
+                }
+            }};
+        }
+        match u.len() {
+            ..=2 => solve_with!(two),
+            3..=4 => solve_with!(four),
+            _ => solve_with!(any),
+        }
+        Solution { outcome, solver: Solver::DualActiveSet, iterations }
+    }
+
+    /// Notes what is active in an answer found without a method: the first row, by its multiplier, and the
+    /// bounds that hold `u`.
+    fn take_over(&mut self, p: &Problem, u: &[f64], multiplier: f64) {
+        let mut push = |constraint, multiplier: f64| {
+            self.active[self.active_len] = Active { constraint, multiplier };
+            self.active_len += 1;
+        };
+        if multiplier > 0.0 {
+            push(Constraint::Row(0), multiplier);
+        } else if u == p.u_ref {
+            return;
+        }
+        for (i, &v) in u.iter().enumerate() {
+            let pull = p.rows.first().map_or(0.0, |row| multiplier * row.normal[i]);
+            let held = p.weights.map_or(1.0, |w| w[i]) * (v - p.u_ref[i]) - pull;
+            if held > 0.0 && v == p.bounds.min[i] {
+                push(Constraint::Lower(i), held);
+            } else if held < 0.0 && v == p.bounds.max[i] {
+                push(Constraint::Upper(i), -held);
+            }
+        }
+    }
+
+    /// The active rows and bounds of the last solve, soft rows at their largest multiplier last. Empty after
+    /// the interior-point method, and after one row that cannot be met.
+    pub fn active(&self) -> &[Active] {
+        &self.active[..self.active_len]
+    }
+
+    /// Whether row `i` of the last solve was given up because it cannot be met ([`Outcome::Infeasible`]).
+    /// Unknown to the interior-point method.
+    pub fn is_relaxed(&self, i: usize) -> bool {
+        i < MAX_ROWS && self.relaxed >> i & 1 == 1
+    }
+
+    /// Whether row `i` of the last solve was degenerate ([`Outcome::Degenerate`]). Unknown to the
+    /// interior-point method.
+    pub fn is_degenerate(&self, i: usize) -> bool {
+        i < MAX_ROWS && self.lost >> i & 1 == 1
+    }
+
+    /// How far `u` is from satisfying the conditions of optimality, with the active rows of the last solve,
+    /// which was of `p`.
+    pub fn residuals(&self, p: &Problem, u: &[f64]) -> Residuals {
+        Residuals::of(p, u, self.active())
+    }
+}
+
+/// Solves one programme of hard rows with W = 1 into `u`, as [`Workspace::solve`] does: a workspace saves the
+/// cost of making one.
+///
+/// # Panics
+///
+/// As [`Workspace::solve`].
+pub fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], correction_limit: f64, u: &mut [f64]) -> Solution {
+    Workspace::default().solve(&Problem::new(rows, bounds, u_ref, correction_limit), u)
 }

@@ -7,19 +7,20 @@
 
 use std::array::from_fn;
 
-use super::{Bounds, Outcome, Row, distance_from_clamped, scaled};
+use super::{Bounds, Outcome, Row, distance_from_clamped, power_of_two, scaled};
 use crate::MAX_INPUTS;
 
 /// A component of the normal below this part of the largest one cannot influence the row: its square
 /// would underflow.
 const NEGLIGIBLE: f64 = 1e-150;
 
-/// Solves into `u`; called where the row does not hold at the clamped `u_ref`.
-pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &mut [f64]) -> Outcome {
+/// Solves into `u`; called where the row does not hold at the clamped `u_ref`. Returns the multiplier too,
+/// 0 unless the row holds.
+pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &mut [f64]) -> (Outcome, f64) {
     let m = u.len();
     let Some(Row { normal: a, floor }) = scaled(row) else {
         least_violation(row, bounds, u_ref, u);
-        return Outcome::Degenerate;
+        return (Outcome::Degenerate, 0.0);
     };
     let moves = |i: usize| a[i].abs() >= NEGLIGIBLE;
     // The multipliers between which component i moves: a reference outside its bounds moves only once
@@ -65,18 +66,19 @@ pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &m
             // λ is known to the round-off of the terms at u_ref, which may be far larger than those at u.
             let met = row.slack(u) >= -row.round_off(u) - row.round_off(u_ref);
             if met && distance_from_clamped(u, bounds, u_ref) <= limit {
-                return Outcome::Optimal;
+                return (Outcome::Optimal, solution.max(lambda) * power_of_two(&row.normal).unwrap_or(1.0));
             }
             least_violation(row, bounds, u_ref, u);
-            return Outcome::Degenerate;
+            return (Outcome::Degenerate, 0.0);
         }
         if next.is_infinite() {
             // Every component that can help is at its bound, or too flat to get there.
-            return match least_violation(row, bounds, u_ref, u) {
+            let outcome = match least_violation(row, bounds, u_ref, u) {
                 false => Outcome::Degenerate,
                 true if slope == 0.0 && row.holds(u) => Outcome::Optimal,
                 true => Outcome::Infeasible,
             };
+            return (outcome, 0.0);
         }
         lambda = next;
     }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub(crate) mod random;
+
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use punctual_core::MAX_INPUTS;
