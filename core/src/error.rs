@@ -103,10 +103,11 @@ pub(crate) fn finite(field: &str, value: f64) -> Result<f64, Error> {
 }
 
 /// `Ok(())` if `found` equals `wanted`.
+#[inline]
 pub(crate) fn length(field: &str, found: usize, wanted: usize) -> Result<(), Error> {
-    if found == wanted {
-        Ok(())
-    } else {
-        Err(Error::new(ErrorKind::Dimension, field, format!("has {found} components, must have {wanted}")))
+    #[cold]
+    fn wrong(field: &str, found: usize, wanted: usize) -> Error {
+        Error::new(ErrorKind::Dimension, field, format!("has {found} components, must have {wanted}"))
     }
+    if found == wanted { Ok(()) } else { Err(wrong(field, found, wanted)) }
 }

@@ -2,7 +2,9 @@
 
 use nalgebra::SVector;
 
-use super::{BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Workspace};
+use super::{
+    BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Strictness, Workspace,
+};
 use crate::barrier::Barrier;
 use crate::convergence::profile::Profile;
 use crate::convergence::sampled::SampledDemand;
@@ -10,7 +12,7 @@ use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource, Derivatives};
-use crate::qp::{self, Bounds, Row};
+use crate::qp::{self, Backend, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// Collects barriers and bounds for a [`SafetyFilter`].
@@ -22,6 +24,7 @@ pub struct FilterBuilder {
     correction_limit: f64,
     sampling: Sampling,
     delay: f64,
+    backend: Backend,
 }
 
 impl FilterBuilder {
@@ -37,6 +40,7 @@ impl FilterBuilder {
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
             delay: 0.0,
+            backend: Backend::default(),
         }
     }
 
@@ -201,6 +205,33 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// What becomes of the last barrier added where not all can be met. Default: [`Strictness::KeepFirst`].
+    ///
+    /// # Errors
+    ///
+    /// No barrier yet; a penalty that is not finite or ≤ 0.
+    pub fn strictness(mut self, strictness: Strictness) -> Result<Self, Error> {
+        let Some(channel) = self.channels.last_mut() else {
+            return Err(Error::new(
+                ErrorKind::Dimension,
+                "strictness",
+                "there is no barrier yet to have one",
+            ));
+        };
+        if let Strictness::Soft(penalty) = strictness {
+            positive("penalty", penalty).map_err(|e| e.within(&channel.name))?;
+        }
+        channel.strictness = strictness;
+        Ok(self)
+    }
+
+    /// Which method solves programmes of several rows. Default: [`Backend::DualActiveSet`], which does not
+    /// allocate; the other is for comparison and knows no priorities.
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
+        self
+    }
+
     /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity where there is none.
     /// Default: none.
     ///
@@ -276,7 +307,8 @@ impl FilterBuilder {
     /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
     /// a given sampling period, or that a source cannot predict over.
     pub fn build(self) -> Result<SafetyFilter, Error> {
-        let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling, delay } = self;
+        let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling, delay, backend } =
+            self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if channels.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
@@ -314,11 +346,12 @@ impl FilterBuilder {
         let workspace = Workspace {
             derivatives: Derivatives::ZERO,
             rows: vec![Row::ZERO; channels.len()],
+            enforcement: vec![Enforcement::Hard { priority: 0 }; channels.len()],
             demands: vec![SampledDemand::ZERO; channels.len()],
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],
             report: Report::new(channels.len()),
-            programme: qp::Workspace::default(),
+            programme: qp::Workspace::new(backend),
         };
         let deadlines = channels.iter().map(|c| c.promise.settings().deadline);
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));

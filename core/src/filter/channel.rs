@@ -3,6 +3,7 @@
 use super::{FixedTimeState, Phase};
 use crate::convergence::FixedTime;
 use crate::lie::DerivativeSource;
+use crate::qp::Enforcement;
 
 /// When a barrier begins to be enforced. Its deadline counts from the filter's first sample in any case, so
 /// that "be in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
@@ -29,6 +30,21 @@ pub enum End {
     OnArrival,
 }
 
+/// What becomes of a barrier's constraint where not all can be met within the input bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Strictness {
+    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: what is safe is kept before
+    /// what is promised is reached.
+    #[default]
+    KeepFirst,
+    /// Hard: met as far as the bounds and the barriers of smaller numbers allow; of equal ones the one added
+    /// first goes first.
+    Priority(u32),
+    /// Soft, with an exact penalty: it yields, also to u_ref, where it would cost more than this distance
+    /// ‖u − u_ref‖, in units of u, finite, > 0.
+    Soft(f64),
+}
+
 /// One barrier of a filter.
 pub(super) struct Channel {
     pub(super) name: String,
@@ -36,6 +52,7 @@ pub(super) struct Channel {
     pub(super) promise: FixedTime,
     pub(super) begin: Begin,
     pub(super) end: End,
+    pub(super) strictness: Strictness,
 }
 
 /// Round-off of a time that is a sum of steps, as a part of it.
@@ -43,8 +60,17 @@ const SAME_TIME: f64 = 1e-12;
 
 impl Channel {
     pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
-        let (begin, end) = (Begin::default(), End::default());
-        Self { name: name.to_owned(), source, promise, begin, end }
+        let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
+        Self { name: name.to_owned(), source, promise, begin, end, strictness }
+    }
+
+    /// How strictly its row is enforced.
+    pub(super) fn enforcement(&self, promise: &FixedTimeState) -> Enforcement {
+        match self.strictness {
+            Strictness::KeepFirst => Enforcement::Hard { priority: u32::from(!promise.was_inside()) },
+            Strictness::Priority(priority) => Enforcement::Hard { priority },
+            Strictness::Soft(penalty) => Enforcement::Soft { penalty },
+        }
     }
 
     /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it

@@ -13,7 +13,7 @@ mod sampling;
 pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase, Refusal};
 pub use builder::FilterBuilder;
 use channel::Channel;
-pub use channel::{Begin, End};
+pub use channel::{Begin, End, Strictness};
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 
@@ -22,7 +22,7 @@ use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length};
 use crate::lie::{DerivativeSource, Derivatives};
-use crate::qp::{self, Bounds, Outcome, Problem, Row};
+use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Row};
 use sampling::Held;
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -55,6 +55,7 @@ impl Clone for FilterState {
 struct Workspace {
     derivatives: Derivatives,
     rows: Vec<Row>,
+    enforcement: Vec<Enforcement>,
     demands: Vec<SampledDemand>,
     next: FilterState,
     /// The state from which each barrier is held, one after the other.
@@ -123,7 +124,7 @@ impl SafetyFilter {
     /// ```
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        self.state.clone_from(&self.workspace.next);
+        std::mem::swap(&mut self.state, &mut self.workspace.next);
         Ok(&self.workspace.report)
     }
 
@@ -141,13 +142,15 @@ impl SafetyFilter {
         length("x", x.len(), self.state_dim)?;
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        let (begin, acting) = (t + self.delay, self.acting());
-        let Workspace { derivatives, rows, demands, next, predicted, report, programme } =
+        let begin = t + self.delay;
+        let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
+        let Workspace { derivatives, rows, enforcement, demands, next, predicted, report, programme } =
             &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
-        if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
+        if !t.is_finite() || !finite(x) || !finite(u_ref) {
             report.status = Status::InvalidInput;
+            report.barriers.fill(BarrierReport::BLANK);
             abstain(&self.state, &self.bounds, next, report, u);
             return Ok(());
         }
@@ -167,33 +170,33 @@ impl SafetyFilter {
             }
             let n = channel.source.relative_degree();
             let report_b = &mut report.barriers[i];
-            report_b.h = h;
             if !channel.in_force(&mut next.barriers, i, t, h) {
                 (rows[i], demands[i]) = (Row::ZERO, SampledDemand::ZERO);
+                *report_b = BarrierReport { h, ..BarrierReport::BLANK };
                 report_b.remember(&next.barriers[i]);
                 continue;
             }
             let promise = &mut next.barriers[i];
             if let Some(status) = defect(derivatives) {
                 report.status = status;
+                *report_b = BarrierReport { h, ..BarrierReport::BLANK };
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
             channel.anchor(promise, (begin, self.delay), &derivatives.drift[..n], (period, first));
             let demand = channel.promise.advance(promise, begin, &derivatives.drift[..n]);
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
-            rows[i] = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
+            let row = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
+            rows[i] = row;
+            enforcement[i] = channel.enforcement(promise);
             if let Some(period) = period {
                 match channel.promise.over_period(promise, begin, &derivatives.drift[..n], period) {
                     Some(demand) => demands[i] = demand,
                     None => sampled = None,
                 }
             }
-            report_b.row = rows[i];
-            report_b.profile = demand.profile;
-            report_b.time_left = demand.time_left;
-            report_b.remember(promise);
-            if !rows[i].floor.is_finite() {
+            *report_b = BarrierReport::of(promise, h, demand, row);
+            if !row.floor.is_finite() {
                 report.status = Status::Singular;
             }
         }
@@ -208,16 +211,18 @@ impl SafetyFilter {
             report.period = period;
             let (channels, bounds) = (&self.channels[..], &self.bounds);
             let (t, x) = (begin, &predicted[..]);
-            let held = Held { channels, demands, t, x, period, bounds, u_ref, correction_limit: limit };
+            let enforcement = &enforcement[..];
+            let held =
+                Held { channels, demands, t, x, period, bounds, u_ref, enforcement, correction_limit: limit };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             held.solve(rows, last, programme, u)
         });
         report.predicted = held.is_some();
         let solution = held.unwrap_or_else(|| {
-            for (row, b) in rows.iter_mut().zip(&report.barriers) {
-                *row = b.row;
+            if sampled.is_some() {
+                rows.iter_mut().zip(&report.barriers).for_each(|(row, b)| *row = b.row);
             }
-            programme.solve(&Problem::new(rows, &self.bounds, u_ref, limit), u)
+            programme.solve(&Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) }, u)
         });
         if matches!(self.sampling, Sampling::Measured { .. }) && self.state.time.is_some_and(|last| t > last)
         {
@@ -234,6 +239,7 @@ impl SafetyFilter {
             Outcome::Degenerate => Status::Degenerate,
             Outcome::Failed => Status::SolverFailed,
         };
+        let mut blocked = false;
         for (i, row) in rows.iter().enumerate() {
             let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
             if matches!(promise.phase, Phase::Waiting | Phase::Released) {
@@ -242,17 +248,25 @@ impl SafetyFilter {
             if let Some(period) = period.filter(|_| report.predicted) {
                 report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period);
             }
-            report_b.row = *row;
+            if report.predicted {
+                report_b.row = *row;
+            }
             report_b.slack = row.slack(u);
+            let soft = matches!(enforcement[i], Enforcement::Soft { .. });
             promise.unmet = match promise.unmet {
-                _ if report.status.is_satisfied() || row.holds(u) => None,
+                _ if report.status.is_satisfied() && !soft || row.holds(u) => None,
                 Some(unmet) => Some(Unmet { steps: unmet.steps.saturating_add(1), ..unmet }),
                 None => Some(Unmet { steps: 1, since: t, h: report_b.h }),
             };
-            promise.guaranteed &= promise.unmet.is_none();
-            report_b.remember(promise);
+            if let Some(unmet) = promise.unmet {
+                promise.guaranteed = false;
+                (report_b.guaranteed, report_b.unmet_steps) = (false, unmet.steps);
+                blocked = true;
+            }
         }
-        report.find_deadlocks(t, &next.barriers, u);
+        if blocked {
+            report.find_deadlocks(t, &next.barriers, u);
+        }
         Ok(())
     }
 
@@ -374,6 +388,13 @@ fn defect(derivatives: &Derivatives) -> Option<Status> {
     if !derivatives.is_finite() {
         return Some(Status::Singular);
     }
+    if derivatives.lower_sensitivity <= ROUND_OFF {
+        return None;
+    }
     let size = derivatives.row.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
     (derivatives.lower_sensitivity > ROUND_OFF * size).then_some(Status::WrongRelativeDegree)
+}
+
+fn finite(values: &[f64]) -> bool {
+    values.iter().all(|v| v.is_finite())
 }

@@ -1,6 +1,6 @@
 //! What a step says about itself.
 
-use crate::convergence::{FixedTimeState, Phase};
+use crate::convergence::{Demand, FixedTimeState, Phase};
 use crate::qp::{Row, Solver, dot};
 
 /// How a step ended, and so what the returned input means. The numbers are stable: they leave the
@@ -116,6 +116,29 @@ impl BarrierReport {
         sampling_loss: 0.0,
     };
 
+    /// Before the programme is solved.
+    #[inline]
+    pub(super) fn of(promise: &FixedTimeState, h: f64, demand: Demand, row: Row) -> Self {
+        Self {
+            h,
+            phase: promise.phase,
+            profile: demand.profile,
+            time_left: demand.time_left,
+            arrived: promise.arrival.is_some(),
+            arrival_time: promise.arrival,
+            guaranteed: promise.guaranteed,
+            margin: promise.margin,
+            fallback: promise.fallback,
+            recoveries: promise.recoveries,
+            row,
+            slack: 0.0,
+            unmet_steps: 0,
+            blocked_by: None,
+            deadlocked: false,
+            sampling_loss: 0.0,
+        }
+    }
+
     /// Fills in what the promise remembers.
     pub(super) fn remember(&mut self, promise: &FixedTimeState) {
         self.phase = promise.phase;
@@ -193,6 +216,7 @@ impl Report {
         }
     }
 
+    /// All but the barriers, which a sample writes anew.
     pub(super) fn reset(&mut self, t: f64) {
         self.time = t;
         self.status = Status::Unchanged;
@@ -200,6 +224,5 @@ impl Report {
         self.iterations = 0;
         self.period = 0.0;
         self.predicted = false;
-        self.barriers.fill(BarrierReport::BLANK);
     }
 }

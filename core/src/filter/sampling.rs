@@ -11,11 +11,11 @@
 //! the turn that was begun on through the instants at which the linearisation cannot see it.
 
 use super::{Channel, FilterState};
-use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;
 use crate::error::{Error, positive};
 use crate::lie::Ahead;
-use crate::qp::{Bounds, Outcome, Problem, Row, Solution, Solver, Workspace};
+use crate::qp::{Bounds, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
+use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// How the filter accounts for inputs that are held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,22 @@ pub(super) struct Held<'a> {
     pub(super) period: f64,
     pub(super) bounds: &'a Bounds,
     pub(super) u_ref: &'a [f64],
+    pub(super) enforcement: &'a [Enforcement],
     pub(super) correction_limit: f64,
+}
+
+/// The rows linearised at some u, and how far each is from being met there, in units of its terms.
+struct Linearised<'a> {
+    rows: &'a mut [Row],
+    violations: [f64; MAX_ROWS],
+}
+
+impl Linearised<'_> {
+    /// The largest violation among the rows that are not in `given_up`, 0 if all are met.
+    fn worst(&self, given_up: u64) -> f64 {
+        let kept = |i: &usize| given_up >> i & 1 == 0;
+        (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
+    }
 }
 
 impl Held<'_> {
@@ -112,21 +127,23 @@ impl Held<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
+        let mut at = Linearised { rows, violations: [0.0; MAX_ROWS] };
         let mut pointwise = [0.0; MAX_INPUTS];
         let pointwise = &mut pointwise[..m];
-        let first = programme.solve(&self.problem(rows), pointwise);
+        let first = programme.solve(&self.problem(at.rows), pointwise);
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
         }
         // Nothing to do where u_ref meets the sampled rows.
-        if self.violation(u, rows)? <= 0.0 {
+        self.linearise(u, &mut at)?;
+        if at.worst(0) <= 0.0 {
             return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
         }
         let mut best: Option<Guess> = None;
         let mut guess = [0.0; MAX_INPUTS];
         for start in [Some(&*pointwise), last].into_iter().flatten() {
             guess[..m].copy_from_slice(start);
-            if let Some(found) = self.newton(&mut guess[..m], rows, programme)
+            if let Some(found) = self.newton(&mut guess[..m], &mut at, programme)
                 && best.as_ref().is_none_or(|b| found.better_than(b))
             {
                 u.copy_from_slice(&guess[..m]);
@@ -134,28 +151,39 @@ impl Held<'_> {
             }
         }
         let best = best?;
-        self.violation(u, rows)?;
+        self.linearise(u, &mut at)?;
         let outcome = match best.outcome {
-            _ if best.violation <= 0.0 => Outcome::Optimal,
+            Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
             // The linearised rows can be met, the rows themselves could not.
             Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
             Outcome::Optimal => Outcome::Degenerate,
+            // What was given up on the way has been met after all.
+            Outcome::Infeasible | Outcome::Degenerate if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
     }
 
     fn problem<'b>(&'b self, rows: &'b [Row]) -> Problem<'b> {
-        Problem::new(rows, self.bounds, self.u_ref, self.correction_limit)
+        let plain = Problem::new(rows, self.bounds, self.u_ref, self.correction_limit);
+        Problem { enforcement: self.enforcement, ..plain }
     }
 
-    /// Writes the sampled rows linearised at `u` and returns the largest violation, 0 if all are met, in
-    /// units of the terms of its row. `None` where there is no finite prediction.
-    fn violation(&self, u: &[f64], rows: &mut [Row]) -> Option<f64> {
-        let mut worst: f64 = 0.0;
+    /// The soft rows, one bit each.
+    fn soft(&self) -> u64 {
+        let soft = |e: &Enforcement| matches!(e, Enforcement::Soft { .. });
+        self.enforcement.iter().enumerate().filter(|(_, e)| soft(e)).fold(0, |bits, (i, _)| bits | 1 << i)
+    }
+
+    /// Linearises the sampled rows at `u`. `None` where there is no finite prediction.
+    fn linearise(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
         let mut ahead = Ahead::ZERO;
         let states = self.x.chunks_exact(self.x.len() / self.channels.len());
-        for (((channel, demand), x), row) in self.channels.iter().zip(self.demands).zip(states).zip(rows) {
+        let rows = at.rows.iter_mut().zip(&mut at.violations);
+        for (((channel, demand), x), (row, violation)) in
+            self.channels.iter().zip(self.demands).zip(states).zip(rows)
+        {
+            *violation = 0.0;
             if demand.is_zero() {
                 *row = Row::ZERO;
                 continue;
@@ -189,18 +217,20 @@ impl Held<'_> {
             // Near a floor of 0 the ends are small differences of what the input moves.
             let terms = terms / self.period + moved;
             if value < -MET * terms {
-                worst = worst.max(-value / terms);
+                *violation = -value / terms;
             }
         }
-        Some(worst)
+        Some(())
     }
 
-    /// Newton's method from `u`.
-    fn newton(&self, u: &mut [f64], rows: &mut [Row], programme: &mut Workspace) -> Option<Guess> {
+    /// Newton's method from `u`, on the rows that the linearised programme does not give up.
+    fn newton(&self, u: &mut [f64], at: &mut Linearised, programme: &mut Workspace) -> Option<Guess> {
         let m = u.len();
-        let mut violation = self.violation(u, rows)?;
+        self.linearise(u, at)?;
+        let soft = self.soft();
         let mut found = Guess {
-            violation,
+            given_up: 0,
+            violation: at.worst(soft),
             distance: 0.0,
             outcome: Outcome::Optimal,
             solver: Solver::Unchanged,
@@ -209,13 +239,17 @@ impl Held<'_> {
         let mut target = [0.0; MAX_INPUTS];
         for _ in 0..ITERATIONS {
             let target = &mut target[..m];
-            let solution = programme.solve(&self.problem(rows), target);
+            let solution = programme.solve(&self.problem(at.rows), target);
+            let lost = |i: usize| programme.is_relaxed(i) || programme.is_degenerate(i);
+            found.given_up = (0..at.rows.len()).filter(|i| lost(*i)).fold(soft, |bits, i| bits | 1 << i);
             found.outcome = solution.outcome;
             found.solver = solution.solver;
             found.iterations += solution.iterations;
+            let violation = at.worst(found.given_up);
             let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
             let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
+            found.violation = violation;
             if violation <= 0.0 && way <= MET * size {
                 break;
             }
@@ -225,22 +259,22 @@ impl Held<'_> {
                 for i in 0..m {
                     u[i] = from[i] + part * (target[i] - from[i]);
                 }
-                if let Some(there) = self.violation(u, rows)
-                    && (there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation)
-                {
-                    violation = there;
-                    moved = true;
-                    break;
+                if self.linearise(u, at).is_some() {
+                    let there = at.worst(found.given_up);
+                    if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
+                        found.violation = there;
+                        moved = true;
+                        break;
+                    }
                 }
                 part /= 2.0;
             }
             if !moved {
                 u.copy_from_slice(&from[..m]);
-                self.violation(u, rows)?;
+                self.linearise(u, at)?;
                 break;
             }
         }
-        found.violation = violation;
         found.distance = u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
         Some(found)
     }
@@ -248,6 +282,8 @@ impl Held<'_> {
 
 /// What a search came to.
 struct Guess {
+    /// The rows that are not among those counted in `violation`, one bit each.
+    given_up: u64,
     violation: f64,
     distance: f64,
     outcome: Outcome,
@@ -257,6 +293,7 @@ struct Guess {
 
 impl Guess {
     fn better_than(&self, other: &Self) -> bool {
-        (self.violation, self.distance) < (other.violation, other.distance)
+        let key = |g: &Self| (g.given_up.count_ones(), g.violation, g.distance);
+        key(self) < key(other)
     }
 }
