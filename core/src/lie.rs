@@ -1,13 +1,8 @@
 //! Lie derivatives of a barrier along a plant, of any order, by Taylor jets.
 //!
 //! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one
-//! after the other from
-//!
-//! ```math
-//! (k+1)\, x_{k+1} = \bigl[\, f(x) + g(x)\, u \,\bigr]_k;
-//! ```
-//!
-//! then `h(t, x)` evaluated on that series has the coefficients `h⁽ᵏ⁾(t₀)/k!`. The components of u are dual numbers, value 0 and derivative 1
+//! after the other from `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series
+//! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. The components of u are dual numbers, value 0 and derivative 1
 //! along their own direction, so that at relative degree n
 //!
 //! ```math
