@@ -5,10 +5,12 @@
 //! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. Series are taken at u = 0 with their derivatives along u
 //! ([`Response`]), so that at relative degree n
 //!
-//! ```text
-//! h⁽ᵏ⁾ = L_fᵏ h                               k = 0 … n, the value part       (1)
-//! ∂h⁽ⁿ⁾/∂u = L_g L_f^(n−1) h                  the gradient part at k = n      (2)
-//! ∂h⁽ᵏ⁾/∂u = 0                                k < n                           (3)
+//! ```math
+//! \begin{align}
+//! h^{(k)} &= L_f^k h, & k &= 0 \dots n, \text{ the value part} \tag{1} \\
+//! \frac{\partial h^{(n)}}{\partial u} &= L_g L_f^{n-1} h, & k &= n, \text{ the gradient part} \tag{2} \\
+//! \frac{\partial h^{(k)}}{\partial u} &= 0, & k &< n \tag{3}
+//! \end{align}
 //! ```
 //!
 //! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off; (3) is checked at

@@ -17,9 +17,12 @@ pub fn damping(v: f64, gain: f64) -> f64 {
 ///
 /// With d the vector to the goal, φ the angle from the heading to ±d of least size and σ its sign,
 ///
-/// ```text
-/// v* = min(speed_gain |d|, speed_limit),   ω = clamp(turn_gain φ, ±turn_limit),
-/// a = clamp(acceleration_gain (σ v* cos φ − v), ±acceleration_limit).
+/// ```math
+/// \begin{aligned}
+/// v^* &= \min(\mathtt{speed\_gain}\,|d|,\ \mathtt{speed\_limit}), \\
+/// \omega &= \operatorname{clamp}(\mathtt{turn\_gain}\,\varphi,\ \pm\mathtt{turn\_limit}), \\
+/// a &= \operatorname{clamp}(\mathtt{acceleration\_gain}\,(\sigma v^* \cos\varphi - v),\ \pm\mathtt{acceleration\_limit}).
+/// \end{aligned}
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heading {

@@ -1,8 +1,10 @@
 //! The repository's own rules: which crate and module may use which, where unsafe code and printing
-//! stand, that examples parse and that documents agree with the program. Each rule is one test.
+//! stand, that examples parse, that formulas can be set and that documents agree with the program. Each
+//! rule is one test.
 
 mod dependencies;
 mod documents;
+mod formulas;
 mod lexer;
 mod places;
 mod sources;

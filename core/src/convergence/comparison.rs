@@ -3,9 +3,11 @@
 //! For a constant real rate a and e ∈ Cⁿ put p(τ) = e^{aτ} e(τ). Then p⁽ⁿ⁾ = e^{aτ} (D + a)ⁿ e with
 //! D = d/dt, and Taylor's formula with integral remainder gives: if (D + a)ⁿ e ≥ 0 on [0, τ], then
 //!
-//! ```text
-//! e(τ) ≥ e^{−aτ} P(τ),  P(τ) = Σ_{k<n} c_k τᵏ,
-//! c_k = (1/k!) Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0),                               (L)
+//! ```math
+//! \begin{aligned}
+//! e(\tau) &\ge e^{-a\tau} P(\tau), \qquad P(\tau) = \sum_{k<n} c_k \tau^k, \\
+//! c_k &= \frac{1}{k!} \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}(0),
+//! \end{aligned} \tag{L}
 //! ```
 //!
 //! with equality if the constraint is active throughout.

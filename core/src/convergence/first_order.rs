@@ -2,9 +2,11 @@
 //!
 //! Below zero, ė ≥ α |e|^p with p in (0, 1) makes |e|^{1−p} fall at least at the rate (1 − p) α:
 //!
-//! ```text
-//! |e(τ)|^{1−p} ≤ |e₀|^{1−p} − (1 − p) α τ,   α = |e₀|^{1−p} / ((1 − p) T),
-//! e(τ) ≥ e₀ (1 − τ/T)^{1/(1−p)},                                              (F)
+//! ```math
+//! \begin{aligned}
+//! |e(\tau)|^{1-p} &\le |e_0|^{1-p} - (1-p)\,\alpha\tau, \qquad \alpha = \frac{|e_0|^{1-p}}{(1-p)\,T}, \\
+//! e(\tau) &\ge e_0 \left(1 - \frac{\tau}{T}\right)^{1/(1-p)},
+//! \end{aligned} \tag{F}
 //! ```
 //!
 //! with equality if the condition is active throughout, so e reaches zero at T exactly. It is the

@@ -323,8 +323,8 @@ impl FixedTime {
 
     /// Takes into account, on the way, that inputs are held for `period` > 0 seconds: margin and default
     /// rates become what they would have been had it been known at the anchor. With the reference profile
-    /// h − μ − r changes by less than (elapsed/T)ⁿ parts of the change of the margin; other methods take
-    /// none.
+    /// h − μ − r changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin; other methods
+    /// take none.
     pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
         if self.settings.method != Method::ReferenceProfile {
             return;

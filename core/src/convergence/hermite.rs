@@ -3,9 +3,11 @@
 //!
 //! With s = τ/T and y_j = e⁽ʲ⁾(0) Tʲ/j!, the two-point Hermite interpolant of degree 2n − 1 is
 //!
-//! ```text
-//! r(τ) = (1 − s)ⁿ q(s),  q(s) = Σ_{k<n} q_k sᵏ,
-//! q_k = Σ_{j≤k} y_j C(n − 1 + k − j, k − j)      for τ < T,   r = 0 from T on.      (H)
+//! ```math
+//! \begin{aligned}
+//! r(\tau) &= (1-s)^n\, q(s), \qquad q(s) = \sum_{k<n} q_k s^k, \\
+//! q_k &= \sum_{j\le k} y_j \binom{n-1+k-j}{k-j} \qquad \text{for } \tau < T, \qquad r = 0 \text{ from } T \text{ on}.
+//! \end{aligned} \tag{H}
 //! ```
 //!
 //! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n, and r minimises ∫ (r⁽ⁿ⁾)². Enforcing

@@ -4,8 +4,8 @@
 //!
 //! With the elementary symmetric polynomials σ_k of the rates,
 //!
-//! ```text
-//! Π_{i≤n} (D + a_i) e = Σ_{j≤n} σ_{n−j} e⁽ʲ⁾,   σ_0 = 1.                               (O)
+//! ```math
+//! \prod_{i\le n} (D + a_i)\, e = \sum_{j\le n} \sigma_{n-j}\, e^{(j)}, \qquad \sigma_0 = 1. \tag{O}
 //! ```
 //!
 //! Put e_0 = e and e_i = (D + a_i) e_{i−1}. If e_n ≥ 0 and e_i(0) ≥ 0 then e_{i}(τ) ≥ e^{−a_{i+1}τ} e_i(0)

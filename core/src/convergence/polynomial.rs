@@ -4,7 +4,11 @@
 //! alone in one of the intervals that the zeros of p' cut out, or is one of those zeros (a multiple
 //! root). Going up from the linear derivative, each zero is bracketed by a change of sign and found by
 //! bisection to the last bit; nothing diverges and none is missed, whatever the scales. All real zeros
-//! lie within Fujiwara's bound 2 max_k |p_{d−k}/p_d|^{1/k}.
+//! of a polynomial of degree d lie within Fujiwara's bound
+//!
+//! ```math
+//! |x| \le 2 \max_{1\le k\le d} \left|\frac{p_{d-k}}{p_d}\right|^{1/k}.
+//! ```
 //!
 //! Bisection runs over the floating-point numbers in their order, not over the real line: at most 64
 //! halvings from −10³⁰⁸ to 10³⁰⁸, with the same relative accuracy at every scale. For |x| > 1 the sign

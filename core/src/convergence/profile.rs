@@ -4,8 +4,8 @@
 //!
 //! Let r ∈ Cⁿ⁻¹ with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and r ≥ 0 from T on. Enforcing
 //!
-//! ```text
-//! Π (D + a_i) (e − r) ≥ 0,   a_i > 0                                                    (P)
+//! ```math
+//! \prod_{i\le n} (D + a_i)\, (e - r) \ge 0, \qquad a_i > 0 \tag{P}
 //! ```
 //!
 //! starts from a zero error, so e ≥ r for ever ([`super::operator`]): e(T) ≥ 0 and e ≥ 0 after it.

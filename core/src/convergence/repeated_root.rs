@@ -5,8 +5,8 @@
 //!
 //! P(T) = 0 in the comparison lemma is, with y_j = e⁽ʲ⁾(0) Tʲ/j!, s = aT and E_m(s) = Σ_{i≤m} sⁱ/i!,
 //!
-//! ```text
-//! R(s) = Σ_{j<n} y_j E_{n−1−j}(s) = Σ_{i<n} (y_0 + … + y_{n−1−i}) sⁱ/i! = 0.          (R)
+//! ```math
+//! R(s) = \sum_{j<n} y_j\, E_{n-1-j}(s) = \sum_{i<n} (y_0 + \dots + y_{n-1-i})\, \frac{s^i}{i!} = 0. \tag{R}
 //! ```
 //!
 //! For n = 2: s = −(e₀ + e₁T)/e₀, the paper's c = a/T = (−e₀ − e₁T)/(e₀T²). A root is *admissible* if T
@@ -19,15 +19,21 @@
 //! derivative of P by a at fixed τ is τ (P − c_{n−1} τ^{n−1}), hence
 //! ∂e_a(τ)/∂a = −τⁿ e^{−aτ} C(a) with
 //!
-//! ```text
-//! C(v) = c_{n−1}(v) = Σ_{j<n} e⁽ʲ⁾(0) v^{n−1−j} / (j! (n−1−j)!),
-//! e_a(τ) = τⁿ ∫_a^∞ e^{−vτ} C(v) dv    for τ > 0,                                     (I)
+//! ```math
+//! \begin{aligned}
+//! C(v) &= c_{n-1}(v) = \sum_{j<n} \frac{e^{(j)}(0)\, v^{n-1-j}}{j!\,(n-1-j)!}, \\
+//! e_a(\tau) &= \tau^n \int_a^\infty e^{-v\tau}\, C(v)\, dv \qquad \text{for } \tau > 0,
+//! \end{aligned} \tag{I}
 //! ```
 //!
 //! because e_a(τ) → 0 as a → ∞. Let a be the largest root and H(v) = ∫_v^∞ e^{−wT} C(w) dw; H has the
 //! sign of (R) at v, so H(a) = 0, and H < 0 for v > a as C → −∞. For τ > T integrate (I) by parts:
-//! e_a(τ)/τⁿ = −(τ − T) ∫_a^∞ e^{−v(τ−T)} H(v) dv > 0. So P has no zero after T and is positive there,
-//! which needs c_{n−1} ≥ 0. ∎
+//!
+//! ```math
+//! \frac{e_a(\tau)}{\tau^n} = -(\tau - T) \int_a^\infty e^{-v(\tau-T)}\, H(v)\, dv > 0.
+//! ```
+//!
+//! So P has no zero after T and is positive there, which needs c_{n−1} ≥ 0. ∎
 //!
 //! **Choice.** [`rate`] takes the largest root: the least anti-stable one, and always admissible.
 //! [`admissibility`] judges any other.

@@ -4,8 +4,8 @@
 //! held input lets it fall to −Mδ in between (M bounds |d/dt (D + a)ⁿ e|), and e to −Mδ/aⁿ. Its integral
 //! over the period,
 //!
-//! ```text
-//! ψ(t + δ) ≥ e^{−aδ} ψ(t),                                                    (S)
+//! ```math
+//! \psi(t + \delta) \ge e^{-a\delta}\, \psi(t), \tag{S}
 //! ```
 //!
 //! depends on the state that the held input leads to, which a model predicts. If (S) holds at every
@@ -14,8 +14,8 @@
 //! of slope at most M whose integral is ≥ 0 dips by at most Mδ²/8. With c₋ = max(0, −(D + a)ⁿ e) at the
 //! start of the period and an even slope, Mδ = 2c₋ and
 //!
-//! ```text
-//! ψ ≥ −c₋ δ/4,  e ≥ −c₋ δ/(4 aⁿ⁻¹)      for a > 0, n > 1,                     (5)
+//! ```math
+//! \psi \ge -\frac{c_-\,\delta}{4}, \qquad e \ge -\frac{c_-\,\delta}{4\,a^{n-1}} \qquad \text{for } a > 0,\ n > 1, \tag{5}
 //! ```
 //!
 //! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`SampledDemand::loss`] is (5): an

@@ -23,8 +23,9 @@ pub enum Method {
 /// Settings of one barrier's promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedTimeSettings {
-    /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample
-    /// where the filter looks over the period ([`Sampling`](crate::filter::Sampling)), else late.
+    /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample for
+    /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)); for
+    /// higher ones later.
     pub deadline: f64,
     /// How the deadline is met. Default: [`Method::ReferenceProfile`].
     pub method: Method,

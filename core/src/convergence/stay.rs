@@ -3,8 +3,13 @@
 //! By the comparison lemma e ≥ e^{−aτ} P(τ), so e ≥ 0 for ever if every coefficient c_k(a) of P is ≥ 0
 //! at the start. For n = 1 that is e ≥ 0; for n = 2 it is a ≥ −ė/e.
 //!
-//! **The rates that do.** A_k(a) = k! c_k(a) = Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾ is an Appell sequence,
-//! dA_k/da = k A_{k−1}. So where A_0 … A_{k−1} are ≥ 0 on a ray [a_{k−1}, ∞), A_k does not fall on it,
+//! **The rates that do.** The k! c_k are an Appell sequence in a:
+//!
+//! ```math
+//! A_k(a) = k!\, c_k(a) = \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}, \qquad \frac{dA_k}{da} = k\, A_{k-1}. \tag{A}
+//! ```
+//!
+//! So where A_0 … A_{k−1} are ≥ 0 on a ray [a_{k−1}, ∞), A_k does not fall on it,
 //! and A_0 … A_k are ≥ 0 on a smaller ray [a_k, ∞), or nowhere if A_k is a negative constant. By
 //! induction the rates ≥ 0 with all c_k ≥ 0 are a ray [a_min, ∞), and there is none if and only if the
 //! first derivative that is not zero is negative. Every rate above [`smallest_rate`] will do as well.

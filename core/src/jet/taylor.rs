@@ -2,7 +2,12 @@
 //!
 //! A smooth `a(t₀ + τ) = Σ_k a_k τᵏ` is kept as its first `K` normalised coefficients
 //! `a_k = a⁽ᵏ⁾(t₀)/k!`. Products are Cauchy products; each elementary function follows from the
-//! differential equation it satisfies, e.g. `y = eᵃ ⇒ y' = a' y ⇒ k y_k = Σ_{i=1}^{k} i a_i y_{k−i}`.
+//! differential equation it satisfies, such as `y = eᵃ` from `y' = a' y`:
+//!
+//! ```math
+//! (a b)_k = \sum_{i=0}^{k} a_i\, b_{k-i}, \qquad k\, y_k = \sum_{i=1}^{k} i\, a_i\, y_{k-i}.
+//! ```
+//!
 //! The coefficients may themselves be [`Dual`](super::Dual): the recurrences only use ring operations.
 //!
 //! # References

@@ -4,8 +4,10 @@
 //! Runge-Kutta method on dual numbers whose gradients are those along u gives φ and ∂φ/∂u; the series
 //! of h started there gives h⁽ᵏ⁾(t + s) and its total derivative with respect to u,
 //!
-//! ```text
-//! h⁽ᵏ⁾ ∘ φ  and  ∂(h⁽ᵏ⁾ ∘ φ)/∂u = (∂h⁽ᵏ⁾/∂x) (∂φ/∂u) + ∂h⁽ᵏ⁾/∂u,   k = 0 … n.      (4)
+//! ```math
+//! h^{(k)} \circ \varphi \quad \text{and} \quad \frac{\partial (h^{(k)} \circ \varphi)}{\partial u}
+//! = \frac{\partial h^{(k)}}{\partial x} \frac{\partial \varphi}{\partial u} + \frac{\partial h^{(k)}}{\partial u},
+//! \qquad k = 0 \dots n. \tag{4}
 //! ```
 //!
 //! The error is the integrator's, O(s⁵) over [`SUBSTEPS`] substeps; (4) is the exact derivative of what
