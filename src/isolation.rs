@@ -12,16 +12,29 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 use crate::error::Error;
-use crate::host::journal::LastCall;
+use crate::host::journal::{self, LastCall};
 
 /// The name of the journal in the child's folder.
 const JOURNAL: &str = "journal";
 /// How often the child is looked at while it runs.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Where the child keeps its journal when its folder is `folder`.
-pub fn journal(folder: &Path) -> PathBuf {
+fn journal_file(folder: &Path) -> PathBuf {
     folder.join(JOURNAL)
+}
+
+/// For the child: begins the journal in the folder that the watching process made, and unpacks FMUs below
+/// it, so that nothing is left behind when this process has no time to tidy up.
+///
+/// # Errors
+///
+/// The folder cannot be written to.
+pub fn settle(folder: &Path) -> Result<(), Error> {
+    let file = journal_file(folder);
+    journal::begin(&file).map_err(|e| Error::io("write", &file, e))?;
+    // Refused only where it is set already: then files go there.
+    let _ = tempfile::env::override_temp_dir(folder);
+    Ok(())
 }
 
 /// What the child may say.
@@ -136,7 +149,7 @@ impl Child {
             }
             std::thread::sleep(LOOK);
         };
-        let finished = LastCall::finished(&journal(self.folder.path())).unwrap_or(false);
+        let finished = LastCall::finished(&journal_file(self.folder.path())).unwrap_or(false);
         Ok(match broken(status) {
             Break::Exit(code) if finished => End::Finished(code),
             how => End::Broken { how, last: self.last_call() },
@@ -144,7 +157,7 @@ impl Child {
     }
 
     fn last_call(&self) -> Option<LastCall> {
-        LastCall::read(&journal(self.folder.path())).ok().flatten()
+        LastCall::read(&journal_file(self.folder.path())).ok().flatten()
     }
 }
 

@@ -78,8 +78,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return isolated(arguments);
     }
     let Some(folder) = &arguments.watched else { return here(arguments, None) };
-    let journal = isolation::journal(folder);
-    journal::begin(&journal).map_err(|e| Error::io("write", &journal, e))?;
+    isolation::settle(folder)?;
     let rows = rows_file(folder);
     let file = File::create(&rows).map_err(|e| Error::io("write", &rows, e))?;
     let result = here(arguments, Some(file));

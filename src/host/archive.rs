@@ -139,7 +139,7 @@ impl Archive {
     /// # Errors
     ///
     /// It is missing, too large, not UTF-8, or more deeply nested or wider than
-    /// [`super::bounds`] allows.
+    /// `bounds.rs` allows.
     pub fn model_description(&self) -> Result<String, FmuProblem> {
         let missing = |e: io::Error| FmuProblem::Description(format!("cannot be read: {e}"));
         let path = self.path(MODEL_DESCRIPTION);

@@ -1,4 +1,4 @@
-//! Whether an instance does what it should: [`run`] starts this program again, [`perform`] is what it
+//! Whether an instance does what it should: `run` starts this program again, [`perform`] is what it
 //! does there. The FMU runs only there, so that its crash, hang or `exit()` is a finding.
 
 use std::collections::HashSet;
@@ -91,8 +91,7 @@ fn findings_file(folder: &Path) -> PathBuf {
 ///
 /// The folder cannot be written to.
 pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
-    let journal = isolation::journal(folder);
-    journal::begin(&journal).map_err(|e| Error::io("write", &journal, e))?;
+    isolation::settle(folder)?;
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
     let mut trial = Trial { file, told: HashSet::new() };

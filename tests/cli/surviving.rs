@@ -142,3 +142,15 @@ fn isolation_changes_neither_results_nor_other_errors() {
     let report: serde_json::Value = serde_json::from_str(&done.success()).expect("JSON");
     assert_eq!(report["steps"], 10);
 }
+
+/// A process that is ended has no time to remove what it unpacked.
+#[test]
+fn nothing_is_left_behind() {
+    let workshop = workshop("crash-in-step", &[]);
+    std::fs::create_dir(workshop.path("tmp")).expect("a writable folder");
+    let tmp = workshop.path("tmp").display().to_string();
+    let workshop = workshop.with_variable("TMPDIR", tmp);
+    assert_eq!(workshop.punctual(["run", "system.toml", "--isolate"]).code, 1);
+    assert_eq!(workshop.punctual(["validate", "bad.fmu"]).code, 1);
+    assert_eq!(std::fs::read_dir(workshop.path("tmp")).expect("a folder").count(), 0);
+}
