@@ -17,8 +17,9 @@ pub struct Error(Box<Kind>);
 enum Kind {
     Configuration { file: Option<PathBuf>, error: ConfigurationError },
     Io { action: &'static str, path: PathBuf, source: io::Error },
-    Fmu { path: PathBuf, problem: FmuProblem },
+    Fmu { component: Option<String>, path: PathBuf, problem: FmuProblem },
     Call(CallFailure),
+    Broken { what: String, how: String },
     Plot { path: PathBuf, message: String },
 }
 
@@ -29,6 +30,17 @@ pub enum FmuProblem {
     Archive(String),
     /// An entry of this name would be written outside the folder it is unpacked to.
     UnsafeEntry(String),
+    /// More than is unpacked or read from a file of unknown origin.
+    Limit {
+        /// What is measured, as the beginning of a sentence.
+        what: &'static str,
+        /// How much it is.
+        value: u64,
+        /// Of what; empty where it is a plain number.
+        unit: &'static str,
+        /// The greatest value allowed.
+        allowed: u64,
+    },
     /// The model description is missing, not FMI 2.0, or malformed; with the reason.
     Description(String),
     /// It offers no co-simulation interface.
@@ -61,6 +73,13 @@ impl fmt::Display for FmuProblem {
             Self::Archive(reason) => write!(f, "not a readable FMU archive: {reason}"),
             Self::UnsafeEntry(entry) => {
                 write!(f, "refused, because the archive entry {entry:?} points out of the archive")
+            }
+            Self::Limit { what, value, unit, allowed } => {
+                write!(f, "refused: {what} {value}")?;
+                if !unit.is_empty() {
+                    write!(f, " {unit}")?;
+                }
+                write!(f, "; allowed are at most {allowed}")
             }
             Self::Description(reason) => write!(f, "modelDescription.xml: {reason}"),
             Self::NoCoSimulation => f.write_str("has no co-simulation interface (no CoSimulation element)"),
@@ -137,12 +156,34 @@ impl Error {
 
     /// An `.fmu` file that cannot be used.
     pub fn fmu(path: &Path, problem: FmuProblem) -> Self {
-        Self(Box::new(Kind::Fmu { path: path.to_owned(), problem }))
+        Self(Box::new(Kind::Fmu { component: None, path: path.to_owned(), problem }))
     }
 
     /// An FMI function that did not succeed.
     pub fn call(failure: CallFailure) -> Self {
         Self(Box::new(Kind::Call(failure)))
+    }
+
+    /// An FMU that ended its process, in `what` and in which way.
+    pub fn broken(what: impl Into<String>, how: impl Into<String>) -> Self {
+        Self(Box::new(Kind::Broken { what: what.into(), how: how.into() }))
+    }
+
+    /// The same error, naming the component whose FMU it is about.
+    #[must_use]
+    pub fn in_component(mut self, name: &str) -> Self {
+        if let Kind::Fmu { component, .. } = &mut *self.0 {
+            component.get_or_insert_with(|| name.to_owned());
+        }
+        self
+    }
+
+    /// What is wrong with the `.fmu` file, if the error is about one.
+    pub fn as_fmu_problem(&self) -> Option<&FmuProblem> {
+        match &*self.0 {
+            Kind::Fmu { problem, .. } => Some(problem),
+            _ => None,
+        }
     }
 
     /// A picture that cannot be drawn.
@@ -178,7 +219,7 @@ impl Error {
     /// The exit code: 1 where an FMU is at fault, 2 where usage, configuration or a file is.
     pub fn exit_code(&self) -> u8 {
         match &*self.0 {
-            Kind::Fmu { .. } | Kind::Call(_) => 1,
+            Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => 1,
             Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => 2,
         }
     }
@@ -196,7 +237,11 @@ impl fmt::Display for Error {
             Kind::Configuration { file: Some(file), error } => write!(f, "{}: {error}", file.display()),
             Kind::Configuration { file: None, error } => error.fmt(f),
             Kind::Io { action, path, source } => write!(f, "cannot {action} {}: {source}", path.display()),
-            Kind::Fmu { path, problem } => write!(f, "{}: {problem}", path.display()),
+            Kind::Fmu { component: Some(component), path, problem } => {
+                write!(f, "{component} ({}): {problem}", path.display())
+            }
+            Kind::Fmu { component: None, path, problem } => write!(f, "{}: {problem}", path.display()),
+            Kind::Broken { what, how } => write!(f, "{what} {how}"),
             Kind::Call(failure) => failure.fmt(f),
             Kind::Plot { path, message } => write!(f, "cannot draw {}: {message}", path.display()),
         }

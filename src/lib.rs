@@ -6,6 +6,8 @@
 //! ```text
 //! error                what went wrong, with names and numbers
 //! host                 one FMU: archive, description, library, instance
+//! isolation            FMUs in a child process, which may crash
+//! validate             what is wrong with an FMU: archive, schema, rules, symbols, a trial
 //! recording            what a run leaves behind; CSV
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
@@ -23,8 +25,10 @@ pub mod demo;
 pub mod error;
 #[expect(unsafe_code, reason = "FMUs are shared libraries called through C")]
 pub mod host;
+pub mod isolation;
 pub mod output;
 pub mod package;
 pub mod pictures;
 pub mod plot;
 pub mod recording;
+pub mod validate;

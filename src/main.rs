@@ -5,10 +5,10 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, check, demo, inspect, run};
+use punctual::command::{build, check, demo, inspect, run, validate};
 use punctual::output;
 
-/// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple and plot.
+/// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
 ///
 /// Exit codes: 0 success; 1 the run finished but a promise was not kept, or an FMU is at fault; 2 bad
 /// usage or configuration. Results go to stdout, talk and progress to stderr.
@@ -31,6 +31,11 @@ enum Command {
     Run(run::Arguments),
     /// Show what an FMU offers
     Inspect(inspect::Arguments),
+    /// Say what is wrong with an FMU, ours or another's, before a master stumbles over it
+    Validate(validate::Arguments),
+    /// The part of `validate` that may crash, in a process of its own
+    #[command(hide = true)]
+    Trial(validate::TrialArguments),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +45,8 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),
+        Command::Validate(arguments) => validate::execute(&arguments),
+        Command::Trial(arguments) => validate::execute_trial(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -94,18 +94,9 @@ impl Recording {
     ///
     /// As the writer's.
     pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
-        write!(out, "time")?;
-        for column in &self.columns {
-            write!(out, ",{}", quoted(&column.name))?;
-        }
-        writeln!(out)?;
+        write_header(&mut out, &self.columns)?;
         for (index, time) in self.times.iter().enumerate() {
-            write_number(&mut out, *time)?;
-            for value in self.row(index) {
-                out.write_all(b",")?;
-                write_number(&mut out, *value)?;
-            }
-            writeln!(out)?;
+            write_row(&mut out, *time, self.row(index))?;
         }
         out.flush()
     }
@@ -120,6 +111,33 @@ impl Recording {
             .and_then(|file| self.write_csv(io::BufWriter::with_capacity(1 << 16, file)))
             .map_err(|e| Error::io("write", path, e))
     }
+}
+
+/// Writes the first line of the CSV form.
+///
+/// # Errors
+///
+/// As the writer's.
+pub fn write_header(out: &mut impl Write, columns: &[Column]) -> io::Result<()> {
+    write!(out, "time")?;
+    for column in columns {
+        write!(out, ",{}", quoted(&column.name))?;
+    }
+    writeln!(out)
+}
+
+/// Writes one line of the CSV form.
+///
+/// # Errors
+///
+/// As the writer's.
+pub fn write_row(out: &mut impl Write, time: f64, row: &[f64]) -> io::Result<()> {
+    write_number(out, time)?;
+    for value in row {
+        out.write_all(b",")?;
+        write_number(out, *value)?;
+    }
+    writeln!(out)
 }
 
 /// The shortest text that reads back to `value`; powers of ten where they are shorter.

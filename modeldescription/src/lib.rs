@@ -87,5 +87,6 @@ pub use description::{
     NamingConvention,
 };
 pub use error::Error;
+pub use names::{is_c_identifier, is_structured_name};
 pub use unit::{BaseUnit, Unit};
 pub use variable::{BaseType, Causality, Initial, InitialRule, Variability, Variable, VariableKind};

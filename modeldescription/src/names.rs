@@ -15,7 +15,7 @@ pub(crate) fn is_one_line(text: &str) -> bool {
 }
 
 /// Whether a text is a C identifier in ASCII.
-pub(crate) fn is_c_identifier(text: &str) -> bool {
+pub fn is_c_identifier(text: &str) -> bool {
     let mut bytes = text.bytes();
     bytes.next().is_some_and(is_nondigit) && bytes.all(is_word)
 }
@@ -29,7 +29,7 @@ pub(crate) fn is_c_identifier(text: &str) -> bool {
 /// Q-name          = "'" ( Q-char | escape ) { Q-char | escape } "'"
 /// arrayIndices    = "[" unsignedInteger { "," unsignedInteger } "]"
 /// ```
-pub(crate) fn is_structured_name(text: &str) -> bool {
+pub fn is_structured_name(text: &str) -> bool {
     let whole = |rest: Option<&[u8]>| rest.is_some_and(<[u8]>::is_empty);
     whole(identifier(text.as_bytes())) || whole(derivative(text.as_bytes()))
 }

@@ -1,5 +1,8 @@
 //! `punctual run`: couples FMUs as a system file says.
 
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -7,8 +10,10 @@ use serde::Serialize;
 
 use crate::coupling::{Order, Outcome, Simulation, System};
 use crate::error::Error;
+use crate::host::journal;
+use crate::isolation::{self, Child, End, Voice};
 use crate::output::{self, Progress};
-use crate::pictures;
+use crate::{pictures, recording};
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -21,6 +26,12 @@ pub struct Arguments {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
+    /// Run in a process of its own: a crash of an FMU is told, and the rows until then are kept
+    #[arg(long)]
+    isolate: bool,
+    /// The folder of a run that another process watches
+    #[arg(long, hide = true, value_name = "DIR", conflicts_with = "isolate")]
+    watched: Option<PathBuf>,
 }
 
 /// What `run` tells, as JSON.
@@ -63,6 +74,60 @@ struct SignalReport {
 ///
 /// A system file that cannot be used, an FMU that fails, a file that cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    if arguments.isolate {
+        return isolated(arguments);
+    }
+    let Some(folder) = &arguments.watched else { return here(arguments, None) };
+    isolation::settle(folder)?;
+    let rows = rows_file(folder);
+    let file = File::create(&rows).map_err(|e| Error::io("write", &rows, e))?;
+    let result = here(arguments, Some(file));
+    journal::finish();
+    result
+}
+
+/// Where a watched run leaves its rows.
+fn rows_file(folder: &Path) -> PathBuf {
+    folder.join("rows.csv")
+}
+
+/// Runs the system in a child process and tells how that ended.
+fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let child = Child::new()?;
+    let mut words: Vec<OsString> = vec!["run".into()];
+    if let Some(folder) = &arguments.out {
+        words.extend(["--out".into(), folder.into()]);
+    }
+    words.extend(arguments.json.then(|| "--json".into()));
+    words.extend(["--watched".into(), child.folder().into(), "--".into(), arguments.system.clone().into()]);
+    let (how, last) = match child.run(words, Voice::Loud, None)? {
+        End::Finished(code) => return Ok(ExitCode::from(u8::try_from(code).unwrap_or(1))),
+        End::Broken { how, last } => (how, last),
+    };
+    if let Some(folder) = &arguments.out {
+        let (rows, csv) = (rows_file(child.folder()), csv_file(&arguments.system, folder));
+        // Empty where the run had not begun.
+        if std::fs::metadata(&rows).is_ok_and(|rows| rows.len() > 0) {
+            std::fs::copy(&rows, &csv).map_err(|e| Error::io("write", &csv, e))?;
+            output::note(&format!("note: what was recorded until then is in {}", csv.display()));
+        }
+    }
+    let what = last.map_or_else(|| "outside of any call, the run".to_owned(), |last| last.to_string());
+    Err(Error::broken(what, how.to_string()))
+}
+
+/// One write for each row, so that no row is lost with the process.
+fn stream(rows: &mut Option<File>, write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) {
+    let Some(file) = rows else { return };
+    let mut line = Vec::new();
+    if write(&mut line).and_then(|()| file.write_all(&line)).is_err() {
+        // The run and its own recording go on; only a crash would show less.
+        *rows = None;
+    }
+}
+
+/// Runs the system in this process; each row also goes to `rows` at once.
+fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error> {
     let path = &arguments.system;
     let system = System::read(path)?;
     let base = path.parent().unwrap_or(Path::new(""));
@@ -75,7 +140,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
-    let outcome = simulation.run(|time, _| {
+    let columns = simulation.columns().to_vec();
+    stream(&mut rows, |line| recording::write_header(line, &columns));
+    let outcome = simulation.run(|time, row| {
+        stream(&mut rows, |line| recording::write_row(line, time, row));
         progress.update((time - experiment.start_time) / (experiment.stop_time - experiment.start_time));
     })?;
     drop(progress);

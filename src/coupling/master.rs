@@ -96,6 +96,10 @@ impl Statistics {
     }
 }
 
+fn instantiate(fmu: Rc<Fmu>, name: &str) -> Result<Slave, Error> {
+    Slave::instantiate(fmu, name).map_err(|e| e.in_component(name))
+}
+
 impl Simulation {
     /// Opens the FMUs of `system`, found relative to the folder `base`, and instantiates them.
     ///
@@ -120,7 +124,7 @@ impl Simulation {
             });
             let fmu = match shared {
                 Some((_, fmu)) => Rc::clone(fmu),
-                None => Rc::new(Fmu::open(&path)?),
+                None => Rc::new(Fmu::open(&path).map_err(|e| e.in_component(&component.name))?),
             };
             opened.push((path, Rc::clone(&fmu)));
             fmus.push(fmu);
@@ -160,7 +164,7 @@ impl Simulation {
         let mut members = Vec::new();
         for (component, ([states, direct, inputs], fmu)) in groups.into_iter().zip(fmus).enumerate() {
             members.push(Member {
-                slave: Slave::instantiate(fmu, &system.components()[component].name)?,
+                slave: instantiate(fmu, &system.components()[component].name)?,
                 starts: std::mem::take(&mut starts[component]),
                 states,
                 direct,

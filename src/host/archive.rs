@@ -1,12 +1,35 @@
-//! An `.fmu` file unpacked into a directory of its own, which goes when the value goes.
-//! Knows the layout of the archive, not the content of its files.
+//! An `.fmu` file unpacked into a directory of its own, which goes when the value goes. The file may
+//! come from anyone: names and sizes are looked at before a byte is written, and what is written is
+//! counted. Knows the layout of the archive, not the content of its files.
 
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use percent_encoding::{AsciiSet, CONTROLS, utf8_percent_encode};
 use tempfile::TempDir;
+use zip::ZipArchive;
 
 use crate::error::{Error, FmuProblem};
+
+/// The greatest size of an `.fmu` file, in bytes.
+pub const MAX_FILE_BYTES: u64 = 2 << 30;
+/// The greatest number of entries of an archive.
+pub const MAX_ENTRIES: u64 = 20_000;
+/// The greatest length of an entry's name, in bytes.
+pub const MAX_NAME_BYTES: usize = 1024;
+/// The greatest size of an archive unpacked, in bytes.
+pub const MAX_UNPACKED_BYTES: u64 = 4 << 30;
+/// The greatest ratio of the unpacked size to the file's, dimensionless, for archives that unpack to
+/// more than [`SMALL_BYTES`]. Deflate reaches 1032; libraries and tables stay below 50.
+pub const MAX_RATIO: u64 = 200;
+/// The unpacked size, in bytes, up to which the ratio does not matter.
+pub const SMALL_BYTES: u64 = 64 << 20;
+/// The greatest size of `modelDescription.xml`, in bytes.
+pub const MAX_DESCRIPTION_BYTES: u64 = 64 << 20;
+
+const MODEL_DESCRIPTION: &str = "modelDescription.xml";
 
 /// Bytes that a path in a `file:` URI must not carry as they are (RFC 3986, `pchar` and `/` may stay).
 const URI_PATH: &AsciiSet = &CONTROLS
@@ -43,9 +66,10 @@ pub const PLATFORM: &str = if cfg!(target_os = "windows") {
 
 /// An unpacked archive.
 #[derive(Debug)]
-pub(super) struct Archive {
+pub struct Archive {
     source: PathBuf,
     directory: TempDir,
+    entries: Vec<String>,
     platforms: Vec<String>,
 }
 
@@ -54,27 +78,31 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// The file cannot be read, is not a zip archive, or holds an entry that points out of the
-    /// archive (an absolute name, a drive, a backslash, a `..`).
-    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+    /// The file cannot be read, is not a zip archive, exceeds one of the limits above, or holds an entry
+    /// that points out of the archive (an absolute name, a drive, a backslash, a `..`), that is there
+    /// twice, or that is neither a file nor a folder. Nothing is written before all of this is known.
+    pub fn open(path: &Path) -> Result<Self, Error> {
         let problem = |problem| Error::fmu(path, problem);
         // Opened here first: "no such file" is told from "not an archive".
-        drop(std::fs::File::open(path).map_err(|e| Error::io("read", path, e))?);
-        let Some(text) = path.to_str() else {
-            return Err(problem(FmuProblem::Archive("its path is not valid UTF-8".into())));
-        };
-        let entries =
-            fmi_rs::zip::get_zip_contents(text).map_err(|e| problem(FmuProblem::Archive(chain(&e))))?;
-        if let Some(entry) = entries.iter().find(|entry| leaves_archive(entry)) {
-            return Err(problem(FmuProblem::UnsafeEntry(entry.clone())));
+        let mut file = File::open(path).map_err(|e| Error::io("read", path, e))?;
+        let metadata = file.metadata().map_err(|e| Error::io("read", path, e))?;
+        if !metadata.is_file() {
+            return Err(problem(FmuProblem::Archive("it is not a file".into())));
         }
+        let size = metadata.len();
+        limit("the file has", size, "bytes", MAX_FILE_BYTES).map_err(problem)?;
+        announced_entries(&mut file).map_err(problem)?;
+        let mut zip =
+            ZipArchive::new(BufReader::new(file)).map_err(|e| problem(FmuProblem::Archive(chain(&e))))?;
+        let plan = survey(&mut zip, size).map_err(problem)?;
         let directory = tempfile::Builder::new()
             .prefix("punctual-")
             .tempdir()
             .map_err(|e| Error::io("create a folder in", &std::env::temp_dir(), e))?;
-        // Links are written as plain files and names are checked once more while unpacking.
-        fmi_rs::zip::extract_zip_archive(path, directory.path())
-            .map_err(|e| problem(FmuProblem::Archive(chain(&e))))?;
+        for entry in &plan {
+            unpack(&mut zip, entry, directory.path()).map_err(problem)?;
+        }
+        let entries: Vec<String> = plan.into_iter().map(|entry| entry.name).collect();
         let mut platforms: Vec<String> = entries
             .iter()
             .filter_map(|entry| entry.strip_prefix("binaries/")?.split_once('/'))
@@ -83,27 +111,54 @@ impl Archive {
             .collect();
         platforms.sort();
         platforms.dedup();
-        Ok(Self { source: path.to_owned(), directory, platforms })
+        Ok(Self { source: path.to_owned(), directory, entries, platforms })
     }
 
     /// The file this was unpacked from.
-    pub(super) fn source(&self) -> &Path {
+    pub fn source(&self) -> &Path {
         &self.source
     }
 
+    /// The names of all entries, in the order of the archive; folders end with a slash.
+    pub fn entries(&self) -> &[String] {
+        &self.entries
+    }
+
     /// The folders under `binaries/` that hold files, sorted.
-    pub(super) fn platforms(&self) -> &[String] {
+    pub fn platforms(&self) -> &[String] {
         &self.platforms
     }
 
-    /// Where the model description should be.
-    pub(super) fn model_description(&self) -> PathBuf {
-        self.directory.path().join("modelDescription.xml")
+    /// Where an entry of this name is.
+    pub fn path(&self, entry: &str) -> PathBuf {
+        self.directory.path().join(entry)
+    }
+
+    /// The text of `modelDescription.xml`, as far as it is safe to parse.
+    ///
+    /// # Errors
+    ///
+    /// It is missing, too large, not UTF-8, or more deeply nested or wider than
+    /// `bounds.rs` allows.
+    pub fn model_description(&self) -> Result<String, FmuProblem> {
+        let missing = |e: io::Error| FmuProblem::Description(format!("cannot be read: {e}"));
+        let path = self.path(MODEL_DESCRIPTION);
+        let size = std::fs::metadata(&path).map_err(missing)?.len();
+        limit("modelDescription.xml has", size, "bytes", MAX_DESCRIPTION_BYTES)?;
+        let bytes = std::fs::read(&path).map_err(missing)?;
+        let mut text = String::from_utf8(bytes).map_err(|e| {
+            FmuProblem::Description(format!("is not UTF-8 from byte {}", e.utf8_error().valid_up_to()))
+        })?;
+        if text.starts_with('\u{feff}') {
+            text.remove(0);
+        }
+        super::bounds::check(&text)?;
+        Ok(text)
     }
 
     /// Where this platform's shared library should be.
     pub(super) fn library(&self, model_identifier: &str) -> PathBuf {
-        let file = format!("{model_identifier}{}", fmi_rs::SHARED_LIBRARY_EXTENSION);
+        let file = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         self.directory.path().join("binaries").join(PLATFORM).join(file)
     }
 
@@ -114,6 +169,119 @@ impl Archive {
         let path = std::path::absolute(&path).unwrap_or(path);
         file_uri(&path.to_string_lossy())
     }
+}
+
+/// An entry that may be unpacked.
+struct Entry {
+    index: usize,
+    name: String,
+    folder: bool,
+    size: u64,
+}
+
+fn limit(what: &'static str, value: u64, unit: &'static str, allowed: u64) -> Result<(), FmuProblem> {
+    if value <= allowed { Ok(()) } else { Err(FmuProblem::Limit { what, value, unit, allowed }) }
+}
+
+/// Refuses a file whose end says that it has too many entries, before memory is taken for them. (The
+/// plain form counts in 16 bits; a larger count stands in a record of its own.)
+fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
+    let io = |e: io::Error| FmuProblem::Archive(e.to_string());
+    let length = file.seek(SeekFrom::End(0)).map_err(io)?;
+    // The last record is 22 bytes and a comment of at most 65535; the large records stand before it.
+    let tail = length.min(22 + 65_535 + 20 + 56);
+    file.seek(SeekFrom::Start(length - tail)).map_err(io)?;
+    let mut bytes = Vec::new();
+    file.take(tail).read_to_end(&mut bytes).map_err(io)?;
+    file.seek(SeekFrom::Start(0)).map_err(io)?;
+    let number = |at: usize, length: usize| {
+        let field = bytes.get(at..at + length).unwrap_or_default();
+        field.iter().rev().fold(0_u64, |sum, byte| sum << 8 | u64::from(*byte))
+    };
+    for at in 0..bytes.len().saturating_sub(3) {
+        let count = match &bytes[at..at + 4] {
+            b"PK\x05\x06" => number(at + 10, 2),
+            b"PK\x06\x06" => number(at + 32, 8),
+            _ => continue,
+        };
+        // 65535 stands for "see the other record".
+        if count != 65_535 {
+            limit("the archive has", count, "entries", MAX_ENTRIES)?;
+        }
+    }
+    Ok(())
+}
+
+/// Looks at every entry's name and sizes.
+fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<Entry>, FmuProblem> {
+    let damaged = |e: zip::result::ZipError| FmuProblem::Archive(chain(&e));
+    limit("the archive has", zip.len() as u64, "entries", MAX_ENTRIES)?;
+    if zip.has_duplicate_names() {
+        return Err(FmuProblem::Archive("two of its entries have the same name".into()));
+    }
+    let mut names = HashSet::new();
+    let mut total = 0_u64;
+    let mut plan = Vec::new();
+    for index in 0..zip.len() {
+        let file = zip.by_index_raw(index).map_err(damaged)?;
+        let raw = file.name_raw();
+        limit("the name of an entry has", raw.len() as u64, "bytes", MAX_NAME_BYTES as u64)?;
+        let name = String::from_utf8(raw.to_owned()).map_err(|e| {
+            let name = String::from_utf8_lossy(raw);
+            let at = e.utf8_error().valid_up_to();
+            FmuProblem::Archive(format!("the name of entry {index} ({name:?}) is not UTF-8 from byte {at}"))
+        })?;
+        if leaves_archive(&name) {
+            return Err(FmuProblem::UnsafeEntry(name));
+        }
+        if file.is_symlink() {
+            return Err(FmuProblem::Archive(format!("the entry {name:?} is a symbolic link")));
+        }
+        if file.encrypted() {
+            return Err(FmuProblem::Archive(format!("the entry {name:?} is encrypted")));
+        }
+        // Two names that are one file where case does not count would overwrite each other there.
+        if !names.insert(name.to_lowercase()) {
+            let text = format!("the entry {name:?} is there twice (upper and lower case apart)");
+            return Err(FmuProblem::Archive(text));
+        }
+        let (folder, size) = (name.ends_with('/'), file.size());
+        total = total.saturating_add(size);
+        limit("unpacked, the archive has", total, "bytes", MAX_UNPACKED_BYTES)?;
+        plan.push(Entry { index, name, folder, size });
+    }
+    if total > SMALL_BYTES && total / file_size.max(1) > MAX_RATIO {
+        let value = total / file_size.max(1);
+        let what = "unpacked, the archive is larger by a factor of";
+        return Err(FmuProblem::Limit { what, value, unit: "", allowed: MAX_RATIO });
+    }
+    if zip.has_overlapping_entries().map_err(damaged)? {
+        return Err(FmuProblem::Archive("two of its entries share their bytes".into()));
+    }
+    Ok(plan)
+}
+
+/// Writes one entry below `folder`; no more bytes than the archive announced for it.
+fn unpack(zip: &mut ZipArchive<BufReader<File>>, entry: &Entry, folder: &Path) -> Result<(), FmuProblem> {
+    let name = &entry.name;
+    let failed = |e: &dyn std::error::Error| FmuProblem::Archive(format!("entry {name:?}: {}", chain(e)));
+    let target = folder.join(name);
+    if entry.folder {
+        return std::fs::create_dir_all(&target).map_err(|e| failed(&e));
+    }
+    if let Some(parent) = target.parent() {
+        std::fs::create_dir_all(parent).map_err(|e| failed(&e))?;
+    }
+    let source = zip.by_index(entry.index).map_err(|e| failed(&e))?;
+    // Never over a file that is there already.
+    let mut file = File::create_new(&target).map_err(|e| failed(&e))?;
+    let written =
+        io::copy(&mut source.take(entry.size.saturating_add(1)), &mut file).map_err(|e| failed(&e))?;
+    if written != entry.size {
+        let text = format!("entry {name:?} has {written} bytes or more, but the archive says {}", entry.size);
+        return Err(FmuProblem::Archive(text));
+    }
+    Ok(())
 }
 
 /// `file://` URI of an absolute path.
@@ -127,7 +295,9 @@ fn file_uri(path: &str) -> String {
 fn leaves_archive(entry: &str) -> bool {
     entry.starts_with('/')
         || entry.contains(['\\', '\0'])
-        || entry.split('/').any(|part| part == "..")
+        || entry.is_empty()
+        || entry.split('/').any(|part| part == ".." || part == ".")
+        || entry.trim_end_matches('/').split('/').any(str::is_empty)
         || entry.as_bytes().get(1) == Some(&b':')
 }
 

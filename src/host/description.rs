@@ -1,8 +1,6 @@
 //! A model description as the rest of this crate sees it: small, with numbers parsed and references
 //! resolved. The XML itself is read by `fmi-rs`.
 
-use std::path::Path;
-
 use fmi_rs::model_description::fmi2 as xml;
 use punctual_modeldescription::{Causality, Variability};
 
@@ -145,16 +143,6 @@ pub struct Description {
 }
 
 impl Description {
-    /// Reads the model description at `path`.
-    pub(super) fn read(path: &Path) -> Result<Self, FmuProblem> {
-        let text =
-            std::fs::read(path).map_err(|e| FmuProblem::Description(format!("cannot be read: {e}")))?;
-        let text = String::from_utf8(text).map_err(|e| {
-            FmuProblem::Description(format!("is not UTF-8 from byte {}", e.utf8_error().valid_up_to()))
-        })?;
-        Self::parse(text.trim_start_matches('\u{feff}'))
-    }
-
     /// Reads a model description from its text.
     pub(super) fn parse(text: &str) -> Result<Self, FmuProblem> {
         let read =

@@ -65,6 +65,12 @@ functions! {
 /// A loaded library. The functions are valid while it lives.
 pub(super) struct Library {
     pub(super) functions: Functions,
+    /// `fmi2GetString`, which couplings do without.
+    pub(super) get_string: Option<Get<*const c_char>>,
+    /// What `fmi2GetVersion` answered.
+    pub(super) version: String,
+    /// What `fmi2GetTypesPlatform` answered.
+    pub(super) types_platform: String,
     _library: libloading::Library,
 }
 
@@ -84,6 +90,7 @@ impl Library {
             ("fmi2GetVersion", functions.get_version, "2."),
             ("fmi2GetTypesPlatform", functions.get_types_platform, "default"),
         ];
+        let mut answers = Vec::new();
         for (call, function, expected) in asked {
             // SAFETY: the function takes nothing and may be called at any time.
             let answer = unsafe { function() };
@@ -92,8 +99,13 @@ impl Library {
             if !answer.starts_with(expected) {
                 return Err(FmuProblem::Version { call, answer });
             }
+            answers.push(answer);
         }
-        Ok(Self { functions, _library: library })
+        let [version, types_platform] = <[String; 2]>::try_from(answers).unwrap_or_default();
+        // SAFETY: the type is the one the standard gives the function of this name.
+        let get_string = unsafe { library.get::<Get<*const c_char>>("fmi2GetString") };
+        let get_string = get_string.ok().map(|symbol| *symbol);
+        Ok(Self { functions, get_string, version, types_platform, _library: library })
     }
 }
 

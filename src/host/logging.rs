@@ -12,6 +12,9 @@ use super::Status;
 /// Messages kept per instance; older ones are dropped.
 const KEPT: usize = 8;
 
+/// Characters kept of a category.
+const CATEGORY: usize = 100;
+
 /// One message of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogMessage {
@@ -85,6 +88,11 @@ impl Logging {
         Rc::as_ptr(&self.callbacks)
     }
 
+    /// Never gives back what the FMU was told of: for an FMU that may still use it.
+    pub(super) fn leak(&self) {
+        std::mem::forget((Rc::clone(&self.environment), Rc::clone(&self.callbacks)));
+    }
+
     /// The messages kept, oldest first.
     pub(super) fn messages(&self) -> Vec<LogMessage> {
         let messages = self.environment.messages.lock().unwrap_or_else(PoisonError::into_inner);
@@ -116,9 +124,15 @@ unsafe extern "C" fn receive(
     }
     messages.push_back(LogMessage {
         status: Status::from_code(status),
-        category,
-        text: text.trim_end().into(),
+        category: printable(&category).chars().take(CATEGORY).collect(),
+        text: printable(text.trim_end()),
     });
+}
+
+/// The text without control characters, which could make a terminal do things; line breaks and tabs stay.
+fn printable(text: &str) -> String {
+    let harmless = |c: char| !c.is_control() || c == '\n' || c == '\t';
+    text.chars().map(|c| if harmless(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
 /// A copy of a C text, invalid UTF-8 replaced; empty for NULL.
@@ -158,10 +172,13 @@ mod tests {
         unsafe { logger()(environment, null, -5, null, null) };
         // SAFETY: a NULL environment is allowed.
         unsafe { logger()(null.cast(), null, 0, null, c"lost".as_ptr()) };
+        // SAFETY: as above. A conversion that writes is not carried out: nothing is there to write to.
+        unsafe { logger()(environment, instance, 0, null, c"100%n %s\x1b[2J".as_ptr()) };
         let messages = logging.messages();
-        assert_eq!(messages.len(), 2);
+        assert_eq!(messages.len(), 3);
         assert_eq!(messages[0].to_string(), "[fmi2Error, logError] n is 7");
         assert_eq!(messages[1].to_string(), "[unknown status -5] ");
+        assert_eq!(messages[2].to_string(), "[fmi2OK] 100%n %s\u{fffd}[2J");
     }
 
     #[test]

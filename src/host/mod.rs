@@ -3,23 +3,27 @@
 //! keeps to the standard. Knows nothing of coupling.
 
 mod archive;
+mod bounds;
 mod description;
+pub mod journal;
 mod library;
 mod logging;
 mod slave;
 
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 use std::ffi::c_int;
 use std::fmt;
 use std::path::Path;
 
-pub use archive::PLATFORM;
+pub use archive::{
+    Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
+    MAX_UNPACKED_BYTES, PLATFORM, SMALL_BYTES,
+};
 pub use description::{Capabilities, DefaultExperiment, Description, Item, Kind, Output, Variable};
 pub use logging::LogMessage;
 pub use punctual_modeldescription::{Causality, Variability};
 pub use slave::Slave;
 
-use archive::Archive;
 use library::Library;
 
 use crate::error::{Error, FmuProblem};
@@ -77,6 +81,8 @@ pub struct Fmu {
     description: Description,
     // Dropped before the archive: the library is unloaded before its file goes.
     library: OnceCell<Library>,
+    /// Set once an instance was left in a state in which it may still run: see [`Slave`].
+    abandoned: Cell<bool>,
     archive: Archive,
 }
 
@@ -89,9 +95,11 @@ impl Fmu {
     /// not of FMI 2.0, or without a co-simulation interface.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
-        let description =
-            Description::read(&archive.model_description()).map_err(|problem| Error::fmu(path, problem))?;
-        Ok(Self { description, library: OnceCell::new(), archive })
+        let description = archive
+            .model_description()
+            .and_then(|text| Description::parse(&text))
+            .map_err(|problem| Error::fmu(path, problem))?;
+        Ok(Self { description, library: OnceCell::new(), abandoned: Cell::new(false), archive })
     }
 
     /// The file it was read from.
@@ -119,11 +127,36 @@ impl Fmu {
             let present = self.archive.platforms().to_vec();
             return Err(Error::fmu(self.path(), FmuProblem::NoBinary { wanted: PLATFORM, present }));
         }
+        journal::entering("loading its library", "", self.path(), None);
         let library = Library::load(&path).map_err(|problem| Error::fmu(self.path(), problem))?;
         Ok(self.library.get_or_init(|| library))
     }
 
+    /// What `fmi2GetVersion` and `fmi2GetTypesPlatform` answer; loads the library.
+    ///
+    /// # Errors
+    ///
+    /// The library cannot be loaded, lacks a function, or is not of FMI 2.
+    pub fn answers(&self) -> Result<[(&'static str, &str); 2], Error> {
+        let library = self.library()?;
+        Ok([("fmi2GetVersion", &library.version), ("fmi2GetTypesPlatform", &library.types_platform)])
+    }
+
     fn resource_location(&self) -> String {
         self.archive.resource_location()
+    }
+}
+
+impl Drop for Fmu {
+    fn drop(&mut self) {
+        match self.library.take() {
+            // Its code may still be running: it stays loaded.
+            Some(library) if self.abandoned.get() => std::mem::forget(library),
+            Some(library) => {
+                journal::entering("unloading its library", "", self.archive.source(), None);
+                drop(library);
+            }
+            None => {}
+        }
     }
 }

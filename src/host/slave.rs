@@ -6,18 +6,20 @@ use std::ptr::NonNull;
 use std::rc::Rc;
 
 use super::library::{CO_SIMULATION, Component, FALSE, Functions, TRUE};
-use super::logging::Logging;
-use super::{Fmu, LogMessage, Status};
+use super::logging::{Logging, owned};
+use super::{Fmu, LogMessage, Status, journal};
 use crate::error::{CallFailure, Error};
 
-/// An instance. Freed on drop.
+/// An instance. Freed on drop, unless it returned a status after which the standard forbids that
+/// (fmi2Fatal; fmi2Pending, since its step may still be running; a number that is no status): then it
+/// and its library are left as they are until the process ends.
 pub struct Slave {
     component: NonNull<std::ffi::c_void>,
     name: String,
     // What the FMU last got as its time, in seconds; for error texts only.
     time: Option<f64>,
     warnings: u64,
-    fatal: bool,
+    abandoned: bool,
     // These two outlive the instance, because `drop` frees it before fields go.
     logging: Logging,
     fmu: Rc<Fmu>,
@@ -37,7 +39,7 @@ impl Slave {
     /// The library cannot be loaded or lacks a function, `name` holds a zero byte, or the FMU
     /// refuses (its log says why).
     pub fn instantiate(fmu: Rc<Fmu>, name: &str) -> Result<Self, Error> {
-        let functions = &fmu.library()?.functions;
+        fmu.library()?;
         let text = |field: &str, value: &str| {
             CString::new(value).map_err(|_| Error::configuration(field, "must not hold a zero byte"))
         };
@@ -45,6 +47,8 @@ impl Slave {
         let guid = text("guid", &fmu.description().guid)?;
         let resources = text("resource location", &fmu.resource_location())?;
         let logging = Logging::new();
+        let functions = &fmu.library()?.functions;
+        journal::entering("fmi2Instantiate", name, fmu.path(), None);
         // SAFETY: the texts live through the call; the callbacks live as long as the instance.
         let component = unsafe {
             (functions.instantiate)(
@@ -67,7 +71,7 @@ impl Slave {
                 log: logging.messages(),
             }));
         };
-        Ok(Self { component, name: name.to_owned(), time: None, warnings: 0, fatal: false, logging, fmu })
+        Ok(Self { component, name: name.to_owned(), time: None, warnings: 0, abandoned: false, logging, fmu })
     }
 
     /// The FMU it is an instance of.
@@ -97,6 +101,7 @@ impl Slave {
     /// The FMU returns anything but OK or Warning; so for every call below.
     pub fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error> {
         self.time = Some(start_time);
+        self.entering("fmi2SetupExperiment");
         let (call, component) = (self.functions().setup_experiment, self.component());
         // SAFETY: the instance lives; the arguments are plain numbers.
         let status = unsafe { call(component, FALSE, 0.0, start_time, TRUE, stop_time) };
@@ -109,6 +114,7 @@ impl Slave {
     ///
     /// As above.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Error> {
+        self.entering("fmi2EnterInitializationMode");
         let (call, component) = (self.functions().enter_initialization_mode, self.component());
         // SAFETY: the instance lives.
         let status = unsafe { call(component) };
@@ -121,6 +127,7 @@ impl Slave {
     ///
     /// As above.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Error> {
+        self.entering("fmi2ExitInitializationMode");
         let (call, component) = (self.functions().exit_initialization_mode, self.component());
         // SAFETY: the instance lives.
         let status = unsafe { call(component) };
@@ -133,6 +140,7 @@ impl Slave {
     ///
     /// As above.
     pub fn terminate(&mut self) -> Result<(), Error> {
+        self.entering("fmi2Terminate");
         let (call, component) = (self.functions().terminate, self.component());
         // SAFETY: the instance lives.
         let status = unsafe { call(component) };
@@ -146,6 +154,7 @@ impl Slave {
     /// As above.
     pub fn reset(&mut self) -> Result<(), Error> {
         self.time = None;
+        self.entering("fmi2Reset");
         let (call, component) = (self.functions().reset, self.component());
         // SAFETY: the instance lives.
         let status = unsafe { call(component) };
@@ -159,11 +168,28 @@ impl Slave {
     /// As above; Discard and Pending are errors too.
     pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error> {
         self.time = Some(time);
+        self.entering("fmi2DoStep");
         let (call, component) = (self.functions().do_step, self.component());
         // SAFETY: the instance lives; the arguments are plain numbers.
         let status = unsafe { call(component, time, step, TRUE) };
-        self.time = Some(if status <= 1 { time + step } else { time });
+        self.time = Some(if matches!(status, 0 | 1) { time + step } else { time });
         self.check("fmi2DoStep", status)
+    }
+
+    /// `fmi2GetString` of one variable; `None` where the FMU gives NULL or has no such function.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    pub fn get_string(&mut self, reference: u32) -> Result<Option<String>, Error> {
+        let Some(call) = self.fmu.library()?.get_string else { return Ok(None) };
+        self.entering("fmi2GetString");
+        let mut text = std::ptr::null();
+        // SAFETY: the instance lives; one reference can be read and one address written.
+        let status = unsafe { call(self.component(), &raw const reference, 1, &raw mut text) };
+        self.check("fmi2GetString", status)?;
+        // SAFETY: the standard has the FMU keep a zero-terminated text until its next call; NULL is allowed for.
+        Ok((!text.is_null()).then(|| unsafe { owned(text) }))
     }
 
     fn functions(&self) -> &Functions {
@@ -176,6 +202,11 @@ impl Slave {
     }
 
     #[inline]
+    fn entering(&self, call: &'static str) {
+        journal::entering(call, &self.name, self.fmu.path(), self.time);
+    }
+
+    #[inline]
     fn check(&mut self, call: &'static str, status: c_int) -> Result<(), Error> {
         if status == 0 { Ok(()) } else { self.not_ok(call, status) }
     }
@@ -183,7 +214,11 @@ impl Slave {
     #[cold]
     fn not_ok(&mut self, call: &'static str, status: c_int) -> Result<(), Error> {
         let status = Status::from_code(status);
-        self.fatal |= status == Status::Fatal;
+        if matches!(status, Status::Fatal | Status::Pending | Status::Unknown(_)) {
+            self.abandoned = true;
+            self.fmu.abandoned.set(true);
+            self.logging.leak();
+        }
         if status == Status::Warning {
             self.warnings += 1;
             return Ok(());
@@ -229,6 +264,7 @@ macro_rules! access {
                 if references.is_empty() {
                     return Ok(());
                 }
+                self.entering($name);
                 let (call, component) = (self.functions().$method, self.component());
                 let (first, count, data) = (references.as_ptr(), references.len(), values.$pointer());
                 // SAFETY: the instance lives; `count` elements can be read or written from both addresses.
@@ -256,8 +292,9 @@ access! {
 
 impl Drop for Slave {
     fn drop(&mut self) {
-        // After fmi2Fatal the standard forbids any further call, this one included.
-        if !self.fatal {
+        // After fmi2Fatal of one instance no other of this FMU may be called either.
+        if !self.abandoned && !self.fmu.abandoned.get() {
+            self.entering("fmi2FreeInstance");
             let (call, component) = (self.functions().free_instance, self.component());
             // SAFETY: the instance lives and is not used after this.
             unsafe { call(component) }

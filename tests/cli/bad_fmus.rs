@@ -31,8 +31,11 @@ fn what_is_not_a_zip_archive() {
     let workshop = Workshop::with_fmus();
     workshop.write("plant.fmu", "not a zip archive");
     workshop.write("system.toml", system(&[]));
-    for arguments in [["inspect", "plant.fmu"], ["run", "system.toml"]] {
-        workshop.punctual(arguments).fails_like(1, "plant.fmu: not a readable FMU archive: ", &["EOCD"]);
+    for (arguments, who) in
+        [(["inspect", "plant.fmu"], "plant.fmu"), (["run", "system.toml"], "plant (plant.fmu)")]
+    {
+        let begin = format!("{who}: not a readable FMU archive: ");
+        workshop.punctual(arguments).fails_like(1, &begin, &["EOCD"]);
     }
 }
 
@@ -49,7 +52,7 @@ fn an_archive_that_was_cut_off() {
 fn an_archive_without_a_model_description() {
     run(|entry, bytes| (entry != "modelDescription.xml").then_some(bytes)).fails_like(
         1,
-        "plant.fmu: modelDescription.xml: cannot be read: ",
+        "plant (plant.fmu): modelDescription.xml: cannot be read: ",
         &[],
     );
 }
@@ -73,7 +76,7 @@ fn no_library_for_this_platform() {
         (!entry.starts_with("binaries/")).then_some(bytes)
     });
     assert!(moved.iter().any(|entry| entry.starts_with(&format!("binaries/{PLATFORM}/"))), "{moved:?}");
-    done.fails(1, &format!("plant.fmu: holds no binary at all, so none for {PLATFORM}"));
+    done.fails(1, &format!("plant (plant.fmu): holds no binary at all, so none for {PLATFORM}"));
 }
 
 #[test]
@@ -81,7 +84,7 @@ fn a_library_that_is_none() {
     let done =
         run(|entry, bytes| Some(if entry.starts_with("binaries/") { b"text".to_vec() } else { bytes }));
     // The loader's own words follow.
-    done.fails_like(1, "plant.fmu: its library cannot be loaded: ", &["unicycle"]);
+    done.fails_like(1, "plant (plant.fmu): its library cannot be loaded: ", &["unicycle"]);
 }
 
 #[test]
@@ -97,5 +100,5 @@ fn a_configuration_that_was_tampered_with() {
 #[test]
 fn another_version_of_fmi() {
     let done = run(description("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\""));
-    done.fails_like(1, "plant.fmu: modelDescription.xml: ", &["2.0"]);
+    done.fails_like(1, "plant (plant.fmu): modelDescription.xml: ", &["2.0"]);
 }

@@ -46,17 +46,20 @@ fn crates_depend_on_crates_below_them_only() {
 #[test]
 fn each_heavy_dependency_belongs_to_one_crate() {
     let owners = [
-        ("clarabel", "core/Cargo.toml"),
-        ("quick-xml", "modeldescription/Cargo.toml"),
-        ("zip", "modeldescription/Cargo.toml"),
-        ("toml", "fmu/Cargo.toml"),
-        ("clap", "Cargo.toml"),
-        ("fmi-rs", "Cargo.toml"),
+        ("clarabel", &["core/Cargo.toml"][..]),
+        ("quick-xml", &["modeldescription/Cargo.toml"]),
+        // The one writes archives, the other reads those of others.
+        ("zip", &["modeldescription/Cargo.toml", "Cargo.toml"]),
+        ("toml", &["fmu/Cargo.toml"]),
+        ("clap", &["Cargo.toml"]),
+        ("fmi-rs", &["Cargo.toml"]),
+        ("object", &["Cargo.toml"]),
+        ("roxmltree", &["Cargo.toml"]),
     ];
     for path in ["Cargo.toml", "core/Cargo.toml", "modeldescription/Cargo.toml", "fmu/Cargo.toml"] {
         let dependencies = manifest(path).dependencies;
-        for (name, owner) in owners {
-            assert_eq!(dependencies.contains_key(name), path == owner, "{name} in {path}");
+        for (name, owners) in owners {
+            assert_eq!(dependencies.contains_key(name), owners.contains(&path), "{name} in {path}");
         }
     }
 }
@@ -215,30 +218,28 @@ fn documented(path: &str, module: impl FnMut(&str) -> Option<String>) -> Vec<Vec
 #[test]
 fn each_dependency_is_named_in_one_place() {
     let owners = [
-        (&["clarabel", ":", ":"][..], "core/src/qp/interior_point.rs"),
-        (&["quick_xml", ":", ":"], "modeldescription/src/"),
-        (&["zip", ":", ":"], "modeldescription/src/"),
-        (&["toml", ":", ":"], "fmu/src/configuration/"),
-        (&["clap", ":", ":"], "src/"),
-        (&["fmi_rs", ":", ":"], "src/host/"),
-        (&["libloading", ":", ":"], "src/host/"),
-        (&["plotters", ":", ":"], "src/plot/"),
-        (&["indicatif", ":", ":"], "src/output.rs"),
+        (&["clarabel", ":", ":"][..], &["core/src/qp/interior_point.rs"][..]),
+        (&["quick_xml", ":", ":"], &["modeldescription/src/"]),
+        (&["zip", ":", ":"], &["modeldescription/src/", "src/host/archive.rs"]),
+        (&["toml", ":", ":"], &["fmu/src/configuration/"]),
+        (&["clap", ":", ":"], &["src/"]),
+        (&["fmi_rs", ":", ":"], &["src/host/"]),
+        (&["libloading", ":", ":"], &["src/host/"]),
+        (&["object", ":", ":"], &["src/validate/symbols.rs"]),
+        (&["roxmltree", ":", ":"], &["src/validate/"]),
+        (&["plotters", ":", ":"], &["src/plot/"]),
+        (&["indicatif", ":", ":"], &["src/output.rs"]),
     ];
-    for (tokens, owner) in owners {
+    for (tokens, owners) in owners {
         let mut named = false;
         for source in crates() {
-            // The archives of others are read through fmi_rs::zip.
-            let foreign: Vec<_> = [&["fmi_rs", ":", ":"], tokens].concat();
-            let foreign = source.lexed.lines_with(&foreign);
-            let mut lines = source.lexed.lines_with(tokens);
-            lines.retain(|line| !foreign.contains(line));
-            let place = source.path.starts_with(owner);
+            let lines = source.lexed.lines_with(tokens);
+            let place = owners.iter().any(|owner| source.path.starts_with(owner));
             named |= place && !lines.is_empty();
             let test = tokens[0] == "libloading" && source.is_test();
             assert!(place || test || lines.is_empty(), "{}: {lines:?} name {}", source.path, tokens[0]);
         }
-        assert!(named, "{} is not named in {owner}: the rule is out of date", tokens[0]);
+        assert!(named, "{} is not named in {owners:?}: the rule is out of date", tokens[0]);
     }
 }
 

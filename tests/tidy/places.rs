@@ -33,7 +33,10 @@ fn only_one_module_prints() {
     let streams = [&["stdout", "("][..], &["stderr", "("]];
     for source in crates().filter(|s| s.path != "src/output.rs") {
         for tokens in words.iter().chain(&streams) {
-            let lines = source.lexed.lines_with(tokens);
+            let mut lines = source.lexed.lines_with(tokens);
+            // What a child process may print is a method of its command.
+            let methods = source.lexed.lines_with(&[&["."], *tokens].concat());
+            lines.retain(|line| !methods.contains(line));
             assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens[0]);
         }
     }

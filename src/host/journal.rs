@@ -1,0 +1,117 @@
+//! A file that always says which call into an FMU was made last, for a process that watches this one:
+//! when an FMU ends its process, nobody else is left to tell. Off unless [`begin`] is called; then each
+//! call costs one small write.
+
+use std::fmt;
+use std::fs::File;
+use std::io;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use crate::error::brief_time;
+
+/// Bytes of the one record; longer names are cut.
+const RECORD: usize = 512;
+/// What stands in the file when no FMU is called any more.
+const FINISHED: &str = "finished";
+
+static JOURNAL: OnceLock<File> = OnceLock::new();
+
+/// The last call that a journal tells of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LastCall {
+    /// What was called, such as `fmi2DoStep`.
+    pub call: String,
+    /// The instance, or the empty text before there is one.
+    pub instance: String,
+    /// The FMU's file.
+    pub fmu: String,
+    /// The time of the instance in seconds, where it has one.
+    pub time: Option<f64>,
+}
+
+impl fmt::Display for LastCall {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.instance.as_str() {
+            "" => write!(f, "{}: {}", self.fmu, self.call)?,
+            instance => write!(f, "{} of {instance} ({})", self.call, self.fmu)?,
+        }
+        match self.time {
+            Some(time) => write!(f, " at t = {} s", brief_time(time)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl LastCall {
+    /// Reads the file at `path`: `None` where the watched process had finished with its FMUs or had not
+    /// begun with them.
+    ///
+    /// # Errors
+    ///
+    /// As reading the file.
+    pub fn read(path: &Path) -> io::Result<Option<Self>> {
+        let text = String::from_utf8_lossy(&std::fs::read(path)?).into_owned();
+        let mut lines = text.lines().map(|line| line.trim_end().to_owned());
+        let mut line = || lines.next().unwrap_or_default();
+        let last = Self { call: line(), instance: line(), fmu: line(), time: line().parse().ok() };
+        Ok((!last.call.is_empty() && last.call != FINISHED).then_some(last))
+    }
+
+    /// Whether the watched process said that it had finished with its FMUs.
+    ///
+    /// # Errors
+    ///
+    /// As reading the file.
+    pub fn finished(path: &Path) -> io::Result<bool> {
+        Ok(std::fs::read(path)?.starts_with(FINISHED.as_bytes()))
+    }
+}
+
+/// Keeps the file at `path` from now on. A second call in a process changes nothing.
+///
+/// # Errors
+///
+/// The file cannot be made.
+pub fn begin(path: &Path) -> io::Result<()> {
+    let file = File::create(path)?;
+    let _ = JOURNAL.set(file);
+    Ok(())
+}
+
+/// Says that no FMU is called any more.
+pub fn finish() {
+    write(FINISHED, "", "", None);
+}
+
+/// Says which call comes next.
+#[inline]
+pub(super) fn entering(call: &str, instance: &str, fmu: &Path, time: Option<f64>) {
+    if JOURNAL.get().is_some() {
+        write(call, instance, &fmu.to_string_lossy(), time);
+    }
+}
+
+fn write(call: &str, instance: &str, fmu: &str, time: Option<f64>) {
+    let Some(file) = JOURNAL.get() else { return };
+    let one_line = |text: &str| text.replace(['\n', '\r'], " ");
+    let time = time.map(|time| time.to_string()).unwrap_or_default();
+    let text = format!("{call}\n{}\n{}\n{time}\n", one_line(instance), one_line(fmu));
+    let mut record = [b' '; RECORD];
+    let length = text.len().min(RECORD);
+    record[..length].copy_from_slice(&text.as_bytes()[..length]);
+    // A journal that cannot be written makes the report poorer, not the run.
+    let _ = write_at_start(file, &record);
+}
+
+#[cfg(unix)]
+fn write_at_start(file: &File, record: &[u8]) -> io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, record, 0)
+}
+
+#[cfg(not(unix))]
+fn write_at_start(mut file: &File, record: &[u8]) -> io::Result<()> {
+    use std::io::{Seek, Write};
+    file.rewind()?;
+    file.write_all(record)
+}

@@ -1,0 +1,176 @@
+//! Work with FMUs in a child process: a crash, an `exit()` or a hang of an FMU ends the child, and this
+//! process tells what it was in. The child is this program again, with a journal (see
+//! [`crate::host::journal`]) as the only thing it must leave behind.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use crate::error::Error;
+use crate::host::journal::{self, LastCall};
+
+/// The name of the journal in the child's folder.
+const JOURNAL: &str = "journal";
+/// How often the child is looked at while it runs.
+const LOOK: Duration = Duration::from_millis(5);
+
+fn journal_file(folder: &Path) -> PathBuf {
+    folder.join(JOURNAL)
+}
+
+/// For the child: begins the journal in the folder that the watching process made, and unpacks FMUs below
+/// it, so that nothing is left behind when this process has no time to tidy up.
+///
+/// # Errors
+///
+/// The folder cannot be written to.
+pub fn settle(folder: &Path) -> Result<(), Error> {
+    let file = journal_file(folder);
+    journal::begin(&file).map_err(|e| Error::io("write", &file, e))?;
+    // Refused only where it is set already: then files go there.
+    let _ = tempfile::env::override_temp_dir(folder);
+    Ok(())
+}
+
+/// What the child may say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Voice {
+    /// Its output is this process's.
+    Loud,
+    /// Its output is dropped.
+    Silent,
+}
+
+/// How a child ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    /// By itself, after it had finished with its FMUs; with its exit code.
+    Finished(i32),
+    /// In the middle of its work with an FMU.
+    Broken {
+        /// In which way.
+        how: Break,
+        /// The last call made; `None` before the first.
+        last: Option<LastCall>,
+    },
+}
+
+/// In which way a child broke off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Break {
+    /// By this signal.
+    Signal(i32),
+    /// With this exit code, which the FMU chose by ending the process.
+    Exit(i32),
+    /// It was stopped because it took longer than this.
+    Late(Duration),
+}
+
+impl fmt::Display for Break {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Signal(number) => write!(f, "crashed with signal {number}{}", meaning(*number)),
+            Self::Exit(code) => write!(f, "ended the whole process with exit code {code}"),
+            Self::Late(limit) => write!(f, "did not come back within {} s", limit.as_secs_f64()),
+        }
+    }
+}
+
+/// The name of a signal that ends a process by itself, where all systems agree on its number.
+fn meaning(signal: i32) -> &'static str {
+    match signal {
+        4 => " (illegal instruction)",
+        6 => " (aborted)",
+        8 => " (arithmetic exception)",
+        9 => " (killed)",
+        11 => " (invalid memory access)",
+        15 => " (terminated)",
+        _ => "",
+    }
+}
+
+/// A folder for a child and its arguments.
+#[derive(Debug)]
+pub struct Child {
+    folder: TempDir,
+}
+
+impl Child {
+    /// Makes the folder.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be made.
+    pub fn new() -> Result<Self, Error> {
+        let folder = tempfile::Builder::new().prefix("punctual-child-").tempdir();
+        let folder = folder.map_err(|e| Error::io("create a folder in", &std::env::temp_dir(), e))?;
+        Ok(Self { folder })
+    }
+
+    /// Where the child may leave files.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Runs this program with `arguments` and waits for its end, at most `limit`.
+    ///
+    /// # Errors
+    ///
+    /// The program cannot be started or waited for.
+    pub fn run(
+        &self,
+        arguments: impl IntoIterator<Item = OsString>,
+        voice: Voice,
+        limit: Option<Duration>,
+    ) -> Result<End, Error> {
+        let program = std::env::current_exe().map_err(|e| Error::io("find", Path::new("punctual"), e))?;
+        let failed = |e: io::Error| Error::io("run", &program, e);
+        let mut command = Command::new(&program);
+        command.args(arguments).stdin(Stdio::null());
+        if voice == Voice::Silent {
+            command.stdout(Stdio::null()).stderr(Stdio::null());
+        }
+        let begin = Instant::now();
+        let mut child = command.spawn().map_err(failed)?;
+        let status = loop {
+            if let Some(status) = child.try_wait().map_err(failed)? {
+                break status;
+            }
+            if let Some(limit) = limit.filter(|limit| begin.elapsed() >= *limit) {
+                // It may just have ended by itself; either way it is waited for.
+                let _ = child.kill();
+                child.wait().map_err(failed)?;
+                return Ok(End::Broken { how: Break::Late(limit), last: self.last_call() });
+            }
+            std::thread::sleep(LOOK);
+        };
+        let finished = LastCall::finished(&journal_file(self.folder.path())).unwrap_or(false);
+        Ok(match broken(status) {
+            Break::Exit(code) if finished => End::Finished(code),
+            how => End::Broken { how, last: self.last_call() },
+        })
+    }
+
+    fn last_call(&self) -> Option<LastCall> {
+        LastCall::read(&journal_file(self.folder.path())).ok().flatten()
+    }
+}
+
+#[cfg(unix)]
+fn broken(status: ExitStatus) -> Break {
+    use std::os::unix::process::ExitStatusExt;
+    match status.signal() {
+        Some(signal) => Break::Signal(signal),
+        None => Break::Exit(status.code().unwrap_or(-1)),
+    }
+}
+
+#[cfg(not(unix))]
+fn broken(status: ExitStatus) -> Break {
+    Break::Exit(status.code().unwrap_or(-1))
+}

@@ -1,0 +1,220 @@
+//! How a finding is told: severity, rule, place, words.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// How bad a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The standard is broken, or the FMU does not work.
+    Error,
+    /// Allowed, but some importers will stumble over it.
+    Warning,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        })
+    }
+}
+
+/// Where a finding is.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// The entry of the archive; empty for the archive as a whole, `trial` for what an instance did.
+    pub file: String,
+    /// The line, from 1, and the column, from 1, in bytes.
+    pub position: Option<(u32, u32)>,
+    /// The variable, where it is about one.
+    pub variable: Option<String>,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.file.is_empty() { "archive" } else { &self.file })?;
+        if let Some((line, column)) = self.position {
+            write!(f, ":{line}:{column}")?;
+        }
+        if let Some(variable) = &self.variable {
+            write!(f, " {variable}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Something that is wrong with an FMU.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// One of [`RULES`].
+    pub rule: String,
+    /// Where it is.
+    pub place: Place,
+    /// What is wrong, with the values and those allowed.
+    pub message: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {} [{}]\n  {}",
+            self.severity,
+            self.place,
+            self.rule,
+            self.message.replace('\n', "\n  ")
+        )
+    }
+}
+
+use Severity::{Error, Warning};
+
+/// Every rule: its name, how bad it is to break it, and what it asks. A rule's name never changes its
+/// meaning.
+pub const RULES: &[(&str, Severity, &str)] = &[
+    (
+        "archive.readable",
+        Error,
+        "the file is a zip archive: whole, no entry twice, no link, nothing encrypted",
+    ),
+    ("archive.name", Error, "no entry is absolute, leaves the archive, or holds a backslash"),
+    ("archive.limit", Error, "the archive is not larger than what is unpacked from a file of unknown origin"),
+    (
+        "archive.binary",
+        Error,
+        "there is a library, or source code, for some platform, named as modelIdentifier says",
+    ),
+    ("archive.platform", Warning, "there is a library for this platform"),
+    ("archive.top-folder", Warning, "everything lies where the standard has a place for it"),
+    ("xml.readable", Error, "modelDescription.xml is there, UTF-8, well-formed, and needs no document type"),
+    ("schema.element", Error, "elements are those of the schema, in its order and number"),
+    ("schema.attribute", Error, "attributes are those of the schema; the required ones are there"),
+    ("schema.value", Error, "values have the type that the schema gives them"),
+    ("schema.text", Error, "there is no text between elements"),
+    ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
+    ("interface.identifier", Error, "modelIdentifier is a C identifier"),
+    ("interface.guid", Error, "guid is not empty"),
+    ("interface.flags", Warning, "the capability flags do not contradict each other"),
+    ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
+    ("unit.unique", Error, "no unit or display unit is defined twice"),
+    ("unit.defined", Error, "units and display units used are defined"),
+    ("type.unique", Error, "no type is defined twice or named like a variable"),
+    ("type.defined", Error, "declaredType names a type of the same kind"),
+    ("type.items", Error, "the items of an enumeration have different names and values"),
+    ("variable.unique", Error, "variable names are unique"),
+    ("variable.name", Error, "variable names follow the naming convention"),
+    ("variable.alias", Warning, "variables with the same value reference agree in start value and unit"),
+    ("variable.alias-set", Error, "at most one variable of an alias set can be set from outside"),
+    ("variable.combination", Error, "causality, variability and initial go together"),
+    ("variable.continuous", Error, "only Real variables are continuous"),
+    ("variable.start", Error, "start values are there where they must be, and only there"),
+    ("variable.range", Error, "min <= start <= max"),
+    ("variable.enumeration", Error, "start values of enumerations are values of their items"),
+    ("variable.independent", Error, "there is at most one independent variable, and it is Real"),
+    ("variable.derivative", Error, "derivative is the index of a Real variable"),
+    ("structure.outputs", Error, "ModelStructure/Outputs lists every output exactly once"),
+    ("structure.derivatives", Error, "ModelStructure/Derivatives lists derivatives"),
+    ("structure.initial-unknowns", Error, "ModelStructure/InitialUnknowns is complete, without others"),
+    ("structure.order", Error, "ModelStructure/InitialUnknowns is sorted by index"),
+    ("structure.index", Error, "indices are those of variables, from 1"),
+    ("structure.dependencies", Error, "dependencies name variables; dependenciesKind has as many words"),
+    ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
+    ("symbols.readable", Error, "libraries are of the format and processor of their folder"),
+    ("symbols.missing", Error, "libraries export every function of FMI 2.0 co-simulation"),
+    ("trial.load", Error, "the library can be loaded, and an FMI 2.0 importer can read the description"),
+    ("trial.version", Error, "fmi2GetVersion answers 2.0 and fmi2GetTypesPlatform default"),
+    ("trial.call", Error, "every call of the trial succeeds"),
+    ("trial.crash", Error, "the FMU does not crash, hang or end the process"),
+    ("trial.discard", Warning, "the trial's steps are not discarded"),
+    ("trial.warning", Warning, "no call returns fmi2Warning, which several importers take for a failure"),
+    ("trial.output", Warning, "outputs are finite and within their range"),
+    ("trial.start", Warning, "parameters and inputs have the start values that the description says"),
+    ("trial.text", Warning, "fmi2GetString gives a text"),
+    ("trial.reset", Warning, "after fmi2Reset the FMU does the same again"),
+    ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
+];
+
+/// Most findings kept of one rule: the thousandth variable without a start value teaches nothing.
+const KEPT_OF_A_RULE: usize = 20;
+
+/// A place in the model description.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mark {
+    /// Bytes from the beginning of the text.
+    pub(super) at: usize,
+    /// The variable, where it is about one.
+    pub(super) variable: Option<String>,
+}
+
+/// The entry that marks are in.
+pub(super) const DESCRIPTION: &str = "modelDescription.xml";
+
+/// Findings while they are collected.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    /// Where the lines of the model description begin, in bytes.
+    lines: Vec<usize>,
+    list: Vec<Finding>,
+    left_out: Vec<(String, usize)>,
+}
+
+impl Findings {
+    /// Takes the text that marks are in.
+    pub(super) fn read(&mut self, text: &str) {
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        self.lines = std::iter::once(0).chain(breaks.map(|(at, _)| at + 1)).collect();
+    }
+
+    /// Adds a finding of a rule in the model description.
+    pub(super) fn add(&mut self, rule: &str, mark: Mark, message: impl Into<String>) {
+        let line = self.lines.partition_point(|begin| *begin <= mark.at);
+        let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(0);
+        let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let position = Some((number(line), number(mark.at - begin + 1)));
+        self.place(rule, Place { file: DESCRIPTION.to_owned(), position, variable: mark.variable }, message);
+    }
+
+    /// Adds a finding of a rule. A rule that is not in [`RULES`] counts as an error.
+    pub(super) fn place(&mut self, rule: &str, place: Place, message: impl Into<String>) {
+        let severity = RULES.iter().find(|known| known.0 == rule).map_or(Error, |known| known.1);
+        self.push(Finding { severity, rule: rule.to_owned(), place, message: message.into() });
+    }
+
+    /// Adds a finding in an entry of the archive.
+    pub(super) fn archive(&mut self, rule: &str, entry: &str, message: impl Into<String>) {
+        self.place(rule, Place { file: entry.to_owned(), ..Place::default() }, message);
+    }
+
+    /// Adds a finding as it is.
+    pub(super) fn push(&mut self, finding: Finding) {
+        if self.list.iter().filter(|other| other.rule == finding.rule).count() < KEPT_OF_A_RULE {
+            self.list.push(finding);
+            return;
+        }
+        match self.left_out.iter_mut().find(|(rule, _)| *rule == finding.rule) {
+            Some((_, count)) => *count += 1,
+            None => self.left_out.push((finding.rule, 1)),
+        }
+    }
+
+    /// Whether a rule whose name begins so is broken.
+    pub(super) fn any(&self, head: &str) -> bool {
+        self.list.iter().any(|finding| finding.severity == Error && finding.rule.starts_with(head))
+    }
+
+    /// All findings; where some were left out, the last of their rule says how many.
+    pub(super) fn finish(mut self) -> Vec<Finding> {
+        for (rule, count) in self.left_out {
+            if let Some(last) = self.list.iter_mut().rev().find(|finding| finding.rule == rule) {
+                last.message.push_str(&format!(" (and {count} more findings of this rule)"));
+            }
+        }
+        self.list
+    }
+}

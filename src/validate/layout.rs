@@ -1,0 +1,76 @@
+//! Which entries the archive must and may have (FMI 2.0.4, section 2.3).
+
+use super::finding::Findings;
+use super::model::Model;
+use crate::host::{Archive, PLATFORM};
+
+/// What may stand at the top of the archive.
+const TOP: [&str; 8] = [
+    "modelDescription.xml",
+    "model.png",
+    "documentation",
+    "sources",
+    "binaries",
+    "resources",
+    "extra",
+    "licenses",
+];
+
+/// The ending of libraries in a folder of `binaries/`, by the beginning of its name.
+pub(super) const ENDINGS: [(&str, &str); 4] =
+    [("win", ".dll"), ("linux", ".so"), ("aarch64-linux", ".so"), ("darwin", ".dylib")];
+
+/// The ending of libraries for a platform, where it is one that the standard names.
+pub(super) fn ending(platform: &str) -> Option<&'static str> {
+    ENDINGS.iter().find(|(head, _)| platform.starts_with(head)).map(|(_, ending)| *ending)
+}
+
+pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Findings) {
+    let mut odd: Vec<&str> = archive.entries().iter().filter_map(|entry| entry.split('/').next()).collect();
+    odd.retain(|top| !TOP.contains(top));
+    odd.sort_unstable();
+    odd.dedup();
+    for top in odd {
+        let message = format!("{top:?} at the top of the archive; the standard has {}", TOP.join(", "));
+        findings.archive("archive.top-folder", top, message);
+    }
+    let Some(interface) = model.interface() else { return };
+    let Some(identifier) = interface.identifier else { return };
+    let mut libraries = 0;
+    for platform in archive.platforms() {
+        let Some(ending) = ending(platform) else { continue };
+        let wanted = format!("binaries/{platform}/{identifier}{ending}");
+        if archive.entries().contains(&wanted) {
+            libraries += 1;
+            continue;
+        }
+        let folder = format!("binaries/{platform}/");
+        let present: Vec<_> = archive
+            .entries()
+            .iter()
+            .filter(|e| e.starts_with(&folder) && !e.ends_with('/'))
+            .take(8)
+            .cloned()
+            .collect();
+        let message = format!(
+            "there is no {wanted}, which modelIdentifier = {identifier:?} asks for; there is {}",
+            present.join(", ")
+        );
+        findings.archive("archive.binary", &folder, message);
+    }
+    let sources = interface.source_files > 0
+        || archive.entries().iter().any(|entry| entry.starts_with("sources/") && !entry.ends_with('/'));
+    if libraries == 0 && !sources && !findings.any("archive.binary") {
+        let message = format!(
+            "there is no library under binaries/ and no source code, so nothing can be run; expected for this platform: \
+             binaries/{PLATFORM}/{identifier}{}",
+            std::env::consts::DLL_SUFFIX
+        );
+        findings.archive("archive.binary", "", message);
+    } else if !archive.platforms().iter().any(|platform| platform == PLATFORM) {
+        let present =
+            if archive.platforms().is_empty() { "none".into() } else { archive.platforms().join(", ") };
+        let message = format!("there is no library for this platform, {PLATFORM}; there is: {present}");
+        findings.archive("archive.platform", "binaries/", message);
+    }
+}

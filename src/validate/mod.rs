@@ -1,0 +1,99 @@
+//! What is wrong with an FMI 2.0 co-simulation FMU, ours or another's, as a list of findings. Each
+//! module asks one kind of question and uses only those above it:
+//!
+//! | module | asks |
+//! |---|---|
+//! | `finding` | how a finding is told |
+//! | `schema` | what the XML schema says: elements, attributes, types of values |
+//! | `model` | nothing: the description as plain data with positions |
+//! | `semantics` | what the standard says beyond the schema |
+//! | `layout` | which files the archive must and may hold |
+//! | `symbols` | whether the libraries export what they must, without loading them |
+//! | `trial` | whether an instance does what it should, in a child process |
+
+mod finding;
+mod layout;
+mod model;
+mod schema;
+mod semantics;
+mod symbols;
+pub mod trial;
+
+use std::path::Path;
+use std::time::Duration;
+
+pub use finding::{Finding, Place, RULES, Severity};
+
+use crate::error::{Error, FmuProblem};
+use crate::host::Archive;
+use finding::Findings;
+
+/// What was found in one FMU.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// All findings: those of the archive first, then of the description from top to bottom.
+    pub findings: Vec<Finding>,
+    /// What was not looked at, and why.
+    pub skipped: Vec<String>,
+}
+
+impl Report {
+    /// The number of findings of this severity.
+    pub fn count(&self, severity: Severity) -> usize {
+        self.findings.iter().filter(|finding| finding.severity == severity).count()
+    }
+}
+
+/// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of
+/// the FMU is run.
+///
+/// # Errors
+///
+/// The file cannot be read, or the trial's process cannot be started. Whatever is wrong with the FMU
+/// is a finding.
+pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
+    let mut findings = Findings::default();
+    let mut skipped = Vec::new();
+    let archive = match Archive::open(path) {
+        Ok(archive) => archive,
+        Err(error) => {
+            let Some(problem) = error.as_fmu_problem() else { return Err(error) };
+            findings.archive(rule(problem), "", problem.to_string());
+            skipped.push("everything else: the archive was not unpacked".to_owned());
+            return Ok(Report { findings: findings.finish(), skipped });
+        }
+    };
+    let text = match archive.model_description() {
+        Ok(text) => text,
+        Err(problem) => {
+            findings.archive(rule(&problem), "modelDescription.xml", problem.to_string());
+            skipped.push("everything else: there is no description to go by".to_owned());
+            return Ok(Report { findings: findings.finish(), skipped });
+        }
+    };
+    let Some(document) = schema::parse(&text, &mut findings) else {
+        skipped.push("everything else: the description is not well-formed".to_owned());
+        return Ok(Report { findings: findings.finish(), skipped });
+    };
+    schema::check(&document, &mut findings);
+    let model = model::Model::read(&document);
+    semantics::check(&model, &mut findings);
+    layout::check(&archive, &model, &mut findings);
+    symbols::check(&archive, &model, &mut findings);
+    match (limit, trial::reason_to_skip(&archive, &model, &findings)) {
+        (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
+        (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
+        (Some(limit), None) => trial::run(path, limit, &mut findings)?,
+    }
+    Ok(Report { findings: findings.finish(), skipped })
+}
+
+/// The rule that an FMU breaks which cannot be opened at all.
+fn rule(problem: &FmuProblem) -> &'static str {
+    match problem {
+        FmuProblem::UnsafeEntry(_) => "archive.name",
+        FmuProblem::Limit { .. } => "archive.limit",
+        FmuProblem::Description(_) => "xml.readable",
+        _ => "archive.readable",
+    }
+}

@@ -1,0 +1,179 @@
+//! What the XML schema of FMI 2.0 says, as one table ([`table`]) and one pass over the document.
+
+mod table;
+pub(super) mod types;
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::finding::{DESCRIPTION, Findings, Mark, Place};
+use table::{Content, ELEMENTS, Element, Times, Use};
+
+/// The attributes that every element may have: those of the schema language itself.
+const SCHEMA_INSTANCE: &str = "http://www.w3.org/2001/XMLSchema-instance";
+
+/// Parses the text; a finding where it is not well-formed.
+pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Document<'a>> {
+    findings.read(text);
+    // Without a document type, and as many nodes as the text has been looked through for.
+    let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
+    match Document::parse_with_options(text, options) {
+        Ok(document) => {
+            declared_encoding(text, findings);
+            Some(document)
+        }
+        Err(error) => {
+            let at = error.pos();
+            let place = Place { file: DESCRIPTION.into(), position: Some((at.row, at.col)), variable: None };
+            let words = error.to_string();
+            let words = words.rsplit_once(" at ").map_or(words.as_str(), |(words, _)| words);
+            findings.place("xml.readable", place, format!("is not well-formed XML: {words}"));
+            None
+        }
+    }
+}
+
+/// The standard asks for UTF-8; the parser goes by the bytes, other importers by the declaration.
+fn declared_encoding(text: &str, findings: &mut Findings) {
+    let declaration = text.strip_prefix("<?xml").and_then(|rest| rest.split_once("?>")).map(|(head, _)| head);
+    let Some((_, rest)) = declaration.and_then(|head| head.split_once("encoding")) else { return };
+    let Some(name) = rest.split(['"', '\'']).nth(1) else { return };
+    if !name.eq_ignore_ascii_case("utf-8") {
+        findings.add(
+            "xml.readable",
+            Mark::default(),
+            format!("the declared encoding is {name:?}; must be UTF-8"),
+        );
+    }
+}
+
+/// Where a node begins.
+pub(super) fn place(node: Node<'_, '_>) -> Mark {
+    mark(node, node.range().start)
+}
+
+/// Where an attribute of a node stands, or the node where it has none of this name.
+pub(super) fn place_of(node: Node<'_, '_>, attribute: &str) -> Mark {
+    let at = node.attribute_node(attribute).map_or(node.range().start, |a| a.range().start);
+    mark(node, at)
+}
+
+fn mark(node: Node<'_, '_>, at: usize) -> Mark {
+    // A variable and its type are at most this deep.
+    let inside = node.ancestors().take(2).find(|n| n.has_tag_name("ScalarVariable"));
+    Mark { at, variable: inside.and_then(|n| n.attribute("name")).map(brief) }
+}
+
+/// Checks the whole document.
+pub(super) fn check(document: &Document<'_>, findings: &mut Findings) {
+    let root = document.root_element();
+    if root.tag_name().name() != "fmiModelDescription" || root.tag_name().namespace().is_some() {
+        let message = format!("the root element is {}; must be fmiModelDescription", root.tag_name().name());
+        findings.add("schema.element", place(root), message);
+        return;
+    }
+    // Not by recursion: the depth is the file's.
+    let mut open = vec![(root, "fmiModelDescription")];
+    while let Some((node, kind)) = open.pop() {
+        let Some(element) = ELEMENTS.iter().find(|element| element.kind == kind) else { continue };
+        attributes(node, element, findings);
+        children(node, element, &mut open, findings);
+    }
+}
+
+fn attributes(node: Node<'_, '_>, element: &Element, findings: &mut Findings) {
+    let name = node.tag_name().name();
+    for attribute in node.attributes() {
+        if attribute.namespace() == Some(SCHEMA_INSTANCE) {
+            continue;
+        }
+        let known = element.attributes.iter().find(|a| a.name == attribute.name());
+        let Some(known) = known.filter(|_| attribute.namespace().is_none()) else {
+            let names: Vec<_> = element.attributes.iter().map(|a| a.name).collect();
+            let allowed = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let message = format!("{name} has an attribute {}; allowed: {allowed}", attribute.name());
+            findings.add("schema.attribute", mark(node, attribute.range().start), message);
+            continue;
+        };
+        if let Err(allowed) = known.value.accepts(attribute.value()) {
+            let message =
+                format!("{name}: {} is {:?}; must be {allowed}", known.name, brief(attribute.value()));
+            findings.add("schema.value", mark(node, attribute.range().start), message);
+        }
+    }
+    for required in element.attributes.iter().filter(|a| a.required == Use::Required) {
+        if node.attribute(required.name).is_none() {
+            let message = format!("{name} has no attribute {}, which it must have", required.name);
+            findings.add("schema.attribute", place(node), message);
+        }
+    }
+}
+
+/// The beginning of a long value.
+pub(super) fn brief(value: &str) -> String {
+    const LENGTH: usize = 80;
+    if value.chars().count() <= LENGTH {
+        return value.to_owned();
+    }
+    value.chars().take(LENGTH).chain("...".chars()).collect()
+}
+
+fn children<'a, 'i>(
+    node: Node<'a, 'i>,
+    element: &Element,
+    open: &mut Vec<(Node<'a, 'i>, &'static str)>,
+    findings: &mut Findings,
+) {
+    if element.content == Content::Anything {
+        return;
+    }
+    let name = node.tag_name().name();
+    let rules = element.children;
+    let allowed = || {
+        let names: Vec<_> = rules.iter().map(|child| child.name).collect();
+        if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+    };
+    let mut counts = vec![0_usize; rules.len()];
+    let mut reached = 0;
+    for child in node.children() {
+        if let Some(text) = child.text().filter(|text| child.is_text() && !text.trim().is_empty()) {
+            let message = format!("text {:?} between the elements of {name}", brief(text.trim()));
+            findings.add("schema.text", place(child), message);
+        }
+        if !child.is_element() {
+            continue;
+        }
+        let tag = child.tag_name();
+        let known = rules.iter().position(|rule| rule.name == tag.name() && tag.namespace().is_none());
+        let Some(index) = known else {
+            let message = format!("{name} has an element {}; allowed: {}", tag.name(), allowed());
+            findings.add("schema.element", place(child), message);
+            continue;
+        };
+        let rule = &rules[index];
+        counts[index] += 1;
+        if rule.group < reached {
+            let message = format!("{} stands too late in {name}; the order is {}", rule.name, allowed());
+            findings.add("schema.element", place(child), message);
+        }
+        reached = reached.max(rule.group);
+        if rule.times.most() < counts[index] {
+            let message = format!("{} is there again; {name} has it at most once", rule.name);
+            findings.add("schema.element", place(child), message);
+        }
+        open.push((child, rule.kind));
+    }
+    let choosing = rules.iter().filter(|rule| rule.times == Times::Choice).map(|rule| rule.name);
+    let chosen: usize =
+        rules.iter().zip(&counts).filter(|(rule, _)| rule.times == Times::Choice).map(|(_, n)| *n).sum();
+    let names: Vec<_> = choosing.collect();
+    if !names.is_empty() && chosen != 1 {
+        let message = format!("{name} has {chosen} of {}; must have exactly one", names.join(", "));
+        findings.add("schema.element", place(node), message);
+    }
+    for (rule, count) in rules.iter().zip(counts) {
+        if count == 0 && matches!(rule.times, Times::One | Times::Some) {
+            let message = format!("{name} has no element {}, which it must have", rule.name);
+            findings.add("schema.element", place(node), message);
+        }
+    }
+}

@@ -1,0 +1,98 @@
+"""`punctual validate` and FMPy come to the same verdict, on our FMUs and on descriptions broken one way each."""
+
+import json
+import os
+import subprocess
+import sysconfig
+import zipfile
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from conftest import ROOT, punctual
+
+FIXTURES = ROOT / "tests" / "fixtures"
+
+FIRST = '<Unknown index="1" dependencies="2" dependenciesKind="dependent"/>'
+# What is replaced by what; both must object.
+BROKEN = {
+    "no model name": (' modelName="misbehaving"', ""),
+    "an unknown attribute": ("canHandleVariable", "canHandelVariable"),
+    "an unknown element": ("<ModelVariables>", "<Odd/><ModelVariables>"),
+    "an empty list": ('<Category name="logAll"/>', ""),
+    "the wrong order": ("  <DefaultExperiment", "  <UnitDefinitions><Unit name='s'/></UnitDefinitions><DefaultExperiment"),
+    "a flag that is none": ('StepSize="true"', 'StepSize="yes"'),
+    "a number that is none": ('max="1000"', 'max="lots"'),
+    "infinity in Rust's spelling": ('max="1000"', 'max="inf"'),
+    "a negative reference": ('valueReference="1"', 'valueReference="-1"'),
+    "an unknown causality": ('causality="input"', 'causality="inputs"'),
+    "a date that is none": ("2026-01-31T", "2026-02-31T"),
+    "no type": ("<String/>", ""),
+    "two types": ("<String/>", "<String/><Integer/>"),
+    "another version": ('fmiVersion="2.0"', 'fmiVersion="2.1"'),
+    "a name twice": ('name="u"', 'name="y"'),
+    "a name that is not structured": ('name="u"', 'name="u["'),
+    "an undefined unit": ('<Real unit="m" max="1000"/>', '<Real unit="s"/>'),
+    "an undefined display unit": ('displayUnit="mm"', 'displayUnit="km"'),
+    "an undefined type": ("<String/>", '<String declaredType="T"/>'),
+    "an input without start": ('<Real start="0" unit', "<Real unit"),
+    "a start too many": ("<String/>", '<String start="x"/>'),
+    "an illegal combination": ('causality="input"', 'causality="input" variability="fixed"'),
+    "an illegal initial": ('variability="fixed"', 'variability="fixed" initial="calculated"'),
+    "a continuous text": (' variability="discrete"', ""),
+    "an output that is not listed": (FIRST, ""),
+    "an output that is none": (FIRST, FIRST + '<Unknown index="3" dependencies=""/>'),
+    "too few kinds": ('dependencies="2"', 'dependencies="2 3"'),
+    "kinds without dependencies": ('dependencies="2" ', ""),
+    "an initial unknown that is not listed": ("<InitialUnknowns>\n      " + FIRST, "<InitialUnknowns>"),
+    "not well-formed": ("</Outputs>", ""),
+}
+# No defect for either.
+SOUND = {
+    "nothing": ("", ""),
+    "flags as numbers": ('StepSize="true"', 'StepSize="1"'),
+    "infinity": ('max="1000"', 'max="INF"'),
+    "no version of the tool": ("<LogCategories>", "<!-- a comment --><LogCategories>"),
+    "a variable of its own kind": ("<String/>", '<String/><Annotations><Tool name="t"/></Annotations>'),
+    "model exchange too": ("<CoSimulation", '<ModelExchange modelIdentifier="misbehaving"/><CoSimulation'),
+}
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    product = tmp_path_factory.mktemp("library") / "misbehaving"
+    compiler = os.environ.get("CC", "cc")
+    flags = ["-shared", "-fPIC", "-fvisibility=hidden"]
+    subprocess.run([compiler, *flags, FIXTURES / "misbehaving.c", "-o", product, "-lm"], check=True)
+    return product
+
+
+def verdicts(folder, library, old, new):
+    xml = (FIXTURES / "misbehaving.xml").read_text()
+    assert old in xml
+    fmu = folder / "x.fmu"
+    with zipfile.ZipFile(fmu, "w") as archive:
+        archive.writestr("modelDescription.xml", xml.replace(old, new, 1))
+        archive.write(library, "binaries/linux64/misbehaving.so")
+    done = punctual("validate", fmu, "--json", "--no-trial", check=False)
+    return json.loads(done.stdout), validate_fmu(str(fmu))
+
+
+@pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")
+@pytest.mark.parametrize("defect", BROKEN)
+def test_both_object(tmp_path, library, defect):
+    ours, theirs = verdicts(tmp_path, library, *BROKEN[defect])
+    assert ours["errors"] > 0 and theirs, (ours, theirs)
+
+
+@pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")
+@pytest.mark.parametrize("edit", SOUND)
+def test_both_accept(tmp_path, library, edit):
+    ours, theirs = verdicts(tmp_path, library, *SOUND[edit])
+    assert ours["errors"] == 0 and theirs == [], (ours, theirs)
+
+
+def test_ours_have_no_errors_and_no_warnings(fmus):
+    for path in fmus:
+        report = json.loads(punctual("validate", path, "--json").stdout)
+        assert (report["findings"], report["not_examined"]) == ([], []), path.name
