@@ -78,10 +78,26 @@ pub struct FixedTimeState {
 pub struct Unmet {
     /// How many, ≥ 1.
     pub steps: u32,
-    /// Time of the first in s.
+    /// Time in s of the first, or of the last progress since: a rise of h by a hundredth of its size.
     pub since: f64,
     /// h then, in its own unit.
     pub h: f64,
+}
+
+impl Unmet {
+    const PROGRESS: f64 = 0.01;
+
+    /// With one more step, at time `t` with the value `h`.
+    pub(crate) fn after(before: Option<Self>, t: f64, h: f64) -> Self {
+        match before {
+            None => Self { steps: 1, since: t, h },
+            Some(unmet) => {
+                let steps = unmet.steps.saturating_add(1);
+                let progress = h - unmet.h > Self::PROGRESS * unmet.h.abs();
+                if progress { Self { steps, since: t, h } } else { Self { steps, ..unmet } }
+            }
+        }
+    }
 }
 
 impl FixedTimeState {

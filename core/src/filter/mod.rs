@@ -253,11 +253,8 @@ impl SafetyFilter {
             }
             report_b.slack = row.slack(u);
             let soft = matches!(enforcement[i], Enforcement::Soft { .. });
-            promise.unmet = match promise.unmet {
-                _ if report.status.is_satisfied() && !soft || row.holds(u) => None,
-                Some(unmet) => Some(Unmet { steps: unmet.steps.saturating_add(1), ..unmet }),
-                None => Some(Unmet { steps: 1, since: t, h: report_b.h }),
-            };
+            let met = report.status.is_satisfied() && !soft || row.holds(u);
+            promise.unmet = (!met).then(|| Unmet::after(promise.unmet, t, report_b.h));
             if let Some(unmet) = promise.unmet {
                 promise.guaranteed = false;
                 (report_b.guaranteed, report_b.unmet_steps) = (false, unmet.steps);
@@ -265,7 +262,7 @@ impl SafetyFilter {
             }
         }
         if blocked {
-            report.find_deadlocks(t, &next.barriers, u);
+            report.find_deadlocks(t, &next.barriers, programme.active());
         }
         Ok(())
     }

@@ -1,7 +1,10 @@
 //! What a step says about itself.
 
 use crate::convergence::{Demand, FixedTimeState, Phase};
-use crate::qp::{Row, Solver, dot};
+use crate::qp::{Active, Constraint, Row, Solver, dot};
+
+/// Part of the deadline without progress in [`BarrierReport::deadlocked`].
+const DEADLOCK_TIME: f64 = 0.1;
 
 /// How a step ended, and so what the returned input means. The numbers are stable: they leave the
 /// library as the FMU's `status`.
@@ -83,11 +86,11 @@ pub struct BarrierReport {
     pub slack: f64,
     /// Steps in a row that have not met the constraint, this one included.
     pub unmet_steps: u32,
-    /// Where the constraint is not met: the number of the barrier whose row holds with equality and points
-    /// most against this one's, if there is one.
+    /// Where the constraint is not met: the number of the barrier whose row is active and points most
+    /// against this one's, if there is one.
     pub blocked_by: Option<usize>,
-    /// Whether the barrier is blocked and has been getting nowhere: its constraint has not been met for a
-    /// tenth of its deadline, in which h has not risen by a hundredth of its size. Another u_ref can lead
+    /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
+    /// been met, and h has not risen by a hundredth of its size. Another u_ref can lead
     /// out of it, one that goes around ([`Heading::around`](crate::nominal::Heading::around)).
     pub deadlocked: bool,
     /// How far h may fall below its promise within the period because the input is held, `[h]`: what
@@ -190,20 +193,16 @@ impl Report {
         self.barriers.iter().enumerate().filter(|(_, b)| b.unmet_steps > 0).map(|(i, _)| i)
     }
 
-    /// Finds what blocks the barriers that are not met at `u`, and whether that is a deadlock.
-    pub(super) fn find_deadlocks(&mut self, t: f64, promises: &[FixedTimeState], u: &[f64]) {
-        /// Part of the deadline, and part of |h|, in [`BarrierReport::deadlocked`].
-        const TIME: f64 = 0.1;
-        const PROGRESS: f64 = 0.01;
+    /// Finds which of the `active` rows blocks the barriers that are not met, and whether that is a deadlock.
+    pub(super) fn find_deadlocks(&mut self, t: f64, promises: &[FixedTimeState], active: &[Active]) {
         for i in 0..self.barriers.len() {
             let Some(unmet) = promises[i].unmet else { continue };
-            let (normal, mut worst) = (self.barriers[i].row.normal, 0.0);
-            let mut blocked_by = None;
-            for (j, other) in self.barriers.iter().enumerate() {
-                let tight = other.slack.abs() <= 1e-6 * other.row.size(u);
-                let size = dot(&normal, &normal).sqrt() * dot(&other.row.normal, &other.row.normal).sqrt();
-                let cosine = dot(&normal, &other.row.normal) / size;
-                if j != i && tight && cosine < worst {
+            let (normal, mut worst, mut blocked_by) = (self.barriers[i].row.normal, 0.0, None);
+            for active in active {
+                let Constraint::Row(j) = active.constraint else { continue };
+                let other = &self.barriers[j].row.normal;
+                let cosine = dot(&normal, other) / (dot(&normal, &normal) * dot(other, other)).sqrt();
+                if j != i && cosine < worst {
                     (worst, blocked_by) = (cosine, Some(j));
                 }
             }
@@ -211,8 +210,7 @@ impl Report {
             b.blocked_by = blocked_by;
             b.deadlocked = blocked_by.is_some()
                 && matches!(b.phase, Phase::Approach | Phase::Late)
-                && t - unmet.since >= TIME * promises[i].deadline
-                && b.h - unmet.h <= PROGRESS * unmet.h.abs();
+                && t - unmet.since >= DEADLOCK_TIME * promises[i].deadline;
         }
     }
 
