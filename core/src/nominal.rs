@@ -80,6 +80,37 @@ impl Heading {
         Ok(self)
     }
 
+    /// The same controller towards a point from which the way to the goal is free: where the straight way
+    /// from `position` passes within `clearance` (m) of one of the discs (centre and radius in m), a point
+    /// beside the first of them, on the side where the way is shorter. The goal itself where it does not.
+    ///
+    /// Not a plan: it looks at one disc at a time and can go back and forth between discs that overlap.
+    pub fn around(self, position: [f64; 2], discs: &[([f64; 2], f64)], clearance: f64) -> Self {
+        let way = [self.goal[0] - position[0], self.goal[1] - position[1]];
+        let length = way[0].hypot(way[1]);
+        if length == 0.0 {
+            return self;
+        }
+        let along = [way[0] / length, way[1] / length];
+        let (mut first, mut goal) = (f64::INFINITY, self.goal);
+        for &(centre, radius) in discs {
+            let to = [centre[0] - position[0], centre[1] - position[1]];
+            // Where the disc is along the way, and beside it: > 0 to the left.
+            let ahead = to[0] * along[0] + to[1] * along[1];
+            let beside = along[0] * to[1] - along[1] * to[0];
+            let wide = radius + clearance;
+            if ahead <= 0.0 || ahead - wide >= length || beside.abs() >= wide || ahead >= first {
+                continue;
+            }
+            first = ahead;
+            // Pass a disc on the left on its right side, with as much room again as the way misses.
+            let side = if beside > 0.0 { -1.0 } else { 1.0 };
+            let out = 1.2 * wide;
+            goal = [centre[0] - along[1] * side * out, centre[1] + along[0] * side * out];
+        }
+        Self { goal, ..self }
+    }
+
     /// Acceleration (m/s²) of the point mass, x = (x_p, y_p, v_x, v_y).
     pub fn point_mass(&self, x: &[f64; 4]) -> [f64; 2] {
         let (d, distance) = self.offset(x);

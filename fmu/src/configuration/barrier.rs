@@ -182,6 +182,14 @@ pub struct BarrierSection {
     /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
     #[serde(default)]
     pub recovery: f64,
+    /// Where not all barriers can be met: those of smaller numbers go first, of equal ones the one above.
+    /// Default: 0 for one whose set the start is in, 1 for the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub priority: Option<u32>,
+    /// Makes it soft: it yields where it would cost more than this ‖u − u_ref‖, in units of u, > 0. Default 0:
+    /// hard.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub penalty: f64,
     /// Time in s after the first step from which it is enforced, ≥ 0, < deadline. Default 0.
     #[serde(default, skip_serializing_if = "is_default")]
     pub begin: f64,
@@ -301,6 +309,9 @@ impl BarrierSection {
         row("recovery", "s", non_negative, "deadline for coming back after leaving; 0: none", |b| {
             &mut b.recovery
         });
+        if self.penalty != 0.0 {
+            row("penalty", "1", positive, "distance in u beyond which it yields", |b| &mut b.penalty);
+        }
         if self.begin != 0.0 {
             row("begin", "s", non_negative, "time from the first step to be enforced from", |b| &mut b.begin);
         }

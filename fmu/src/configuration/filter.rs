@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
-use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
 use punctual_core::lie;
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
@@ -212,7 +212,19 @@ impl FilterConfiguration {
             let adding = Adding { configuration: self, builder, index: i, point };
             builder = section.visit(&self.plant.model, states, adding).map_err(core)??;
             let (begin, end) = self.window(i)?;
-            builder = builder.window(begin, end).map_err(|e| self.refused(i, &e))?;
+            let strictness = match (section.penalty, section.priority) {
+                (penalty, Some(_)) if penalty != 0.0 => {
+                    let message = "belongs to hard barriers, this one has a penalty";
+                    return Err(ConfigurationError::new(format!("barrier[{i}].priority"), message));
+                }
+                (penalty, _) if penalty != 0.0 => Strictness::Soft(penalty),
+                (_, Some(priority)) => Strictness::Priority(priority),
+                _ => Strictness::KeepFirst,
+            };
+            builder = builder
+                .window(begin, end)
+                .and_then(|b| b.strictness(strictness))
+                .map_err(|e| self.refused(i, &e))?;
         }
         let (mut min, mut max) = (Vec::new(), Vec::new());
         for input in inputs {

@@ -84,6 +84,10 @@ defects! {
     an_unknown_state: FILTER,
         "centre = [45.0, 44.0]\nradius = 2.0" => "shape = \"at_most\"\nstate = \"w\"\nbound = 1.0",
         "barrier[0].state: is \"w\", must be one of x_p, y_p, theta, v";
+    a_priority_of_a_soft_barrier: FILTER, "radius = 2.0" => "radius = 2.0\npriority = 1\npenalty = 2.0",
+        "barrier[0].priority: belongs to hard barriers, this one has a penalty";
+    a_negative_penalty: FILTER, "radius = 2.0" => "radius = 2.0\npenalty = -2.0",
+        "barrier[0].penalty: is -2, must be finite and >= 1e-9";
     after_an_unknown_barrier: FILTER, "radius = 2.0" => "radius = 2.0\nafter = \"A\"",
         "barrier[0].after: is \"A\", must be the name of a barrier above";
     begin_after_the_deadline: FILTER, "radius = 2.0" => "radius = 2.0\nbegin = 10.0",
