@@ -72,25 +72,23 @@ pub fn run(
 
 /// A number between `low` and `high` (0 < low ≤ high) with which `works` is true, at most `1 + tolerance`
 /// times one with which it is not: the smallest where it works for all larger ones. By bisection of the
-/// ratio. `None` where it does not work at `high`; `low` where it works there.
+/// ratio. `None` where it does not work at `high`, or the limits are not numbers as above; `low` where it
+/// works there.
 ///
 /// ```
-/// let found = punctual_core::effort::smallest([1.0, 100.0], 1e-3, |x| Ok(x >= 7.0))?;
-/// assert!(found.is_some_and(|x| (7.0..7.01).contains(&x)));
-/// # Ok::<(), punctual_core::Error>(())
+/// let found = punctual_core::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
+/// assert!(found.is_ok_and(|x| x.is_some_and(|x| (7.0..7.01).contains(&x))));
 /// ```
 ///
 /// # Errors
 ///
-/// Those of `works`; a limit or tolerance that is not finite or ≤ 0.
-pub fn smallest(
-    [low, high]: [f64; 2],
+/// Those of `works`.
+pub fn smallest<E>(
+    [mut low, mut high]: [f64; 2],
     tolerance: f64,
-    mut works: impl FnMut(f64) -> Result<bool, Error>,
-) -> Result<Option<f64>, Error> {
-    let (mut low, mut high) = (positive("low", low)?, positive("high", high)?);
-    let tolerance = positive("tolerance", tolerance)?;
-    if !works(high)? {
+    mut works: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<Option<f64>, E> {
+    if !(low > 0.0 && low <= high && high.is_finite()) || !works(high)? {
         return Ok(None);
     }
     if works(low)? {
@@ -166,10 +164,10 @@ pub struct Rating {
 /// # Errors
 ///
 /// Those of `try_out`.
-pub fn compare(
+pub fn compare<E>(
     candidates: &[Candidate],
-    mut try_out: impl FnMut(&Candidate, f64) -> Result<(bool, f64), Error>,
-) -> Result<Vec<Rating>, Error> {
+    mut try_out: impl FnMut(&Candidate, f64) -> Result<(bool, f64), E>,
+) -> Result<Vec<Rating>, E> {
     let mut ratings = Vec::with_capacity(candidates.len());
     for candidate in candidates {
         let (kept, peak) = try_out(candidate, f64::INFINITY)?;

@@ -6,7 +6,9 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
+use punctual_core::filter::{
+    BarrierSettings, FilterBuilder, Infeasible, Method, ProfileKind, SafetyFilter, Sampling,
+};
 use punctual_core::lie;
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
@@ -60,6 +62,33 @@ pub enum MethodName {
     RepeatedRoot,
 }
 
+/// The profile that `reference_profile` follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProfileName {
+    /// [`ProfileKind::Hermite`].
+    #[default]
+    Hermite,
+    /// [`ProfileKind::LowPeak`]: of least peak.
+    LowPeak,
+}
+
+/// What is done where the bounds certainly do not allow the deadline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InfeasibleName {
+    /// [`Infeasible::Report`].
+    #[default]
+    Report,
+    /// [`Infeasible::Soonest`].
+    Soonest,
+}
+
+/// Whether a setting is its default, and left out of the canonical form.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// What is done about inputs that are held between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -109,6 +138,12 @@ pub struct BarrierSection {
     /// How it is met. Default `reference_profile`.
     #[serde(default)]
     pub method: MethodName,
+    /// The profile of `reference_profile`. Default `hermite`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub profile: ProfileName,
+    /// What is done where the bounds certainly do not allow the deadline. Default `report`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub when_infeasible: InfeasibleName,
     /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
     #[serde(default)]
     pub rate: f64,
@@ -236,6 +271,14 @@ impl BarrierSection {
             method: match self.method {
                 MethodName::ReferenceProfile => Method::ReferenceProfile,
                 MethodName::RepeatedRoot => Method::RepeatedRoot,
+            },
+            profile: match self.profile {
+                ProfileName::Hermite => ProfileKind::Hermite,
+                ProfileName::LowPeak => ProfileKind::LowPeak,
+            },
+            infeasible: match self.when_infeasible {
+                InfeasibleName::Report => Infeasible::Report,
+                InfeasibleName::Soonest => Infeasible::Soonest,
             },
             rate: given(self.rate),
             rates,
@@ -438,6 +481,11 @@ impl FilterConfiguration {
             .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
             .and_then(FilterBuilder::build)
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
+    }
+
+    /// Whether an input has a bound.
+    pub fn is_bounded(&self) -> bool {
+        self.bounds.values().any(|[min, max]| *min > -UNBOUNDED || *max < UNBOUNDED)
     }
 
     /// The start values of the points that are inputs; they follow the states of the plant in the filter's.

@@ -9,7 +9,10 @@ mod parameter;
 mod plant;
 mod read;
 
-pub use filter::{BarrierSection, FilterConfiguration, MethodName, SamplingName, ShapeName, UNBOUNDED};
+pub use filter::{
+    BarrierSection, FilterConfiguration, InfeasibleName, MethodName, ProfileName, SamplingName, ShapeName,
+    UNBOUNDED,
+};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};
 pub use read::{ConfigurationError, read_toml};
