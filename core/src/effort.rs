@@ -13,7 +13,7 @@ use crate::simulation::Schedule;
 /// What a closed loop came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run {
-    /// Whether every barrier had h ≥ 0 at every sample from its deadline on.
+    /// Whether every barrier had h ≥ 0 at every sample from its deadline on. The run ends where one had not.
     pub kept: bool,
     /// Time in s of the last first arrival; `None` where a barrier has not arrived.
     pub arrival: Option<f64>,
@@ -59,6 +59,9 @@ pub fn run(
         }
         for (peak, u) in run.peak.iter_mut().zip(&u) {
             *peak = peak.max(u.abs());
+        }
+        if !run.kept {
+            break;
         }
         if k < schedule.steps {
             for _ in 0..substeps {

@@ -12,11 +12,11 @@ use crate::error::Error;
 use crate::output::{self, number};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.
-const SAMPLES: f64 = 1000.0;
+const SAMPLES: f64 = 200.0;
 /// Part of the soonest deadline to which it is found.
-const TOLERANCE: f64 = 0.01;
+const TOLERANCE: f64 = 0.02;
 /// The longest deadline looked for, in units of the configured one.
-const HORIZON: f64 = 100.0;
+const HORIZON: f64 = 30.0;
 /// Per second.
 const DAMPING: f64 = 1.0;
 

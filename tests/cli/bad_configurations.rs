@@ -28,7 +28,7 @@ fn an_unknown_key() {
         "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
          unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `centre_input`, `radius`, `smoothing`, \
-         `deadline`, `method`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`",
+         `deadline`, `method`, `profile`, `when_infeasible`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`",
     );
 }
 
