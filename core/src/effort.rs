@@ -91,7 +91,8 @@ pub fn smallest<E>(
     tolerance: f64,
     mut works: impl FnMut(f64) -> Result<bool, E>,
 ) -> Result<Option<f64>, E> {
-    if !(low > 0.0 && low <= high && high.is_finite()) || !works(high)? {
+    let valid = low > 0.0 && low <= high && high.is_finite();
+    if !valid || !works(high)? {
         return Ok(None);
     }
     if works(low)? {

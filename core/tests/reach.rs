@@ -82,7 +82,7 @@ fn the_soonest_times_of_chains_are_the_known_ones() {
 /// Inputs drawn within the bounds, held for random times: none arrives before the bound.
 fn never_earlier<P, const NX: usize>(plant: P, limits: [f64; 2], seed: u64)
 where
-    P: ControlAffine<NX, 2> + Clone + Send + 'static,
+    P: ControlAffine<NX, 2> + Copy + Send + 'static,
 {
     let mut draw = draw::Draw::new(seed);
     for _ in 0..40 {
@@ -90,7 +90,7 @@ where
         let disc = DistanceDisc::new([draw.uniform(-9.0, 9.0), 3.0], 2.0, 2.0)
             .and_then(|d| d.moving([draw.uniform(-1.0, 1.0), 0.5]))
             .expect("valid");
-        let source = lie::along(plant.clone(), disc, 2).expect("valid");
+        let source = lie::along(plant, disc, 2).expect("valid");
         let mut within = Bounds::NONE;
         for i in 0..2 {
             (within.min[i], within.max[i]) = (-limits[i], limits[i]);
