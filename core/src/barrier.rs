@@ -2,6 +2,7 @@
 
 use nalgebra::SVector;
 
+use crate::dynamics::Region;
 use crate::scalar::Scalar;
 
 /// A barrier `h(t, x)`; the safe set is `C(t) = {x : h(t, x) ≥ 0}`.
@@ -29,4 +30,11 @@ use crate::scalar::Scalar;
 pub trait Barrier<const NX: usize> {
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S;
+
+    /// A number that h does not exceed while the time is between `time[0]` and `time[1]` and the position, the
+    /// first two states, is in `region`, whatever the other states are. `None`, the default, where that is
+    /// not known.
+    fn highest(&self, _time: [f64; 2], _region: &Region) -> Option<f64> {
+        None
+    }
 }

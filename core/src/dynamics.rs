@@ -51,6 +51,76 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
         }
         dx
     }
+
+    /// Where the position, the first two states, can be between `time[0]` and `time[1]` s (0 ≤ first ≤
+    /// second) after the state `x`, under any input with `bounds[0]` ≤ u ≤ `bounds[1]` (`NU` components): a
+    /// region that contains every such position. `None`, the default, where that is not known.
+    fn region(&self, _x: &SVector<f64, NX>, _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<Region> {
+        None
+    }
+}
+
+/// A part of the plane: every point within `radius` of a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// The box: smallest and largest coordinate along x, and along y, in m.
+    pub sides: [[f64; 2]; 2],
+    /// In m, ≥ 0.
+    pub radius: f64,
+}
+
+impl Region {
+    /// The points within `radius` (m) of `centre` (m).
+    pub fn disc(centre: [f64; 2], radius: f64) -> Self {
+        Self { sides: centre.map(|c| [c, c]), radius }
+    }
+
+    /// Smallest and largest value of nᵀp over the region.
+    pub fn along(&self, n: [f64; 2]) -> [f64; 2] {
+        let mut ends = [-self.radius * n[0].hypot(n[1]), self.radius * n[0].hypot(n[1])];
+        for (side, n) in self.sides.iter().zip(n) {
+            let (a, b) = (n * side[0], n * side[1]);
+            ends = [ends[0] + a.min(b), ends[1] + a.max(b)];
+        }
+        ends
+    }
+
+    /// The distance in m from `point` (m), 0 inside.
+    pub fn distance(&self, point: [f64; 2]) -> f64 {
+        let [x, y] = [0, 1].map(|i| (self.sides[i][0] - point[i]).max(point[i] - self.sides[i][1]).max(0.0));
+        (x.hypot(y) - self.radius).max(0.0)
+    }
+}
+
+/// Where a chain of integrators can be between `time[0]` and `time[1]` s after its output had the
+/// derivatives `from` (of order 0 to n − 1), while its n-th one lies within `input`: an interval that contains
+/// every value, and exactly the values that can be had where the two times are one.
+///
+/// ```
+/// // n = 2 from rest: ±u τ²/2.
+/// assert_eq!(punctual_core::dynamics::chain(&[0.0, 0.0], [-2.0, 3.0], [4.0, 4.0]), [-16.0, 24.0]);
+/// ```
+pub fn chain(from: &[f64], input: [f64; 2], time: [f64; 2]) -> [f64; 2] {
+    let (n, length) = (from.len(), time[1] - time[0]);
+    let mut ends = [0.0; 2];
+    for (side, end) in ends.iter_mut().enumerate() {
+        let order = |k: usize| if k < n { from[k] } else { input[side] };
+        // The derivatives at time[0], then the rest of the interval by Taylor's formula, term by term.
+        let mut power = 1.0;
+        for k in 0..=n {
+            let shifted = (k..=n).rev().fold(0.0, |sum, j| order(j) + sum * time[0] / (j - k + 1) as f64);
+            let term = shifted * power;
+            *end += if k == 0 {
+                term
+            } else if side == 0 {
+                term.min(0.0)
+            } else {
+                term.max(0.0)
+            };
+            power *= length / (k + 1) as f64;
+        }
+    }
+    ends
 }
 
 /// A plant with an integrator before one of its inputs (dynamic extension): the input becomes the last
@@ -111,6 +181,23 @@ where
             _ => S::zero(),
         })
     }
+
+    fn region(&self, x: &SVector<f64, EXTENDED>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        let inner = SVector::<f64, NX>::from_fn(|i, _| x[i]);
+        let mut own = [[0.0; NU]; 2];
+        for (own, bounds) in own.iter_mut().zip(bounds) {
+            own.copy_from_slice(bounds);
+        }
+        if self.input < NU {
+            let rates = [own[0][self.input], own[1][self.input]];
+            if !rates.iter().all(|rate| rate.is_finite()) {
+                return None;
+            }
+            let [least, most] = chain(&[x[NX]], rates, [0.0, time[1]]);
+            (own[0][self.input], own[1][self.input]) = (least, most);
+        }
+        self.plant.region(&inner, [&own[0], &own[1]], time)
+    }
 }
 
 /// A plant beside a point that moves on its own at constant velocity, such as an obstacle that another
@@ -154,6 +241,10 @@ where
     fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
         let g = self.0.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
         SMatrix::from_fn(|i, j| if i < NX { g[(i, j)] } else { S::zero() })
+    }
+
+    fn region(&self, x: &SVector<f64, EXTENDED>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        self.0.region(&SVector::from_fn(|i, _| x[i]), bounds, time)
     }
 }
 

@@ -43,8 +43,9 @@
 //! # Layers
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
-//! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`filter`];
-//! [`plants`], [`barriers`], [`nominal`] and [`simulation`] are reference material beside it.
+//! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
+//! bounded inputs can do); [`filter`]; [`plants`], [`barriers`], [`nominal`] and [`simulation`] are reference
+//! material beside it, and [`effort`] compares what filters need.
 //!
 //! # References
 //!
@@ -58,6 +59,7 @@ pub mod barrier;
 pub mod barriers;
 pub mod convergence;
 pub mod dynamics;
+pub mod effort;
 mod error;
 pub mod filter;
 pub mod jet;
@@ -65,6 +67,7 @@ pub mod lie;
 pub mod nominal;
 pub mod plants;
 pub mod qp;
+pub mod reach;
 pub mod scalar;
 pub mod simulation;
 

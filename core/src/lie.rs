@@ -134,6 +134,12 @@ pub trait DerivativeSource: Send {
     fn ahead(&self, _t: f64, _x: &[f64], _u: &[f64], _duration: f64, _out: &mut Ahead) -> bool {
         false
     }
+
+    /// A number that h does not exceed between `time[0]` and `time[1]` s after `t` and `x`, under any input
+    /// with `bounds[0]` ≤ u ≤ `bounds[1]`; for [`crate::reach`]. The default knows none.
+    fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
+        None
+    }
 }
 
 /// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken.
@@ -188,6 +194,11 @@ where
         let x = SVector::from_column_slice(x);
         ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
         true
+    }
+
+    fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
+        let region = self.plant.region(&SVector::from_column_slice(x), bounds, time)?;
+        self.barrier.highest(time.map(|after| t + after), &region)
     }
 }
 

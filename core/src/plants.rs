@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::dynamics::{ControlAffine, IntegratedInput};
+use crate::dynamics::{ControlAffine, IntegratedInput, Region, chain};
 use crate::error::{Error, positive};
 use crate::scalar::Scalar;
 
@@ -62,6 +62,14 @@ impl ControlAffine<4, 2> for PointMass {
         g[(3, 1)] = S::one();
         g
     }
+
+    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        if !bounds.iter().all(|b| b[..2].iter().all(|v| v.is_finite())) {
+            return None;
+        }
+        let side = |i: usize| chain(&[x[i], x[i + 2]], [bounds[0][i], bounds[1][i]], time);
+        Some(Region { sides: [side(0), side(1)], radius: 0.0 })
+    }
 }
 
 /// A unicycle: x = (x_p, y_p, θ, v), u = (a, ω).
@@ -88,6 +96,10 @@ impl ControlAffine<4, 2> for Unicycle {
         g[(3, 0)] = S::one();
         g[(2, 1)] = S::one();
         g
+    }
+
+    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
     }
 }
 
@@ -127,6 +139,10 @@ impl ControlAffine<4, 2> for Bicycle {
         g[(3, 0)] = S::one();
         g[(2, 1)] = x[3] / self.l_r;
         g
+    }
+
+    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
     }
 }
 
@@ -178,6 +194,11 @@ impl ControlAffine<4, 2> for SmallSlipBicycle {
         g[(2, 1)] = x[3] / self.l_r;
         g
     }
+
+    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        let slip = bounds[0][1].abs().max(bounds[1][1].abs());
+        driven([x[0], x[1]], x[3], bounds, time[1], slip.hypot(1.0))
+    }
 }
 
 /// [`SmallSlipBicycle`] with an integrator before β: x = (x_p, y_p, θ, v, β), u = (a, β̇).
@@ -200,6 +221,10 @@ impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     #[inline]
     fn input_map<S: Scalar>(&self, x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
         self.0.input_map(x)
+    }
+
+    fn region(&self, x: &SVector<f64, 5>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        self.0.region(x, bounds, time)
     }
 }
 
@@ -249,4 +274,18 @@ impl ControlAffine<5, 2> for KinematicBicycle {
         g[(4, 1)] = S::one();
         g
     }
+
+    fn region(&self, x: &SVector<f64, 5>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
+    }
+}
+
+/// Where a vehicle at `from` with the speed `v` can be until `time`: no further than `factor` times the way
+/// that the largest acceleration, the first input, gives.
+fn driven(from: [f64; 2], v: f64, bounds: [&[f64]; 2], time: f64, factor: f64) -> Option<Region> {
+    let acceleration = bounds[0][0].abs().max(bounds[1][0].abs());
+    if !acceleration.is_finite() || !factor.is_finite() {
+        return None;
+    }
+    Some(Region::disc(from, factor * (v.abs() * time + acceleration * time * time / 2.0)))
 }

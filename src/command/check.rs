@@ -8,6 +8,7 @@ use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfi
 use punctual_fmu::product::describe;
 use serde::Serialize;
 
+use super::closed_loop::{self, RatingReport, ReachReport, Verdict};
 use crate::error::Error;
 use crate::output::{self, number};
 use crate::package;
@@ -23,6 +24,9 @@ pub struct Arguments {
     /// Also check a filter from this start, such as "x_p=1,v=-2"; states not named are 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
+    /// Also find the profile and rate that need the smallest bound on the accelerations from the start
+    #[arg(long)]
+    effort: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -42,6 +46,9 @@ struct FilterReport {
     /// Status of the first sample from there.
     status: Option<&'static str>,
     warnings: Vec<String>,
+    /// What profiles and rates need, the best first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    effort: Option<Vec<RatingReport>>,
 }
 
 #[derive(Serialize)]
@@ -69,6 +76,8 @@ struct StartReport {
     inside: bool,
     /// Whether the theorem applies from there.
     guaranteed: bool,
+    /// What the input bounds allow, where there are any.
+    reach: Option<ReachReport>,
 }
 
 /// What `check` tells about a plant.
@@ -106,14 +115,26 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     match package::read_configuration(file)? {
         Configuration::Filter(configuration) => {
             let start = start(arguments, &configuration)?;
-            let report = filter(&configuration, start).map_err(|e| e.in_file(file))?;
+            if arguments.effort && start.is_none() {
+                let message = "needs a start: give --plant or --x0";
+                return Err(Error::configuration("--effort", message));
+            }
+            let effort = match &start {
+                Some(x0) if arguments.effort => {
+                    Some(closed_loop::ratings(&configuration, x0).map_err(|e| e.in_file(file))?)
+                }
+                _ => None,
+            };
+            let mut report = filter(&configuration, start).map_err(|e| e.in_file(file))?;
+            report.effort = effort;
             if arguments.json {
                 output::json(&report);
             } else {
                 output::result(&filter_text(&report));
             }
             let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
-            let promised = starts.all(|start| start.guaranteed);
+            let lost = |s: &StartReport| s.reach.as_ref().is_some_and(|r| r.deadline == Verdict::CannotBeMet);
+            let promised = starts.all(|start| start.guaranteed && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Configuration::Plant(configuration) => {
@@ -232,7 +253,12 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             ));
         }
         let report = begun.then(|| filter.report().barriers[i]);
-        let start = report.map(|b| StartReport { h: b.h, inside: b.h >= 0.0, guaranteed: b.guaranteed });
+        let reach = match start.as_deref() {
+            Some(x0) if c.is_bounded() => Some(closed_loop::reach(c, i, x0)?),
+            _ => None,
+        };
+        let start =
+            report.map(|b| StartReport { h: b.h, inside: b.h >= 0.0, guaranteed: b.guaranteed, reach });
         if start.as_ref().is_some_and(|s| !s.guaranteed) {
             warn("nothing is guaranteed from this start".to_owned());
         }
@@ -260,6 +286,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         start: start.map(|x0| states.iter().map(|s| s.name).zip(x0).collect()),
         status,
         warnings,
+        effort: None,
     })
 }
 
@@ -325,8 +352,12 @@ fn filter_text(report: &FilterReport) -> String {
             let side = if start.inside { "inside" } else { "outside" };
             let promise = if start.guaranteed { "guaranteed" } else { "not guaranteed" };
             rows.push(("start", format!("{side}, h = {} {}; {promise}", number(start.h), b.unit)));
+            rows.extend(start.reach.iter().flat_map(ReachReport::rows));
         }
         lines.extend(rows.into_iter().map(|(name, value)| format!("  {name:<16} {value}")));
+    }
+    if let Some(ratings) = &report.effort {
+        lines.push(closed_loop::ratings_text(ratings));
     }
     if !report.warnings.is_empty() {
         lines.push(String::new());

@@ -2,6 +2,7 @@
 
 pub mod build;
 pub mod check;
+mod closed_loop;
 pub mod demo;
 pub mod inspect;
 pub mod run;

@@ -146,3 +146,24 @@ fn starts_that_cannot_be_used() {
         .punctual(["check", "filter.toml", "--plant", "other.toml"])
         .fails(2, "other.toml: plant.model: has no state theta, which the filter measures");
 }
+
+/// From 60.8 m at 0.1 m/s² no input is there within 10 s; with 20 m/s² the filter is.
+#[test]
+fn bounds_decide_what_deadline_can_be_met() {
+    let with = |limit: &str| {
+        let bounds = format!("[bounds]\na = [-{limit}, {limit}]\n[experiment]");
+        let workshop = workshop(&[("[experiment]", &bounds), ("step_size = 0.001", "step_size = 0.1")]);
+        let done = workshop.punctual(["check", "filter.toml", "--x0", "theta=0.3", "--json"]);
+        let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+        (done.code, report["barriers"][0]["start"]["reach"].clone())
+    };
+    let (code, lost) = with("0.1");
+    assert_eq!((code, &lost["deadline"]), (1, &"cannot_be_met".into()), "{lost}");
+    // √(2 · 61.64/0.1), and more.
+    let (least, most) = (lost["soonest_at_least"].as_f64(), lost["soonest_at_most"].as_f64());
+    assert!(least.is_some_and(|t| (t - 35.11).abs() < 0.01) && most >= least, "{lost}");
+    let (code, met) = with("20.0");
+    assert_eq!((code, &met["deadline"]), (0, &"can_be_met".into()), "{met}");
+    let most = met["soonest_at_most"].as_f64();
+    assert!(most.is_some_and(|t| t < 10.0) && most >= met["soonest_at_least"].as_f64(), "{met}");
+}

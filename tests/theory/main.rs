@@ -6,6 +6,7 @@
 
 mod chains;
 mod obstacles;
+mod profiles;
 mod sampling;
 mod starts;
 

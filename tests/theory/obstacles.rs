@@ -132,10 +132,10 @@ fn table(count: usize) {
             count(|r| r.deadlocked),
         );
         if let Some(lost) = runs.iter().find(|r| r.clearance < 0.0) {
-            println!("  first collision: {lost:?}");
+            println!("  first collision, from {:?}: {lost:?}", lost.start);
         }
         if let Some(lost) = runs.iter().find(|r| !r.kept) {
-            println!("  first late: {lost:?}");
+            println!("  first late, from {:?}: {lost:?}", lost.start);
         }
         assert_eq!(collisions, 0, "{name}");
     }

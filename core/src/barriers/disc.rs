@@ -3,6 +3,7 @@
 use nalgebra::SVector;
 
 use crate::barrier::Barrier;
+use crate::dynamics::Region;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
@@ -43,6 +44,18 @@ impl Centre {
             }
         };
         away(0).squared() + away(1).squared()
+    }
+
+    /// The least distance in m of the point from a position in `region` between the two times.
+    fn nearest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
+        let Self::Given { start, velocity } = self else { return None };
+        // As seen from the point: the region moved against the way of the point.
+        let mut seen = *region;
+        for (i, side) in seen.sides.iter_mut().enumerate() {
+            let way = time.map(|t| start[i] + t * velocity[i]);
+            *side = [side[0] - way[0].max(way[1]), side[1] - way[0].min(way[1])];
+        }
+        Some(seen.distance([0.0; 2]))
     }
 }
 
@@ -88,6 +101,11 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
     #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
+    }
+
+    fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
+        let nearest = self.centre.nearest(time, region)?;
+        Some((self.radius - nearest) * (self.radius + nearest))
     }
 }
 
@@ -138,5 +156,10 @@ impl<const NX: usize> Barrier<NX> for DistanceDisc {
     #[inline]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
+    }
+
+    fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
+        let nearest = self.centre.nearest(time, region)?;
+        Some(self.level - nearest.hypot(self.smoothing))
     }
 }

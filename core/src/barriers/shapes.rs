@@ -3,6 +3,7 @@
 use nalgebra::SVector;
 
 use crate::barrier::Barrier;
+use crate::dynamics::Region;
 use crate::error::{Error, ErrorKind, finite, positive};
 use crate::scalar::Scalar;
 
@@ -42,6 +43,11 @@ impl<const NX: usize> Barrier<NX> for HalfPlane {
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         (x[0] - self.point[0]) * self.normal[0] + (x[1] - self.point[1]) * self.normal[1]
     }
+
+    fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
+        let [n, q] = [self.normal, self.point];
+        Some(region.along(n)[1] - (n[0] * q[0] + n[1] * q[1]))
+    }
 }
 
 /// Axes turned by an angle, in which a shape is straight.
@@ -62,6 +68,16 @@ impl Axes {
     fn along<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> [S; 2] {
         let (away, [c, s]) = ([x[0] - self.centre[0], x[1] - self.centre[1]], self.direction);
         [away[0] * c + away[1] * s, away[1] * c - away[0] * s]
+    }
+
+    /// The least size of each of [`Self::along`] over `region`.
+    fn least(&self, region: &Region) -> [f64; 2] {
+        let [c, s] = self.direction;
+        [[c, s], [-s, c]].map(|axis| {
+            let centre = axis[0] * self.centre[0] + axis[1] * self.centre[1];
+            let [low, high] = region.along(axis);
+            (low - centre).max(centre - high).max(0.0)
+        })
     }
 }
 
@@ -92,6 +108,11 @@ impl<const NX: usize> Barrier<NX> for Ellipse {
         let [a, b] = self.half_axes;
         let level = (along / a).squared() + (across / b).squared();
         (-(level + 1.0).sqrt() + std::f64::consts::SQRT_2) * a.min(b)
+    }
+
+    fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
+        let ([along, across], [a, b]) = (self.axes.least(region), self.half_axes);
+        Some((std::f64::consts::SQRT_2 - (along / a).hypot(across / b).hypot(1.0)) * a.min(b))
     }
 }
 
@@ -130,6 +151,12 @@ impl<const NX: usize> Barrier<NX> for Rectangle {
         let level = (along / a).squared().squared() + (across / b).squared().squared();
         (-(level + 1.0).sqrt().sqrt() + 2_f64.powf(0.25)) * a.min(b)
     }
+
+    fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
+        let ([along, across], [a, b]) = (self.axes.least(region), self.half_sides);
+        let level = (along / a).powi(4) + (across / b).powi(4);
+        Some((2_f64.powf(0.25) - (level + 1.0).powf(0.25)) * a.min(b))
+    }
 }
 
 /// A bound on one state: h = bound − x_i or x_i − bound, in the unit of the state.
@@ -167,6 +194,11 @@ impl<const NX: usize> Barrier<NX> for StateBound {
             Some(value) => (*value - self.bound) * self.sign,
             None => S::from(f64::NAN),
         }
+    }
+
+    fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
+        let axis = [[1.0, 0.0], [0.0, 1.0]].get(self.state)?.map(|n| n * self.sign);
+        Some(region.along(axis)[1] - self.sign * self.bound)
     }
 }
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use super::comparison::{Stack, lower_bound, lower_terms};
 use super::hermite::HermiteProfile;
-use super::profile::{self, Derivatives, Hermite, Profile, ProfileError};
+use super::profile::{self, Derivatives, Hermite, LowPeak, Profile, ProfileError};
 use super::repeated_root::{self, NoAdmissibleRate};
-use super::settings::{FixedTimeSettings, Method};
+use super::settings::{FixedTimeSettings, Method, ProfileKind};
 use super::{sampled, stay};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, positive};
@@ -49,6 +49,9 @@ pub struct FixedTimeState {
     pub deadline: f64,
     /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
     pub recoveries: u32,
+    /// How often a deadline that the input bounds do not allow was given up for a later one
+    /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
+    pub postponed: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
@@ -301,8 +304,8 @@ impl FixedTime {
             Method::ReferenceProfile => {
                 rate = settings.rate.unwrap_or(default_rate);
                 if !past && period > 0.0 {
-                    margin +=
-                        sampled::margin(&anchor[..n], deadline, self.attenuation(rate, deadline), period);
+                    let attenuation = self.attenuation(rate, deadline);
+                    margin += sampled::margin(self.built_in(), &anchor[..n], deadline, attenuation, period);
                 }
             }
             Method::FirstOrder(exponent) if !past => rate = exponent.rate(deadline),
@@ -325,6 +328,7 @@ impl FixedTime {
             anchor_time: t,
             deadline,
             recoveries: state.recoveries,
+            postponed: state.postponed,
             anchor,
             rate,
             stay_rate,
@@ -352,6 +356,14 @@ impl FixedTime {
         (state.arrival, state.guaranteed, state.phase) = (arrival, guaranteed, phase);
     }
 
+    /// The profile of the settings.
+    fn built_in(&self) -> &'static dyn Profile {
+        match self.settings.profile {
+            ProfileKind::Hermite => &Hermite,
+            ProfileKind::LowPeak => &LowPeak,
+        }
+    }
+
     /// The profile in force and its derivatives, without the margin.
     pub(super) fn profile(&self, state: &FixedTimeState, elapsed: f64) -> Derivatives {
         let anchor = &state.anchor[..self.n];
@@ -359,7 +371,8 @@ impl FixedTime {
             Some(own) if !state.fallback && state.deadline > 0.0 => {
                 own.evaluate(anchor, state.deadline, elapsed)
             }
-            _ => Hermite.evaluate(anchor, state.deadline, elapsed),
+            _ if state.deadline > 0.0 => self.built_in().evaluate(anchor, state.deadline, elapsed),
+            _ => [0.0; MAX_RELATIVE_DEGREE + 1],
         }
     }
 

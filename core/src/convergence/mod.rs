@@ -29,4 +29,4 @@ mod settings;
 pub mod stay;
 
 pub use fixed_time::{Demand, FixedTime, FixedTimeState, Phase, Refusal, Unmet};
-pub use settings::{FixedTimeSettings, Method};
+pub use settings::{FixedTimeSettings, Infeasible, Method, ProfileKind};

@@ -53,6 +53,47 @@ impl Profile for Hermite {
     }
 }
 
+/// The profile of least peak |r⁽ⁿ⁾| that lands flat on zero, for n = 1 and 2; for higher orders the
+/// Hermite profile.
+///
+/// n = 1: r = e (1 − s) with s = τ/T. n = 2: r″ = A/T² until s₁T and −A/T² from then on. With v = ėT and
+/// w = e + v/2 the two conditions at T are A(2s₁ − 1) = −v and A s₁(1 − s₁) = −w, so A² + 4wA − v² = 0:
+///
+/// ```text
+/// A = −2 sign(w) (|w| + √(w² + v²/4)),   s₁ = ½ − v/(2A).                               (B)
+/// ```
+///
+/// This root has |A| ≥ |v|, and so s₁ in [0, 1]. No other r with these ends has a smaller peak: the
+/// difference d of one with |r″| < |A|/T² has d″ of one sign until s₁T and of the other after it, so that
+/// ∫ (s₁T − τ) d″ dτ ≠ 0; but d and ḋ vanish at both ends, and then it is 0.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LowPeak;
+
+impl Profile for LowPeak {
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
+        let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
+        let s = elapsed / deadline;
+        match *anchor {
+            _ if elapsed >= deadline => {}
+            [e] => (r[0], r[1]) = (e * (1.0 - s), -e / deadline),
+            [e, de] => {
+                let v = de * deadline;
+                let w = e + v / 2.0;
+                let a = -2.0 * (w + w.hypot(v / 2.0).copysign(w));
+                // At a = 0 both pieces are zero.
+                let values = if a != 0.0 && s < 0.5 - v / (2.0 * a) {
+                    [e + s * (v + s * a / 2.0), v + s * a, a]
+                } else {
+                    [-a * (1.0 - s) * (1.0 - s) / 2.0, a * (1.0 - s), -a]
+                };
+                (r[0], r[1], r[2]) = (values[0], values[1] / deadline, values[2] / (deadline * deadline));
+            }
+            _ => return Hermite.evaluate(anchor, deadline, elapsed),
+        }
+        r
+    }
+}
+
 /// Relative tolerance of the check: far above round-off of a formula of a hundred operations, far below
 /// any mistake in one.
 pub const TOLERANCE: f64 = 1e-9;
@@ -134,6 +175,8 @@ struct Anchored<'a> {
 ///
 /// The first [`ProfileError`] met, in the order of time.
 pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(), ProfileError> {
+    /// Parts of a panel that does not fit.
+    const SHORT: u32 = 64;
     let n = anchor.len();
     let panel = deadline / 64.0;
     let profile = Anchored { profile, anchor, deadline };
@@ -161,7 +204,17 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);
             let round_off = TOLERANCE * largest / (deadline.powi(order as i32 - 1) * (b - a));
-            if (found - wanted).abs() > 10.0 * (found - whole[order]).abs() + round_off {
+            if (found - wanted).abs() <= 10.0 * (found - whole[order]).abs() + round_off {
+                continue;
+            }
+            // A kink can lie where the two rules agree by chance: not for much shorter ones as well.
+            let short = (b - a) / f64::from(SHORT);
+            let mut refined = 0.0;
+            for i in 0..SHORT {
+                let from = a + short * f64::from(i);
+                refined += profile.mean(from, from + short)?[order] / f64::from(SHORT);
+            }
+            if (refined - wanted).abs() > 10.0 * (refined - found).abs() + round_off {
                 return Err(ProfileError::Inconsistent { order, elapsed: middle, found, wanted });
             }
         }
@@ -200,5 +253,40 @@ impl Anchored<'_> {
             }
         }
         Ok(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn peak(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> f64 {
+        let n = anchor.len();
+        let at = |i: u32| profile.evaluate(anchor, deadline, deadline * f64::from(i) / 1000.0)[n].abs();
+        (0..1000).map(at).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn low_peaks_are_profiles_and_lower_than_the_polynomial() {
+        // From rest 4/T² against 6/T².
+        assert!((peak(&LowPeak, &[-1.0, 0.0], 2.0) - 1.0).abs() < 1e-12);
+        assert!((peak(&Hermite, &[-1.0, 0.0], 2.0) - 1.5).abs() < 1e-12);
+        for deadline in [0.3, 2.0, 50.0] {
+            for anchor in [
+                &[-3.0][..],
+                &[-5.0, 0.0],
+                &[-5.0, 3.0],
+                &[-5.0, -3.0],
+                &[-1.0, 40.0],
+                &[-1.0, 1.0],
+                &[0.0, 0.0],
+                &[0.0, 1.0],
+                &[2.0, -4.0],
+            ] {
+                assert_eq!(check(&LowPeak, anchor, deadline), Ok(()), "{anchor:?} in {deadline}");
+                let (low, polynomial) = (peak(&LowPeak, anchor, deadline), peak(&Hermite, anchor, deadline));
+                assert!(low <= polynomial * (1.0 + 1e-12), "{anchor:?} in {deadline}: {low} {polynomial}");
+            }
+        }
     }
 }

@@ -32,7 +32,7 @@
 
 use super::comparison::{Stack, binomial, factorial};
 use super::fixed_time::{FixedTime, FixedTimeState, Phase};
-use super::hermite::HermiteProfile;
+use super::profile::Profile;
 use super::settings::Method;
 use crate::MAX_RELATIVE_DEGREE;
 
@@ -64,15 +64,14 @@ impl SampledDemand {
     }
 }
 
-/// The margin in the unit of e that inputs held for `period` > 0 seconds are expected to need along the
-/// Hermite profile from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
+/// The margin in the unit of e that inputs held for `period` > 0 seconds are expected to need along
+/// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
 /// `attenuation` as in [`SampledDemand`].
-pub fn margin(anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
+pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
     const PANELS: usize = 32;
     let n = anchor.len();
-    let profile = HermiteProfile::new(anchor, deadline);
     let panel = deadline / PANELS as f64;
-    let at = |i: usize| profile.evaluate(panel * i as f64)[n];
+    let at = |i: usize| profile.evaluate(anchor, deadline, panel * i as f64)[n];
     // The last panel ends where r⁽ⁿ⁾ drops to zero.
     let mut steepest: f64 = 0.0;
     let mut left = at(0);
@@ -161,6 +160,7 @@ impl FixedTime {
 #[cfg(test)]
 mod tests {
     use super::super::comparison::lower_terms;
+    use super::super::profile::Hermite;
     use super::super::settings::FixedTimeSettings;
     use super::*;
 
@@ -202,12 +202,12 @@ mod tests {
     /// δ = 0.1 is 12 · 0.1²/8/4, and the margin twice that.
     #[test]
     fn the_margin_is_that_of_the_profile() {
-        let found = margin(&[-1.0, 0.0], 1.0, 4.0, 0.1);
+        let found = margin(&Hermite, &[-1.0, 0.0], 1.0, 4.0, 0.1);
         assert!(
             (found - (2.0 * 12.0 * 0.01 / 32.0_f64).min(LARGEST_MARGIN) - ROUND_OFF).abs() < 1e-12,
             "{found}"
         );
-        let half = margin(&[-1.0, 0.0], 1.0, 4.0, 0.05);
+        let half = margin(&Hermite, &[-1.0, 0.0], 1.0, 4.0, 0.05);
         assert!((half - 2.0 * 12.0 * 0.0025 / 32.0 - ROUND_OFF).abs() < 1e-12, "{half}");
     }
 }

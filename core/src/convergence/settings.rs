@@ -20,6 +20,30 @@ pub enum Method {
     FirstOrder(Exponent),
 }
 
+/// The profile that [`Method::ReferenceProfile`] follows, where it is not one of one's own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ProfileKind {
+    /// [`Hermite`](super::profile::Hermite): the polynomial of least ∫ (r⁽ⁿ⁾)².
+    #[default]
+    Hermite,
+    /// [`LowPeak`](super::profile::LowPeak): for n = 1 and 2 the profile of least peak |r⁽ⁿ⁾|.
+    LowPeak,
+}
+
+/// What is done where the input bounds certainly do not allow a deadline, at the anchor's sample or at any
+/// later one ([`reach`](crate::reach)).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Infeasible {
+    /// It is reported, and the deadline stays.
+    #[default]
+    Report,
+    /// The deadline is given up: the promise starts anew from that sample, with twice the soonest time at
+    /// which h ≥ 0 is not ruled out, and half as much again each further time. A deadline that passes
+    /// outside is given up as well; where no bound is known, for a new one of the configured length.
+    /// Counted in [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
+    Soonest,
+}
+
 /// Settings of one barrier's promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedTimeSettings {
@@ -29,6 +53,10 @@ pub struct FixedTimeSettings {
     pub deadline: f64,
     /// How the deadline is met. Default: [`Method::ReferenceProfile`].
     pub method: Method,
+    /// Which profile the reference profile follows. Default: [`ProfileKind::Hermite`].
+    pub profile: ProfileKind,
+    /// What is done where the deadline certainly cannot be met. Default: [`Infeasible::Report`].
+    pub infeasible: Infeasible,
     /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`]
     /// of the deadline in force and the sampling period.
     pub rate: Option<f64>,
@@ -57,6 +85,8 @@ impl FixedTimeSettings {
         Self {
             deadline,
             method: Method::default(),
+            profile: ProfileKind::default(),
+            infeasible: Infeasible::default(),
             rate: None,
             rates: None,
             stay_rate: None,

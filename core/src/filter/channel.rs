@@ -1,9 +1,10 @@
 //! One barrier of a filter: its derivatives, its promise and when that is in force.
 
-use super::{FixedTimeState, Phase};
+use super::{FixedTimeState, Infeasible, Phase};
 use crate::convergence::FixedTime;
 use crate::lie::DerivativeSource;
-use crate::qp::Enforcement;
+use crate::qp::{Bounds, Enforcement};
+use crate::reach;
 
 /// When a barrier begins to be enforced. Its deadline counts from the filter's first sample in any case, so
 /// that "be in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
@@ -117,5 +118,57 @@ impl Channel {
         } else if measured_first && promise.phase == Phase::Approach && period > promise.period {
             self.promise.resample(promise, period);
         }
+    }
+
+    /// Whether the deadline, `time_left` s after time and state `now`, certainly cannot be met: no input within
+    /// `bounds` has h ≥ 0 then, or it has passed outside.
+    pub(super) fn is_lost(
+        &self,
+        promise: &FixedTimeState,
+        now: (f64, &[f64]),
+        bounds: &Bounds,
+        time_left: f64,
+    ) -> bool {
+        match promise.phase {
+            Phase::Late => true,
+            Phase::Approach => {
+                let size = promise.anchor[0].abs() + promise.margin;
+                reach::ruled_out(&*self.source, now, bounds, time_left, size)
+            }
+            _ => false,
+        }
+    }
+
+    /// Gives up a deadline that is lost, where the settings say so: starts the promise anew with a later one
+    /// ([`Infeasible::Soonest`]). Returns whether it did.
+    pub(super) fn postpone(
+        &self,
+        promise: &mut FixedTimeState,
+        now: (f64, &[f64]),
+        bounds: &Bounds,
+        h: &[f64],
+        period: Option<f64>,
+    ) -> bool {
+        /// How much longer than what is not ruled out: getting there takes less than stopping there does.
+        const FACTOR: f64 = 2.0;
+        const GROWTH: f64 = 1.5;
+        /// The longest deadline looked for, in units of the configured one.
+        const HORIZON: f64 = 1e3;
+        if self.promise.settings().infeasible != Infeasible::Soonest {
+            return false;
+        }
+        let configured = self.promise.settings().deadline;
+        let soonest = reach::soonest(&*self.source, now, bounds, HORIZON * configured);
+        let factor = FACTOR * GROWTH.powi(promise.postponed.min(16) as i32);
+        // Near the set the soonest time tends to zero: never shorter than ten samples.
+        let deadline = match soonest {
+            Some(soonest) if soonest > 0.0 => (factor * soonest).max(10.0 * period.unwrap_or(0.0)),
+            _ => configured,
+        };
+        let postponed = promise.postponed.saturating_add(1);
+        let unmet = promise.unmet;
+        self.promise.anchor(promise, now.0, h, deadline, period.unwrap_or(0.0));
+        (promise.postponed, promise.unmet) = (postponed, unmet);
+        true
     }
 }

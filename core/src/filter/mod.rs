@@ -10,7 +10,9 @@ mod channel;
 mod report;
 mod sampling;
 
-pub use crate::convergence::{FixedTimeSettings as BarrierSettings, Method, Phase, Refusal};
+pub use crate::convergence::{
+    FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
+};
 pub use builder::FilterBuilder;
 use channel::Channel;
 pub use channel::{Begin, End, Strictness};
@@ -20,9 +22,10 @@ pub use sampling::Sampling;
 use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTimeState, Unmet};
-use crate::error::{Error, ErrorKind, length};
+use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Row};
+use crate::reach;
 use sampling::Held;
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -184,7 +187,14 @@ impl SafetyFilter {
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
             channel.anchor(promise, (begin, self.delay), &derivatives.drift[..n], (period, first));
-            let demand = channel.promise.advance(promise, begin, &derivatives.drift[..n]);
+            let stack = &derivatives.drift[..n];
+            let mut demand = channel.promise.advance(promise, begin, stack);
+            let (now, time_left) = ((begin, &*from), demand.time_left);
+            let mut late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
+            if late_certain && channel.postpone(promise, now, &self.bounds, stack, period) {
+                demand = channel.promise.advance(promise, begin, stack);
+                late_certain = false;
+            }
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             let row = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
             rows[i] = row;
@@ -195,7 +205,7 @@ impl SafetyFilter {
                     None => sampled = None,
                 }
             }
-            *report_b = BarrierReport::of(promise, h, demand, row);
+            *report_b = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
             if !row.floor.is_finite() {
                 report.status = Status::Singular;
             }
@@ -296,6 +306,33 @@ impl SafetyFilter {
         length("barriers", state.barriers.len(), self.channels.len())?;
         self.state.clone_from(state);
         Ok(())
+    }
+
+    /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the
+    /// state `x` at `t` ([`reach::soonest`]), at most `horizon` (s, finite, > 0); `None` where that is not
+    /// known or there is no such barrier.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a horizon out of range.
+    pub fn soonest(&self, index: usize, t: f64, x: &[f64], horizon: f64) -> Result<Option<f64>, Error> {
+        length("x", x.len(), self.state_dim)?;
+        let horizon = positive("horizon", horizon)?;
+        let channel = self.channels.get(index);
+        Ok(channel.and_then(|c| reach::soonest(&*c.source, (t, x), &self.bounds, horizon)))
+    }
+
+    /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
+    /// after `t` and the state `x`.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a time out of range.
+    pub fn is_ruled_out(&self, index: usize, t: f64, x: &[f64], after: f64) -> Result<bool, Error> {
+        length("x", x.len(), self.state_dim)?;
+        let after = non_negative("after", after)?;
+        let channel = self.channels.get(index);
+        Ok(channel.is_some_and(|c| reach::ruled_out(&*c.source, (t, x), &self.bounds, after, 1.0)))
     }
 
     /// The report of the last [`Self::step`] or [`Self::peek`].

@@ -79,6 +79,12 @@ pub struct BarrierReport {
     pub fallback: bool,
     /// How often leaving the set has re-armed the deadline (the settings' `recovery`).
     pub recoveries: u32,
+    /// Whether no input within the bounds has h ≥ 0 at the deadline ([`reach`](crate::reach)): true from the
+    /// first sample of the approach at which that is certain, for plants and barriers that know it.
+    pub late_certain: bool,
+    /// How often a deadline that the bounds do not allow was given up for a later one, which time left,
+    /// profile and guarantee are then about (the settings' `infeasible`).
+    pub postponed: u32,
     /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ. Where the step looked
     /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
@@ -111,6 +117,8 @@ impl BarrierReport {
         margin: 0.0,
         fallback: false,
         recoveries: 0,
+        late_certain: false,
+        postponed: 0,
         row: Row::ZERO,
         slack: 0.0,
         unmet_steps: 0,
@@ -133,6 +141,8 @@ impl BarrierReport {
             margin: promise.margin,
             fallback: promise.fallback,
             recoveries: promise.recoveries,
+            postponed: promise.postponed,
+            late_certain: false,
             row,
             slack: 0.0,
             unmet_steps: 0,
@@ -151,6 +161,7 @@ impl BarrierReport {
         self.margin = promise.margin;
         self.fallback = promise.fallback;
         self.recoveries = promise.recoveries;
+        self.postponed = promise.postponed;
         self.unmet_steps = promise.unmet.map_or(0, |unmet| unmet.steps);
     }
 }

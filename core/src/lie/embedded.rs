@@ -54,6 +54,12 @@ impl DerivativeSource for Embedded {
         self.picked(x, &mut own);
         self.source.ahead(t, &own[..self.picks.len()], u, duration, out)
     }
+
+    fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
+        let mut own = [0.0; MAX_PICKED];
+        self.picked(x, &mut own);
+        self.source.highest(t, &own[..self.picks.len()], bounds, time)
+    }
 }
 
 /// `source` as one of a filter with `state_dim` states: its own states are those numbered `picks`, counted

@@ -5,7 +5,7 @@ use punctual_core::barriers::{
     DistanceDisc, Ellipse, HalfPlane, NormBound, Outside, QuadraticDisc, Rectangle, StateBound,
 };
 use punctual_core::convergence::operator::Operator;
-use punctual_core::filter::{BarrierSettings, Method};
+use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
 use serde::{Deserialize, Serialize};
 
 use super::{ConfigurationError, FilterConfiguration, ModelName, Parameter, Range, check_identifier};
@@ -22,6 +22,28 @@ pub enum MethodName {
     ReferenceProfile,
     /// [`Method::RepeatedRoot`], the paper's.
     RepeatedRoot,
+}
+
+/// The profile that `reference_profile` follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProfileName {
+    /// [`ProfileKind::Hermite`].
+    #[default]
+    Hermite,
+    /// [`ProfileKind::LowPeak`]: of least peak.
+    LowPeak,
+}
+
+/// What is done where the bounds certainly do not allow the deadline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InfeasibleName {
+    /// [`Infeasible::Report`].
+    #[default]
+    Report,
+    /// [`Infeasible::Soonest`].
+    Soonest,
 }
 
 /// The shape of a barrier.
@@ -166,6 +188,12 @@ pub struct BarrierSection {
     /// How it is met. Default `reference_profile`.
     #[serde(default)]
     pub method: MethodName,
+    /// The profile of `reference_profile`. Default `hermite`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub profile: ProfileName,
+    /// What is done where the bounds certainly do not allow the deadline. Default `report`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub when_infeasible: InfeasibleName,
     /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
     #[serde(default)]
     pub rate: f64,
@@ -379,6 +407,14 @@ impl BarrierSection {
             method: match self.method {
                 MethodName::ReferenceProfile => Method::ReferenceProfile,
                 MethodName::RepeatedRoot => Method::RepeatedRoot,
+            },
+            profile: match self.profile {
+                ProfileName::Hermite => ProfileKind::Hermite,
+                ProfileName::LowPeak => ProfileKind::LowPeak,
+            },
+            infeasible: match self.when_infeasible {
+                InfeasibleName::Report => Infeasible::Report,
+                InfeasibleName::Soonest => Infeasible::Soonest,
             },
             rate: given(self.rate),
             rates,

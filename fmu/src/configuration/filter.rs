@@ -253,6 +253,11 @@ impl FilterConfiguration {
         self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
     }
 
+    /// Whether an input has a bound.
+    pub fn is_bounded(&self) -> bool {
+        self.bounds.values().any(|[min, max]| *min > -UNBOUNDED || *max < UNBOUNDED)
+    }
+
     /// The start values of the points that are inputs; they follow the states of the plant in the filter's.
     pub fn points(&self) -> Vec<f64> {
         self.barrier.iter().flat_map(BarrierSection::inputs).map(|(_, _, start, _)| start).collect()

@@ -10,7 +10,7 @@ mod parameter;
 mod plant;
 mod read;
 
-pub use barrier::{BarrierSection, MethodName, ShapeName};
+pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, ShapeName};
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};

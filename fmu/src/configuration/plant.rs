@@ -155,6 +155,22 @@ impl PlantSection {
     pub(crate) fn kinematic(&self) -> Result<KinematicBicycle, ConfigurationError> {
         KinematicBicycle::new(self.l_f.unwrap_or(LENGTH), self.l_r.unwrap_or(LENGTH)).map_err(constant)
     }
+
+    /// The plant.
+    ///
+    /// # Errors
+    ///
+    /// A constant outside its range.
+    pub fn build(&self) -> Result<Box<dyn DynPlant>, ConfigurationError> {
+        Ok(match self.model {
+            ModelName::PointMass => Box::new(Erased(PointMass)),
+            ModelName::Unicycle => Box::new(Erased(Unicycle)),
+            ModelName::Bicycle => Box::new(Erased(self.bicycle()?)),
+            ModelName::BicycleSmallSlip => Box::new(Erased(self.small_slip()?)),
+            ModelName::BicycleSmallSlipRate => Box::new(Erased(self.small_slip()?.with_rate())),
+            ModelName::BicycleKinematic => Box::new(Erased(self.kinematic()?)),
+        })
+    }
 }
 
 /// An error about a constant of the plant, with its path.
@@ -270,13 +286,6 @@ impl PlantConfiguration {
     ///
     /// A constant outside its range.
     pub fn build(&self) -> Result<Box<dyn DynPlant>, ConfigurationError> {
-        Ok(match self.plant.model {
-            ModelName::PointMass => Box::new(Erased(PointMass)),
-            ModelName::Unicycle => Box::new(Erased(Unicycle)),
-            ModelName::Bicycle => Box::new(Erased(self.plant.bicycle()?)),
-            ModelName::BicycleSmallSlip => Box::new(Erased(self.plant.small_slip()?)),
-            ModelName::BicycleSmallSlipRate => Box::new(Erased(self.plant.small_slip()?.with_rate())),
-            ModelName::BicycleKinematic => Box::new(Erased(self.plant.kinematic()?)),
-        })
+        self.plant.build()
     }
 }
