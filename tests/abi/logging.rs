@@ -1,7 +1,7 @@
 //! Categories, what is logged, and functions that the capability flags exclude.
 
 use std::ffi::CString;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 use punctual_fmu::product::LOG_CATEGORIES;
 
