@@ -155,6 +155,7 @@ fn snapshots(fmus: usize) -> usize {
 /// away, and the way on beside an instance that never went back. The snapshot is used as it is, or as
 /// bytes, or in an instance that was new.
 #[test]
+#[expect(clippy::print_stdout, reason = "the number of points is the result")]
 fn random_snapshots() {
     let fmus = every_fmu();
     let count = snapshots(fmus.len());
@@ -335,7 +336,6 @@ fn an_adaptive_master() {
     for &(t, h) in &accepted {
         exchange(&straight_f, &straight_p, t, h);
     }
-    println!("{} steps taken, {rejected} rejected", accepted.len());
     assert!(rejected > 20, "{rejected}");
     assert_eq!((all(&f), all(&p)), (all(&straight_f), all(&straight_p)));
 }

@@ -54,7 +54,6 @@ fn the_layout_is_what_is_documented() {
     for (configuration, size) in [(FILTER, 598), (PLANT, 202)] {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
-        println!("a state of {} has {} bytes", fmu.product.configuration.name(), bytes.len());
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
         assert_eq!(bytes[VERSION..GUID], 1_u32.to_le_bytes());
         assert_eq!(&bytes[GUID..LENGTH], fmu.guid().as_bytes());
