@@ -10,7 +10,7 @@
 
 use punctual_modeldescription::{BaseType, Causality, Variable, VariableKind};
 
-use crate::block::{self, Block, Values};
+use crate::block::{self, Block, BlockState, Values};
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
 
@@ -45,6 +45,9 @@ impl Mode {
     const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
+
+    /// Each mode by itself.
+    pub const EACH: [Self; 4] = [Self::INSTANTIATED, Self::INITIALIZATION, Self::STEP, Self::TERMINATED];
 
     /// Whether `self` is among `modes`.
     pub fn is_in(self, modes: Self) -> bool {
@@ -97,6 +100,29 @@ pub const LEGAL: [(Call, Mode); 7] = [
 
 /// Why a call failed, for the log: what was given and what is allowed.
 pub type Failure = String;
+
+/// A snapshot of an instance: all that influences what it does later.
+#[derive(Debug, PartialEq)]
+pub struct State {
+    /// The GUID of the FMU it belongs to.
+    pub guid: String,
+    /// The mode.
+    pub mode: Mode,
+    /// The communication point in s.
+    pub time: f64,
+    /// Whether a step was made since initialization.
+    pub stepped: bool,
+    /// The length of the last step in s.
+    pub last_step: f64,
+    /// Whether the outputs in `values` belong to the inputs in `values`.
+    pub fresh: bool,
+    /// Whether `block` belongs to the parameters in `values`.
+    pub configured: bool,
+    /// Inputs (pending ones too), outputs and parameters.
+    pub values: Values,
+    /// What the computation remembers.
+    pub block: BlockState,
+}
 
 /// One instance of an FMU.
 pub struct Instance {
@@ -175,7 +201,7 @@ impl Instance {
         if self.mode.is_in(modes) {
             return Ok(());
         }
-        let allowed: Vec<_> = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED]
+        let allowed: Vec<_> = Mode::EACH
             .into_iter()
             .filter(|m| m.is_in(modes))
             .map(|mode| format!("{:?}", mode.name()))
@@ -248,6 +274,61 @@ impl Instance {
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
+    }
+
+    /// A snapshot of the instance, in any mode.
+    pub fn state(&self) -> State {
+        let mut state = State {
+            guid: String::new(),
+            mode: self.mode,
+            time: 0.0,
+            stepped: false,
+            last_step: 0.0,
+            fresh: false,
+            configured: false,
+            values: Values::default(),
+            block: BlockState::Plant { x: Vec::new() },
+        };
+        self.save(&mut state);
+        state
+    }
+
+    /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
+    pub fn save(&self, state: &mut State) {
+        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured } = self;
+        state.guid.clone_from(&product.guid);
+        (state.mode, state.time, state.last_step) = (*mode, *time, *last_step);
+        (state.stepped, state.fresh, state.configured) = (*stepped, *fresh, *configured);
+        state.values.clone_from(values);
+        block.save(&mut state.block);
+    }
+
+    /// Goes back, or on, to a snapshot of this or another instance of the same FMU, in any mode: every bit
+    /// that follows is the same. Allocates only where the parameters were others.
+    ///
+    /// # Errors
+    ///
+    /// The state of another FMU.
+    pub fn restore(&mut self, state: &State) -> Result<(), Failure> {
+        let State { guid, mode, time, stepped, last_step, fresh, configured, values, block } = state;
+        if *guid != self.product.guid {
+            return Err(format!(
+                "the state belongs to the FMU with the GUID {guid:?}, must be {:?}",
+                self.product.guid
+            ));
+        }
+        let parameters = self.product.layout.parameters..self.product.layout.end;
+        let bits = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        let mut pairs = self.values.reals[parameters.clone()].iter().zip(&values.reals[parameters]);
+        if *configured && !(self.configured && pairs.all(bits)) {
+            self.block.configure(values).map_err(|e| e.to_string())?;
+        }
+        self.block.restore(block)?;
+        (self.mode, self.time, self.last_step) = (*mode, *time, *last_step);
+        (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
+        self.values.clone_from(values);
+        Ok(())
     }
 
     /// Makes the communication step from `t` by `h` seconds.

@@ -9,6 +9,7 @@
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
 //! | [`block`] | what is computed: a filter or a plant between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
+//! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate. The only unsafe code |
 #![deny(unsafe_code)]
 
@@ -21,3 +22,4 @@ pub mod block;
 pub mod configuration;
 pub mod instance;
 pub mod product;
+pub mod state;

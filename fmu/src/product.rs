@@ -93,6 +93,8 @@ impl Product {
                 model_identifier: name,
                 can_handle_variable_step: true,
                 can_not_use_memory_management_functions: true,
+                can_get_and_set_state: true,
+                can_serialize_state: true,
                 ..CoSimulation::default()
             },
             units: units(&self.variables),

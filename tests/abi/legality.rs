@@ -65,12 +65,25 @@ const FUNCTIONS: [Function; 30] = [
         |s| (API.get_output_derivatives)(s.component, null(), 0, null(), null_mut()),
         OK,
     ),
-    ("fmi2GetFMUstate", None, |s| (API.get_state)(s.component, &mut null_mut()), ERROR),
-    ("fmi2SetFMUstate", None, |s| (API.set_state)(s.component, null_mut()), ERROR),
-    ("fmi2FreeFMUstate", None, |s| (API.free_state)(s.component, &mut null_mut()), OK),
-    ("fmi2SerializedFMUstateSize", None, |s| (API.serialized_size)(s.component, null_mut(), &mut 0), ERROR),
-    ("fmi2SerializeFMUstate", None, |s| (API.serialize)(s.component, null_mut(), null_mut(), 0), ERROR),
-    ("fmi2DeSerializeFMUstate", None, |s| (API.deserialize)(s.component, null(), 0, &mut null_mut()), ERROR),
+    ("fmi2GetFMUstate", None, |s| (API.get_state)(s.component, &mut null_mut()), OK),
+    ("fmi2SetFMUstate", None, |s| (API.set_state)(s.component, s.state()), OK),
+    ("fmi2FreeFMUstate", None, |s| (API.free_state)(s.component, &mut s.state()), OK),
+    ("fmi2SerializedFMUstateSize", None, |s| (API.serialized_size)(s.component, s.state(), &mut 0), OK),
+    (
+        "fmi2SerializeFMUstate",
+        None,
+        |s| (API.serialize)(s.component, s.state(), [0; 4096].as_mut_ptr(), 4096),
+        OK,
+    ),
+    (
+        "fmi2DeSerializeFMUstate",
+        None,
+        |s| {
+            let bytes = s.bytes(s.state());
+            (API.deserialize)(s.component, bytes.as_ptr().cast(), bytes.len(), &mut null_mut())
+        },
+        OK,
+    ),
     (
         "fmi2GetDirectionalDerivative",
         None,

@@ -1,7 +1,7 @@
 //! Categories, what is logged, and functions that the capability flags exclude.
 
 use std::ffi::CString;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 use punctual_fmu::product::LOG_CATEGORIES;
 
@@ -91,27 +91,10 @@ fn excluded_functions_name_their_flag() {
         let fmu = Fmu::new(configuration);
         let slave = Slave::ready(&fmu);
         let (c, before) = (slave.component, slave.snapshot());
-        let (mut state, mut size, mut bytes, mut result) = (null_mut(), 7, [0; 8], [1.5]);
+        let mut result = [1.5];
         let (references, order) = ([0], [1]);
         let refs = references.as_ptr();
         for (status, name, flag) in [
-            ((API.get_state)(c, &raw mut state), "fmi2GetFMUstate", "canGetAndSetFMUstate is false"),
-            ((API.set_state)(c, null_mut()), "fmi2SetFMUstate", "canGetAndSetFMUstate is false"),
-            (
-                (API.serialized_size)(c, null_mut(), &raw mut size),
-                "fmi2SerializedFMUstateSize",
-                "canSerializeFMUstate is false",
-            ),
-            (
-                (API.serialize)(c, null_mut(), bytes.as_mut_ptr(), 8),
-                "fmi2SerializeFMUstate",
-                "canSerializeFMUstate is false",
-            ),
-            (
-                (API.deserialize)(c, bytes.as_ptr(), 8, &raw mut state),
-                "fmi2DeSerializeFMUstate",
-                "canSerializeFMUstate is false",
-            ),
             (
                 (API.directional_derivative)(c, refs, 1, refs, 1, [1.0].as_ptr(), result.as_mut_ptr()),
                 "fmi2GetDirectionalDerivative",
@@ -135,22 +118,9 @@ fn excluded_functions_name_their_flag() {
             let named = messages.iter().any(|m| m.starts_with(&format!("{name}: ")) && m.contains(flag));
             assert!(named, "{name} should name {flag}: {messages:?}");
         }
-        assert!(state.is_null());
-        assert_eq!((size, bytes, result), (7, [0; 8], [1.5]), "nothing was written");
+        assert_eq!(result, [1.5], "nothing was written");
         assert_eq!(slave.snapshot(), before);
     }
-}
-
-#[test]
-fn freeing_no_state_is_fine() {
-    let fmu = Fmu::new(FILTER);
-    let slave = Slave::new(&fmu);
-    slave.ok((API.free_state)(slave.component, null_mut()));
-    let mut state = null_mut();
-    slave.ok((API.free_state)(slave.component, &raw mut state));
-    let mut foreign = (&raw mut state).cast();
-    let message = slave.refused((API.free_state)(slave.component, &raw mut foreign));
-    assert_eq!(message, "fmi2FreeFMUstate: not supported: canGetAndSetFMUstate is false");
 }
 
 /// Nothing is asynchronous: what there is to say is the time and whether the run has ended.

@@ -13,6 +13,8 @@
 //! | `outputs` | lazy outputs of a filter, anchors, re-arming |
 //! | `times` | odd communication points and steps |
 //! | `plant` | inner steps, initial states, refusals |
+//! | `states` | snapshots: layout, lifetime, what is refused |
+//! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
@@ -25,5 +27,7 @@ mod lifetime;
 mod logging;
 mod outputs;
 mod plant;
+mod rollback;
 mod slave;
+mod states;
 mod times;

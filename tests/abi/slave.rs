@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use punctual_core::filter::SafetyFilter;
 use punctual_modeldescription::BaseType;
 
-use crate::api::{API, Api, Callbacks, Component, ERROR, OK, Text};
+use crate::api::{API, Api, Callbacks, Component, ERROR, OK, State, Text};
 use crate::fmu::Fmu;
 
 /// One call of the logger.
@@ -185,6 +185,50 @@ impl<'a> Slave<'a> {
         let mut value = f64::NAN;
         self.ok((self.api.get_real_status)(self.component, 2, &raw mut value));
         value
+    }
+
+    /// A new state; the instance frees it at the latest.
+    pub(crate) fn state(&self) -> State {
+        let mut state = std::ptr::null_mut();
+        self.ok((self.api.get_state)(self.component, &raw mut state));
+        assert!(!state.is_null());
+        state
+    }
+
+    pub(crate) fn restore(&self, state: State) {
+        self.ok((self.api.set_state)(self.component, state));
+    }
+
+    /// A state as bytes.
+    pub(crate) fn bytes(&self, state: State) -> Vec<u8> {
+        let mut size = 0;
+        self.ok((self.api.serialized_size)(self.component, state, &raw mut size));
+        let mut bytes = vec![0xff; size];
+        self.ok((self.api.serialize)(self.component, state, bytes.as_mut_ptr().cast(), size));
+        bytes
+    }
+
+    /// The present state as bytes: every bit that the instance remembers.
+    pub(crate) fn now(&self) -> Vec<u8> {
+        let mut state = self.state();
+        let bytes = self.bytes(state);
+        self.ok((self.api.free_state)(self.component, &raw mut state));
+        bytes
+    }
+
+    /// The answer to bytes that may be no state, and the state.
+    pub(crate) fn try_read(&self, bytes: &[u8]) -> (c_int, State) {
+        let mut state = std::ptr::null_mut();
+        let status =
+            (self.api.deserialize)(self.component, bytes.as_ptr().cast(), bytes.len(), &raw mut state);
+        (status, state)
+    }
+
+    /// The state in bytes.
+    pub(crate) fn read(&self, bytes: &[u8]) -> State {
+        let (status, state) = self.try_read(bytes);
+        self.ok(status);
+        state
     }
 
     /// Every variable with the bits of its value, as text that a failed assertion shows well.

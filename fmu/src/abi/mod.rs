@@ -11,6 +11,7 @@
 mod guard;
 mod logger;
 mod resources;
+mod states;
 mod types;
 mod unsupported;
 
@@ -95,7 +96,10 @@ unsafe extern "C" fn fmi2FreeInstance(component: Component) {
         // SAFETY: not NULL, so it came from `Box::into_raw` in `fmi2Instantiate`, and is freed once.
         let handle = unsafe { Box::from_raw(component.cast::<Handle>()) };
         // A panic while dropping must not reach the importer; what it would leave behind is leaked.
-        let _ = catch(|| drop(handle));
+        let _ = catch(|| {
+            states::free_all(&handle);
+            drop(handle);
+        });
     }
 }
 

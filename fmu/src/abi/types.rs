@@ -4,6 +4,8 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 
 pub(super) type Component = *mut c_void;
 pub(super) type Environment = *mut c_void;
+/// `fmi2FMUstate`.
+pub(super) type StatePointer = *mut c_void;
 pub(super) type ValueReference = c_uint;
 pub(super) type Boolean = c_int;
 pub(super) type StringPointer = *const c_char;

@@ -2,7 +2,7 @@
 
 use punctual_core::filter::{FilterState, SafetyFilter, Status};
 
-use super::{Block, Values};
+use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout};
 
@@ -96,6 +96,37 @@ impl Block for FilterBlock {
 
     fn step(&mut self, t: f64, _h: f64, values: &mut Values) -> Result<(), String> {
         self.sample(t, true, values)
+    }
+
+    fn save(&self, state: &mut BlockState) {
+        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        let Self {
+            rearm_seen: now,
+            filter: memory,
+            configuration: _,
+            parameters: _,
+            layout: _,
+            kept: _,
+            u: _,
+        } = self;
+        match state {
+            BlockState::Filter { rearm_seen, filter } => {
+                *rearm_seen = *now;
+                filter.clone_from(memory.state());
+            }
+            BlockState::Plant { .. } => {
+                *state = BlockState::Filter { rearm_seen: *now, filter: memory.state().clone() };
+            }
+        }
+    }
+
+    fn restore(&mut self, state: &BlockState) -> Result<(), String> {
+        let BlockState::Filter { rearm_seen, filter } = state else {
+            return Err("the state is that of a plant, must be that of a filter".to_owned());
+        };
+        self.filter.restore(filter).map_err(|e| e.to_string())?;
+        self.rearm_seen = *rearm_seen;
+        Ok(())
     }
 
     fn direct_feedthrough(&self) -> bool {

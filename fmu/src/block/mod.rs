@@ -3,6 +3,8 @@
 mod filter;
 mod plant;
 
+use punctual_core::filter::FilterState;
+
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
 use filter::FilterBlock;
@@ -10,7 +12,7 @@ use plant::PlantBlock;
 
 /// The values of all variables, each at the index of its value reference in the array of its type
 /// (the other two entries stay unused).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Values {
     /// Reals, in their units.
     pub reals: Vec<f64>,
@@ -20,11 +22,44 @@ pub struct Values {
     pub booleans: Vec<bool>,
 }
 
+impl Clone for Values {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Reuses the memory, which a derived `Clone` would not.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { reals, integers, booleans } = source;
+        self.reals.clone_from(reals);
+        self.integers.clone_from(integers);
+        self.booleans.clone_from(booleans);
+    }
+}
+
 impl Values {
     /// Zeros and `false` for `len` variables.
     pub fn zeros(len: usize) -> Self {
         Self { reals: vec![0.0; len], integers: vec![0; len], booleans: vec![false; len] }
     }
+}
+
+/// All that a block remembers besides its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BlockState {
+    /// Of a filter.
+    Filter {
+        /// `rearm` at the last step.
+        rearm_seen: bool,
+        /// The promises.
+        filter: FilterState,
+    },
+    /// Of a plant.
+    Plant {
+        /// The state, in the order and units of the model.
+        x: Vec<f64>,
+    },
 }
 
 /// The computation behind an instance.
@@ -46,6 +81,16 @@ pub trait Block: Send {
     ///
     /// A step that cannot be made; nothing has changed.
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String>;
+
+    /// Writes what is remembered to `state`; allocates only where that was of another kind or size.
+    fn save(&self, state: &mut BlockState);
+
+    /// Goes back to what [`Self::save`] wrote under the same parameters: every bit that follows is the same.
+    ///
+    /// # Errors
+    ///
+    /// The state of another product; nothing has changed.
+    fn restore(&mut self, state: &BlockState) -> Result<(), String>;
 
     /// Whether outputs depend on inputs without a step between.
     fn direct_feedthrough(&self) -> bool;

@@ -2,7 +2,7 @@
 
 use punctual_core::dynamics::DynPlant;
 
-use super::{Block, Values};
+use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, updated};
 use crate::product::Layout;
 
@@ -66,6 +66,26 @@ impl Block for PlantBlock {
         }
         std::mem::swap(&mut self.x, &mut self.next);
         self.output(t + h, values);
+        Ok(())
+    }
+
+    fn save(&self, state: &mut BlockState) {
+        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        let Self { x: now, configuration: _, parameters: _, layout: _, plant: _, next: _ } = self;
+        match state {
+            BlockState::Plant { x } => x.clone_from(now),
+            BlockState::Filter { .. } => *state = BlockState::Plant { x: now.clone() },
+        }
+    }
+
+    fn restore(&mut self, state: &BlockState) -> Result<(), String> {
+        let BlockState::Plant { x } = state else {
+            return Err("the state is that of a filter, must be that of a plant".to_owned());
+        };
+        if x.len() != self.x.len() {
+            return Err(format!("the state has {} components, must have {}", x.len(), self.x.len()));
+        }
+        self.x.copy_from_slice(x);
         Ok(())
     }
 

@@ -38,7 +38,13 @@ fn every_product_has_a_valid_model_description() {
         let name = product.configuration.name();
         let xml = product.model_description().to_xml().unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(xml.contains(&product.guid), "{name}: {xml}");
-        assert!(!xml.contains("canGetAndSetFMUstate=\"true\""), "{name} promises what it refuses");
+        for (flag, there) in [
+            ("canGetAndSetFMUstate", true),
+            ("canSerializeFMUstate", true),
+            ("providesDirectionalDerivative", false),
+        ] {
+            assert_eq!(xml.contains(&format!("{flag}=\"true\"")), there, "{name}: {flag}");
+        }
     }
 }
 

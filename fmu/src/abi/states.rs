@@ -1,0 +1,202 @@
+//! States: snapshots in memory, and as bytes.
+//!
+//! What the importer holds is a number, not an address: nothing is ever read through it, a number is given
+//! once, and one that is not of a live state is refused. A state can be used by every instance of its FMU
+//! in the process; it ends with `fmi2FreeFMUstate`, or with the instance that made it.
+
+use std::collections::BTreeMap;
+use std::ffi::c_char;
+use std::ptr;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::guard::{Handle, guarded, slice, slice_mut};
+use super::types::{Component, StatePointer, Status};
+use crate::instance::{Failure, State};
+use crate::state;
+
+/// The live states of the process, by number. Locked by the functions of this file only, never by a step.
+static STATES: Mutex<States> = Mutex::new(States { last: 0, live: BTreeMap::new() });
+
+struct States {
+    /// The last number given.
+    last: usize,
+    live: BTreeMap<usize, Entry>,
+}
+
+struct Entry {
+    state: Box<State>,
+    /// The address of the instance that made it.
+    owner: usize,
+}
+
+impl States {
+    fn lock() -> MutexGuard<'static, Self> {
+        STATES.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn insert(&mut self, owner: &Handle, state: State) -> StatePointer {
+        self.last += 1;
+        self.live.insert(self.last, Entry { state: Box::new(state), owner: ptr::from_ref(owner).addr() });
+        ptr::without_provenance_mut(self.last)
+    }
+
+    /// A live state of the FMU of `handle`.
+    fn find(&mut self, handle: &Handle, pointer: StatePointer) -> Result<&mut State, Failure> {
+        if pointer.is_null() {
+            return Err("FMUstate is NULL".to_owned());
+        }
+        let entry = self.live.get_mut(&pointer.addr()).ok_or(
+            "FMUstate is none that fmi2GetFMUstate or fmi2DeSerializeFMUstate gave, or was freed, \
+             or the instance that made it was",
+        )?;
+        let (found, wanted) = (&entry.state.guid, &handle.instance.product().guid);
+        if found != wanted {
+            return Err(format!("FMUstate belongs to the FMU with the GUID {found:?}, must be {wanted:?}"));
+        }
+        Ok(&mut entry.state)
+    }
+}
+
+/// Frees the states that an instance leaves behind.
+pub(super) fn free_all(owner: &Handle) {
+    let mut states = States::lock();
+    let address = ptr::from_ref(owner).addr();
+    states.live.retain(|_, entry| entry.owner != address);
+    if states.live.is_empty() {
+        // Nothing stays allocated when the library is unloaded.
+        states.live = BTreeMap::new();
+    }
+}
+
+/// Takes a snapshot, in any mode: into a new state where `*state` is NULL, else over that one.
+///
+/// # Safety
+///
+/// See the module above; `state` is NULL or points to a state pointer.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut StatePointer) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for `state`.
+        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+        if state[0].is_null() {
+            let snapshot = handle.instance.state();
+            state[0] = States::lock().insert(handle, snapshot);
+        } else {
+            handle.instance.save(States::lock().find(handle, state[0])?);
+        }
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2GetFMUstate", body) }
+}
+
+/// Goes back, or on, to a snapshot, from any mode.
+///
+/// # Safety
+///
+/// See the module above.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetFMUstate(component: Component, state: StatePointer) -> Status {
+    let body = |handle: &mut Handle| {
+        let mut states = States::lock();
+        let state = states.find(handle, state)?;
+        handle.instance.restore(state).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SetFMUstate", body) }
+}
+
+/// Frees a state and sets `*state` to NULL; NULL is fine.
+///
+/// # Safety
+///
+/// See the module above; `state` is NULL or points to a state pointer.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut StatePointer) -> Status {
+    let body = |handle: &mut Handle| {
+        if state.is_null() {
+            return Ok(Status::Ok);
+        }
+        // SAFETY: the caller's contract for `state`.
+        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+        if !state[0].is_null() {
+            let mut states = States::lock();
+            states.find(handle, state[0])?;
+            states.live.remove(&state[0].addr());
+            state[0] = ptr::null_mut();
+        }
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2FreeFMUstate", body) }
+}
+
+/// The number of bytes of a state: the same for all states of an FMU.
+///
+/// # Safety
+///
+/// See the module above; `size` is NULL or writable.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SerializedFMUstateSize(
+    component: Component,
+    state: StatePointer,
+    size: *mut usize,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        States::lock().find(handle, state)?;
+        // SAFETY: the caller's contract for `size`.
+        let size = unsafe { slice_mut("size", size, 1) }?;
+        size[0] = state::size(handle.instance.product());
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SerializedFMUstateSize", body) }
+}
+
+/// Writes a state to `size` bytes; those that are more than needed become 0.
+///
+/// # Safety
+///
+/// See the module above.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SerializeFMUstate(
+    component: Component,
+    state: StatePointer,
+    bytes: *mut c_char,
+    size: usize,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        let mut states = States::lock();
+        let state = states.find(handle, state)?;
+        // SAFETY: the caller's contract for arrays.
+        let bytes = unsafe { slice_mut("serializedState", bytes.cast::<u8>(), size) }?;
+        state::write(handle.instance.product(), state, bytes).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2SerializeFMUstate", body) }
+}
+
+/// Makes a new state from bytes. What `*state` was is not looked at: the standard does not say.
+///
+/// # Safety
+///
+/// See the module above; `state` is NULL or writable.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2DeSerializeFMUstate(
+    component: Component,
+    bytes: *const c_char,
+    size: usize,
+    state: *mut StatePointer,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for arrays.
+        let bytes = unsafe { slice("serializedState", bytes.cast::<u8>(), size) }?;
+        // SAFETY: the caller's contract for `state`.
+        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+        let read = state::read(handle.instance.product(), bytes)?;
+        state[0] = States::lock().insert(handle, read);
+        Ok(Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2DeSerializeFMUstate", body) }
+}

@@ -1,0 +1,378 @@
+//! A snapshot of an instance as bytes.
+//!
+//! | bytes | hold |
+//! |---|---|
+//! | 8 | `PUNCTUAL` |
+//! | 4 | version of this layout |
+//! | 38 | the GUID of the FMU, as in its model description |
+//! | 8 | length of all |
+//! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
+//! | 4 | CRC-32 of all before |
+//!
+//! Little-endian; numbers by their bits. A field has the same place in every state of an FMU: optional ones
+//! keep theirs. Bytes that are damaged, or not of this FMU, are refused; which field it is, is said.
+
+use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
+use punctual_core::filter::FilterState;
+use punctual_modeldescription::BaseType;
+
+use crate::block::{BlockState, Values};
+use crate::configuration::Configuration;
+use crate::instance::{Failure, Mode, State};
+use crate::product::Product;
+
+const MAGIC: [u8; 8] = *b"PUNCTUAL";
+
+/// To be raised with every change of the layout. (The GUID changes with the version of the library.)
+const VERSION: u32 = 1;
+
+const GUID: usize = 38;
+const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
+const CHECKSUM: usize = u32::SIZE;
+
+/// The number of bytes of every state of `product`.
+pub fn size(product: &Product) -> usize {
+    let flags = Mode::SIZE + 2 * f64::SIZE + 3 * bool::SIZE;
+    let value = |base| match base {
+        BaseType::Real => f64::SIZE,
+        BaseType::Boolean => bool::SIZE,
+        BaseType::Integer => i32::SIZE,
+        BaseType::String => 0,
+    };
+    let values: usize = product.variables.iter().map(|v| value(v.kind.base_type())).sum();
+    let block = match &product.configuration {
+        Configuration::Filter(c) => {
+            bool::SIZE + c.barrier.len() * FixedTimeState::SIZE + 2 * <Option<f64>>::SIZE + Inputs::SIZE
+        }
+        Configuration::Plant(_) => product.layout.states * f64::SIZE,
+    };
+    HEADER + flags + values + block + CHECKSUM
+}
+
+/// Writes a state of `product` to the first [`size`] bytes of `bytes` and zeros to the rest.
+///
+/// # Errors
+///
+/// Too few bytes; the state of another product. Nothing was written.
+pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
+    let State { guid, mode, time, stepped, last_step, fresh, configured, values, block } = state;
+    let size = size(product);
+    if bytes.len() < size {
+        return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
+    }
+    check_guid(product, guid.as_bytes())?;
+    let mut out = Vec::with_capacity(size);
+    out.extend_from_slice(&MAGIC);
+    VERSION.write(&mut out);
+    out.extend_from_slice(guid.as_bytes());
+    (size as u64).write(&mut out);
+    mode.write(&mut out);
+    time.write(&mut out);
+    stepped.write(&mut out);
+    last_step.write(&mut out);
+    fresh.write(&mut out);
+    configured.write(&mut out);
+    for (i, variable) in product.variables.iter().enumerate() {
+        match variable.kind.base_type() {
+            BaseType::Real => values.reals[i].write(&mut out),
+            BaseType::Boolean => values.booleans[i].write(&mut out),
+            BaseType::Integer => values.integers[i].write(&mut out),
+            BaseType::String => {}
+        }
+    }
+    match block {
+        BlockState::Filter { rearm_seen, filter } => {
+            let FilterState { barriers, time, period, input } = filter;
+            rearm_seen.write(&mut out);
+            barriers.iter().for_each(|barrier| barrier.write(&mut out));
+            time.write(&mut out);
+            period.write(&mut out);
+            input.write(&mut out);
+        }
+        BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
+    }
+    let checksum = crc32(&out);
+    checksum.write(&mut out);
+    if out.len() != size {
+        return Err(format!("the state has {} bytes, must have {size}", out.len()));
+    }
+    let (state, rest) = bytes.split_at_mut(size);
+    state.copy_from_slice(&out);
+    rest.fill(0);
+    Ok(())
+}
+
+/// The state of `product` that [`write()`] wrote.
+///
+/// # Errors
+///
+/// Bytes that are not such a state: which part, what it is and what it must be.
+pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
+    let size = size(product);
+    let mut input = Reader { rest: bytes };
+    if input.take("magic number", MAGIC.len())? != MAGIC {
+        return Err("the bytes do not begin as a state does, with \"PUNCTUAL\"".to_owned());
+    }
+    let version: u32 = input.field("version")?;
+    if version != VERSION {
+        return Err(format!("the version of the layout is {version}, must be {VERSION}"));
+    }
+    check_guid(product, input.take("GUID", GUID)?)?;
+    let length: u64 = input.field("length")?;
+    if length != size as u64 {
+        return Err(format!("the length is {length} bytes, must be {size}"));
+    }
+    if bytes.len() < size {
+        return Err(format!("the state is cut off: there are {} bytes, must be {size}", bytes.len()));
+    }
+    let (state, rest) = bytes.split_at(size);
+    if let Some(at) = rest.iter().position(|byte| *byte != 0) {
+        return Err(format!("byte {} after the state is {}, must be 0", size + at, rest[at]));
+    }
+    let (content, checksum) = state.split_at(size - CHECKSUM);
+    let found: u32 = Reader { rest: checksum }.field("checksum")?;
+    let wanted = crc32(content);
+    if found != wanted {
+        return Err(format!("the checksum is {found:08x}, must be {wanted:08x}: the bytes are damaged"));
+    }
+
+    let mut input = Reader { rest: &content[HEADER..] };
+    let mode = input.field("mode")?;
+    let time = input.finite("time")?;
+    let stepped = input.field("stepped")?;
+    let last_step = input.finite("last_step")?;
+    let fresh = input.field("fresh")?;
+    let configured = input.field("configured")?;
+    let values = read_values(product, &mut input)?;
+    let block = match &product.configuration {
+        Configuration::Filter(c) => {
+            let rearm_seen = input.field("rearm_seen")?;
+            let barriers = c.barrier.iter().map(|b| input.field(&b.name)).collect::<Result<_, _>>()?;
+            let filter = FilterState {
+                barriers,
+                time: input.field("filter time")?,
+                period: input.field("period")?,
+                input: input.field("input")?,
+            };
+            BlockState::Filter { rearm_seen, filter }
+        }
+        Configuration::Plant(_) => {
+            let x = (0..product.layout.states).map(|_| input.finite("x")).collect::<Result<_, _>>()?;
+            BlockState::Plant { x }
+        }
+    };
+    let guid = product.guid.clone();
+    Ok(State { guid, mode, time, stepped, last_step, fresh, configured, values, block })
+}
+
+fn read_values(product: &Product, input: &mut Reader) -> Result<Values, Failure> {
+    let mut values = Values::zeros(product.variables.len());
+    for (i, variable) in product.variables.iter().enumerate() {
+        let name = &variable.name;
+        match variable.kind.base_type() {
+            BaseType::Real => values.reals[i] = input.field(name)?,
+            BaseType::Boolean => values.booleans[i] = input.field(name)?,
+            BaseType::Integer => values.integers[i] = input.field(name)?,
+            BaseType::String => {}
+        }
+        if let Some(range) = i.checked_sub(product.layout.parameters).and_then(|p| product.ranges.get(p)) {
+            range.check(name, values.reals[i]).map_err(|e| e.to_string())?;
+        }
+    }
+    Ok(values)
+}
+
+fn check_guid(product: &Product, found: &[u8]) -> Result<(), Failure> {
+    if found == product.guid.as_bytes() {
+        return Ok(());
+    }
+    let found = String::from_utf8_lossy(found);
+    Err(format!("the state belongs to the FMU with the GUID {found:?}, must be {:?}", product.guid))
+}
+
+/// CRC-32 as in Ethernet and zip.
+fn crc32(bytes: &[u8]) -> u32 {
+    const POLYNOMIAL: u32 = 0xedb8_8320;
+    !bytes.iter().fold(!0, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (POLYNOMIAL * (crc & 1)))
+    })
+}
+
+/// The bytes that are still to be read.
+struct Reader<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, name: &str, len: usize) -> Result<&'a [u8], Failure> {
+        let (taken, rest) = self.rest.split_at_checked(len).ok_or_else(|| {
+            format!("the state is cut off in the {name}: {} bytes of {len}", self.rest.len())
+        })?;
+        self.rest = rest;
+        Ok(taken)
+    }
+
+    fn field<T: Field>(&mut self, name: &str) -> Result<T, Failure> {
+        T::read(self).map_err(|failure| format!("{name}: {failure}"))
+    }
+
+    fn finite(&mut self, name: &str) -> Result<f64, Failure> {
+        let value: f64 = self.field(name)?;
+        if value.is_finite() { Ok(value) } else { Err(format!("{name} is {value}, must be finite")) }
+    }
+}
+
+/// What has a fixed number of bytes.
+trait Field: Sized {
+    const SIZE: usize;
+    fn write(&self, out: &mut Vec<u8>);
+    fn read(input: &mut Reader) -> Result<Self, Failure>;
+}
+
+macro_rules! numbers {
+    ($($kind:ty),*) => {$(
+        impl Field for $kind {
+            const SIZE: usize = size_of::<Self>();
+
+            fn write(&self, out: &mut Vec<u8>) {
+                out.extend_from_slice(&self.to_le_bytes());
+            }
+
+            fn read(input: &mut Reader) -> Result<Self, Failure> {
+                let mut bytes = [0; size_of::<Self>()];
+                bytes.copy_from_slice(input.take("number", Self::SIZE)?);
+                Ok(Self::from_le_bytes(bytes))
+            }
+        }
+    )*};
+}
+
+numbers!(u8, i32, u32, u64, f64);
+
+impl Field for bool {
+    const SIZE: usize = 1;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        out.push(u8::from(*self));
+    }
+
+    fn read(input: &mut Reader) -> Result<Self, Failure> {
+        match u8::read(input)? {
+            0 => Ok(false),
+            1 => Ok(true),
+            other => Err(format!("is {other}, must be 0 or 1")),
+        }
+    }
+}
+
+/// Enumerations in one byte: a value that is missing here does not compile.
+macro_rules! enumeration {
+    ($kind:ident { $($value:ident = $byte:literal),* $(,)? }) => {
+        impl Field for $kind {
+            const SIZE: usize = 1;
+
+            fn write(&self, out: &mut Vec<u8>) {
+                out.push(match self { $(Self::$value => $byte),* });
+            }
+
+            fn read(input: &mut Reader) -> Result<Self, Failure> {
+                match u8::read(input)? {
+                    $($byte => Ok(Self::$value),)*
+                    other => Err(format!("is {other}, which is no {}", stringify!($kind))),
+                }
+            }
+        }
+    };
+}
+
+enumeration!(Phase { Waiting = 0, Approach = 1, Late = 2, Stay = 3, Left = 4, Released = 5 });
+
+impl Field for Mode {
+    const SIZE: usize = 1;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        // A number that is none of a mode is refused when it is read.
+        let index = Self::EACH.iter().position(|mode| mode == self).unwrap_or(Self::EACH.len());
+        out.push(index as u8);
+    }
+
+    fn read(input: &mut Reader) -> Result<Self, Failure> {
+        let index = u8::read(input)?;
+        let mode = Self::EACH.get(usize::from(index));
+        mode.copied().ok_or_else(|| format!("is {index}, must be < {}", Self::EACH.len()))
+    }
+}
+
+impl<T: Field> Field for Option<T> {
+    const SIZE: usize = bool::SIZE + T::SIZE;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.is_some().write(out);
+        match self {
+            Some(value) => value.write(out),
+            None => out.resize(out.len() + T::SIZE, 0),
+        }
+    }
+
+    fn read(input: &mut Reader) -> Result<Self, Failure> {
+        let there = bool::read(input)?;
+        let mut value = Reader { rest: input.take("value", T::SIZE)? };
+        there.then(|| T::read(&mut value)).transpose()
+    }
+}
+
+impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
+    const SIZE: usize = N * T::SIZE;
+
+    fn write(&self, out: &mut Vec<u8>) {
+        self.iter().for_each(|value| value.write(out));
+    }
+
+    fn read(input: &mut Reader) -> Result<Self, Failure> {
+        let mut values = [T::default(); N];
+        for value in &mut values {
+            *value = T::read(input)?;
+        }
+        Ok(values)
+    }
+}
+
+/// `FilterState::input`.
+type Inputs = [f64; punctual_core::MAX_INPUTS];
+
+/// Structures field by field: one that is missing here, or of another type, does not compile.
+macro_rules! structure {
+    ($kind:ident { $($field:ident: $type:ty),* $(,)? }) => {
+        impl Field for $kind {
+            const SIZE: usize = 0 $(+ <$type>::SIZE)*;
+
+            fn write(&self, out: &mut Vec<u8>) {
+                let Self { $($field),* } = self;
+                $(<$type>::write($field, out);)*
+            }
+
+            fn read(input: &mut Reader) -> Result<Self, Failure> {
+                Ok(Self { $($field: input.field::<$type>(stringify!($field))?),* })
+            }
+        }
+    };
+}
+
+structure!(Unmet { steps: u32, since: f64, h: f64 });
+
+structure!(FixedTimeState {
+    phase: Phase,
+    start_time: Option<f64>,
+    anchor_time: f64,
+    deadline: f64,
+    recoveries: u32,
+    anchor: [f64; punctual_core::MAX_RELATIVE_DEGREE],
+    rate: f64,
+    stay_rate: f64,
+    margin: f64,
+    period: f64,
+    fallback: bool,
+    arrival: Option<f64>,
+    guaranteed: bool,
+    unmet: Option<Unmet>,
+});
