@@ -257,7 +257,8 @@ impl Held<'_> {
             let mut moved = false;
             for _ in 0..=HALVINGS {
                 for i in 0..m {
-                    u[i] = from[i] + part * (target[i] - from[i]);
+                    // Between two points within the bounds, but for round-off.
+                    u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
                 }
                 if self.linearise(u, at).is_some() {
                     let there = at.worst(found.given_up);
