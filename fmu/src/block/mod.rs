@@ -1,10 +1,12 @@
-//! What an FMU computes, between arrays of values: a filter or a plant. No FMI, no pointers.
+//! What an FMU computes, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
+mod controller;
 mod filter;
 mod plant;
 
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
+use controller::ControllerBlock;
 use filter::FilterBlock;
 use plant::PlantBlock;
 
@@ -66,5 +68,6 @@ pub fn build(product: &Product) -> Result<Box<dyn Block>, ConfigurationError> {
     Ok(match &product.configuration {
         Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product.layout)?),
         Configuration::Plant(c) => Box::new(PlantBlock::new(c.clone(), product.layout)?),
+        Configuration::Controller(c) => Box::new(ControllerBlock::new(c.clone(), product.layout)),
     })
 }
