@@ -130,8 +130,8 @@ fn a_controller_a_filter_and_a_plant() {
     let waypoint = table.column("controller.waypoint");
     assert!(waypoint.windows(2).all(|w| w[0] <= w[1]) && waypoint[0] == 1.0);
     assert_eq!(waypoint.last(), Some(&3.0));
-    let controller = Heading { speed_limit: 6.0, ..Heading::towards([0.0; 2]) };
-    let points = [[15.0, 0.0], [30.0, 20.0], [45.0, 45.0]];
+    let controller = Heading { speed_limit: 8.0, ..Heading::towards([0.0; 2]) };
+    let points = [[12.0, 6.0], [30.0, 26.0], [44.0, 44.0]];
     let x = ["x_p", "y_p", "theta", "v"].map(|name| table.column(&format!("plant.x.{name}")));
     let read = ["a", "omega"].map(|name| table.column(&format!("filter.u_ref.{name}")));
     for k in 0..time.len() {
