@@ -524,7 +524,7 @@ impl<'a> ConnectionElement<'a> {
             end_connector: &c.end.1,
             suppress_unit_conversion: true,
             transformation: (!plain)
-                .then(|| LinearTransformation { factor: Number(c.factor), offset: Number(c.offset) }),
+                .then_some(LinearTransformation { factor: Number(c.factor), offset: Number(c.offset) }),
         }
     }
 }
