@@ -12,7 +12,7 @@
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
 //! pictures             from a system file's plots and a recording to pictures
-//! package              from a configuration to an .fmu file
+//! package              from a configuration to an .fmu file, from a system to an .ssp file
 //! demo                 the demonstration: three plants, two methods
 //! output               the one place that prints
 //! command              one thin function per subcommand

@@ -21,7 +21,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Turn a filter or plant configuration into an FMU
+    /// Turn a filter, plant or controller configuration into an FMU, or a system into an SSP package
     Build(build::Arguments),
     /// Say what a configuration comes to: relative degree, rates, guarantee from a start, warnings
     Check(check::Arguments),

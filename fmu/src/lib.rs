@@ -1,13 +1,13 @@
-//! The safety filter and the reference plants as one FMI 2.0 co-simulation library.
+//! The safety filter, the reference plants and nominal controllers as one FMI 2.0 co-simulation library.
 //!
 //! Every FMU that Punctual makes is this library with another `resources/configuration.toml`: a
-//! filter or a plant. The layers, each using only those above it:
+//! filter, a plant or a controller. The layers, each using only those above it:
 //!
 //! | module | owns |
 //! |---|---|
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
-//! | [`block`] | what is computed: a filter or a plant between value arrays |
+//! | [`block`] | what is computed: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate. The only unsafe code |

@@ -12,8 +12,8 @@ use punctual_modeldescription::{
 use uuid::Uuid;
 
 use crate::configuration::{
-    BarrierSection, Configuration, ConfigurationError, FilterConfiguration, Parameter, PlantConfiguration,
-    Range,
+    BarrierSection, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
+    FilterConfiguration, Parameter, PlantConfiguration, Range,
 };
 
 /// Log categories: name and meaning.
@@ -39,8 +39,8 @@ pub struct Product {
 /// Value references of the groups of variables, in the order of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
-    /// Number of states: the first inputs of a filter (with the points that its barriers follow), the
-    /// outputs of a plant.
+    /// Number of states: the first inputs of a filter (with the points that its barriers follow) or
+    /// controller (with the goal where it is an input), the outputs of a plant.
     pub states: usize,
     /// Number of inputs of the plant.
     pub inputs: usize,
@@ -65,6 +65,7 @@ impl Product {
         let (Table { variables, ranges }, layout) = match &configuration {
             Configuration::Filter(c) => filter_variables(c),
             Configuration::Plant(c) => plant_variables(c),
+            Configuration::Controller(c) => controller_variables(c),
         };
         let guid = guid(&configuration.canonical()?, &variables);
         Ok(Self { configuration, variables, layout, ranges, guid })
@@ -79,6 +80,9 @@ impl Product {
                 format!("Fixed-time safety filter for a {}", c.plant.model.title())
             }
             Configuration::Plant(c) => format!("Reference plant: {}", c.plant.model.title()),
+            Configuration::Controller(c) => {
+                format!("Nominal controller ({}) for a {}", c.controller.name(), c.plant.model.title())
+            }
         };
         ModelDescription {
             model_name: name.clone(),
@@ -100,7 +104,7 @@ impl Product {
             units: units(&self.variables),
             enumerations: match &self.configuration {
                 Configuration::Filter(_) => vec![status_type(), phase_type()],
-                Configuration::Plant(_) => Vec::new(),
+                Configuration::Plant(_) | Configuration::Controller(_) => Vec::new(),
             },
             log_categories: LOG_CATEGORIES
                 .map(|(name, description)| LogCategory { name: name.into(), description: description.into() })
@@ -391,6 +395,41 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         c,
         &c.parameters(),
         Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() },
+    )
+}
+
+fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
+    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let mut table = Table::default();
+    for state in states {
+        table.signal("x", state, "measured ", Causality::Input);
+    }
+    for (name, unit, start, description) in c.goal_inputs() {
+        table.add(name.to_owned(), description, Causality::Input, real(Some(start), unit));
+    }
+    let outputs = table.variables.len();
+    for (i, input) in inputs.iter().enumerate() {
+        // Damping knows which state it opposes; a goal is sought with all of them.
+        let dependencies = match c.controller {
+            _ if !c.direct_feedthrough => Vec::new(),
+            ControllerName::Damping => {
+                c.damped().iter().filter(|pair| pair.1 == i).map(|pair| pair.0 as u32).collect()
+            }
+            _ => (0..outputs as u32).collect(),
+        };
+        table.signal("u_ref", input, "wanted ", Causality::Output).dependencies = Some(dependencies);
+    }
+    if c.controller == ControllerName::Waypoints {
+        let kind =
+            VariableKind::Integer { start: None, min: Some(1), max: i32::try_from(c.points.len()).ok() };
+        let waypoint = "which of the points is the goal, from 1";
+        let position = if c.direct_feedthrough { vec![0, 1] } else { Vec::new() };
+        table.add("waypoint".into(), waypoint, Causality::Output, kind).dependencies = Some(position);
+    }
+    table.finish(
+        c,
+        &c.parameters(),
+        Layout { states: outputs, inputs: inputs.len(), outputs, ..Layout::default() },
     )
 }
 

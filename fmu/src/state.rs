@@ -45,6 +45,7 @@ pub fn size(product: &Product) -> usize {
             bool::SIZE + c.barrier.len() * FixedTimeState::SIZE + 2 * <Option<f64>>::SIZE + Inputs::SIZE
         }
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
+        Configuration::Controller(_) => u32::SIZE,
     };
     HEADER + flags + values + block + CHECKSUM
 }
@@ -90,6 +91,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
             input.write(&mut out);
         }
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
+        BlockState::Controller { waypoint } => waypoint.write(&mut out),
     }
     let checksum = crc32(&out);
     checksum.write(&mut out);
@@ -159,6 +161,13 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         Configuration::Plant(_) => {
             let x = (0..product.layout.states).map(|_| input.finite("x")).collect::<Result<_, _>>()?;
             BlockState::Plant { x }
+        }
+        Configuration::Controller(c) => {
+            let (waypoint, points) = (input.field("waypoint")?, c.points.len().max(1));
+            if waypoint as usize >= points {
+                return Err(format!("waypoint: is {waypoint}, must be < {points}"));
+            }
+            BlockState::Controller { waypoint }
         }
     };
     let guid = product.guid.clone();
@@ -375,4 +384,5 @@ structure!(FixedTimeState {
     arrival: Option<f64>,
     guaranteed: bool,
     unmet: Option<Unmet>,
+    postponed: u32,
 });

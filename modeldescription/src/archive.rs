@@ -1,4 +1,4 @@
-//! The `.fmu` file: a zip archive whose bytes depend on nothing but its entries and one given instant.
+//! The `.fmu` or `.ssp` file: a zip archive whose bytes depend on nothing but its entries and one given instant.
 //!
 //! Reproducible means: sorted entries, one fixed time for all of them, fixed permissions and a fixed
 //! compression level, whatever the operating system. Another version of the compression library may

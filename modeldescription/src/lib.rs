@@ -1,4 +1,5 @@
-//! FMI 2.0 co-simulation model descriptions from typed variables, and reproducible `.fmu` archives.
+//! FMI 2.0 co-simulation model descriptions from typed variables, SSP 1.0 system structures, and
+//! reproducible `.fmu` and `.ssp` archives.
 //!
 //! This crate owns the file `modelDescription.xml` and the zip container around it. It knows nothing
 //! of what the slave computes, reads no file and no environment variable, parses no XML and prints nothing.
@@ -18,6 +19,7 @@
 //! | `structure` | outputs, initial unknowns and their dependencies as variable indices |
 //! | `validate` | every other rule |
 //! | `xml` | the elements and their order |
+//! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and what they may say |
 //! | `archive` | the zip file |
 //!
 //! # Example
@@ -75,6 +77,7 @@ mod error;
 mod names;
 mod number;
 mod structure;
+mod system_structure;
 mod unit;
 mod validate;
 mod variable;
@@ -88,5 +91,9 @@ pub use description::{
 };
 pub use error::Error;
 pub use names::{is_c_identifier, is_structured_name};
+pub use system_structure::{
+    Connector, ConnectorKind, ParameterSet, ParameterValue, SystemComponent, SystemConnection,
+    SystemStructure,
+};
 pub use unit::{BaseUnit, Unit};
 pub use variable::{BaseType, Causality, Initial, InitialRule, Variability, Variable, VariableKind};

@@ -1,6 +1,6 @@
-//! `punctual build`: a filter or plant configuration becomes an FMU.
+//! `punctual build`: a configuration becomes an FMU, a system file an SSP package.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::error::Error;
@@ -9,9 +9,9 @@ use crate::{output, package};
 /// Arguments of `punctual build`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The configuration file (TOML): `kind = "filter"` or `kind = "plant"`
+    /// The configuration file (TOML): `kind = "filter"`, `"plant"` or `"controller"`; or a system file
     configuration: PathBuf,
-    /// The .fmu file to write
+    /// The .fmu file to write; for a system file the .ssp file, with the FMUs it names
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// The shared library to put inside [default: the one beside this program]
@@ -19,14 +19,18 @@ pub struct Arguments {
     library: Option<PathBuf>,
 }
 
-/// Builds the FMU and tries it.
+/// Builds the FMU and tries it, or packs the system.
 ///
 /// # Errors
 ///
 /// A configuration that cannot be used, a file that cannot be read or written, a product that does
 /// not work.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let configuration = package::read_configuration(&arguments.configuration)?;
+    let file = &arguments.configuration;
+    if arguments.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp")) {
+        return pack(arguments, file);
+    }
+    let configuration = package::read_configuration(file)?;
     let fmu = package::build(configuration, arguments.library.as_deref(), &arguments.output)?;
     let description = fmu.description();
     output::result(&format!(
@@ -35,6 +39,27 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         description.description.as_deref().unwrap_or(&description.model_name),
         description.variables.len(),
         description.guid,
+    ));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
+    if arguments.library.is_some() {
+        let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
+        return Err(Error::configuration("--library", message));
+    }
+    if let Ok(configuration) = package::read_configuration(file) {
+        let message = format!("is {:?}; an .ssp file is made from a system file", configuration.kind());
+        return Err(Error::configuration("kind", message).in_file(file));
+    }
+    let packed = package::system::pack(file, &arguments.output)?;
+    output::result(&format!(
+        "{}: {} components from {} FMUs, {} connections, {} start values",
+        arguments.output.display(),
+        packed.components,
+        packed.fmus,
+        packed.connections,
+        packed.start_values,
     ));
     Ok(ExitCode::SUCCESS)
 }

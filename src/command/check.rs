@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
-use punctual_fmu::configuration::{Configuration, FilterConfiguration, PlantConfiguration, SamplingName};
+use punctual_fmu::configuration::{
+    Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
+};
 use punctual_fmu::product::describe;
 use serde::Serialize;
 
@@ -16,7 +18,7 @@ use crate::package;
 /// Arguments of `punctual check`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The configuration file (TOML): `kind = "filter"` or `kind = "plant"`
+    /// The configuration file (TOML): `kind = "filter"`, `"plant"` or `"controller"`
     configuration: PathBuf,
     /// Also check a filter from the start of this plant configuration
     #[arg(long, value_name = "FILE", conflicts_with = "x0")]
@@ -96,6 +98,26 @@ struct PlantReport {
     inner_step: f64,
 }
 
+/// What `check` tells about a controller.
+#[derive(Serialize)]
+struct ControllerReport {
+    kind: &'static str,
+    name: String,
+    model: &'static str,
+    controller: &'static str,
+    parameters: Vec<ParameterReport>,
+    /// Communication step in s.
+    step: f64,
+}
+
+#[derive(Serialize)]
+struct ParameterReport {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    description: String,
+}
+
 #[derive(Serialize)]
 struct SignalReport {
     name: &'static str,
@@ -112,7 +134,13 @@ struct SignalReport {
 /// A configuration or start that cannot be used.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.configuration;
-    match package::read_configuration(file)? {
+    let configuration = package::read_configuration(file)?;
+    let started = arguments.plant.is_some() || arguments.x0.is_some();
+    if started && !matches!(configuration, Configuration::Filter(_)) {
+        let message = format!("is a {}; --plant and --x0 give a start to a filter", configuration.kind());
+        return Err(Error::configuration("kind", message).in_file(file));
+    }
+    match configuration {
         Configuration::Filter(configuration) => {
             let start = start(arguments, &configuration)?;
             if arguments.effort && start.is_none() {
@@ -137,11 +165,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let promised = starts.all(|start| start.guaranteed && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
-        Configuration::Plant(configuration) => {
-            if arguments.plant.is_some() || arguments.x0.is_some() {
-                let message = "is a plant; --plant and --x0 give a start to a filter";
-                return Err(Error::configuration("kind", message).in_file(file));
+        Configuration::Controller(configuration) => {
+            let report = controller(&configuration);
+            if arguments.json {
+                output::json(&report);
+            } else {
+                output::result(&controller_text(&report));
             }
+            Ok(ExitCode::SUCCESS)
+        }
+        Configuration::Plant(configuration) => {
             let report = plant(&configuration);
             if arguments.json {
                 output::json(&report);
@@ -157,8 +190,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<Option<Vec<f64>>, Error> {
     let states = configuration.plant.model.states();
     if let Some(file) = &arguments.plant {
-        let Configuration::Plant(plant) = package::read_configuration(file)? else {
-            return Err(Error::configuration("kind", "is \"filter\", must be \"plant\"").in_file(file));
+        let plant = match package::read_configuration(file)? {
+            Configuration::Plant(plant) => plant,
+            other => {
+                let message = format!("is {:?}, must be \"plant\"", other.kind());
+                return Err(Error::configuration("kind", message).in_file(file));
+            }
         };
         let missing = states.iter().find(|s| !plant.x0.contains_key(s.name));
         return match missing {
@@ -321,6 +358,23 @@ fn plant(c: &PlantConfiguration) -> PlantReport {
     }
 }
 
+fn controller(c: &ControllerConfiguration) -> ControllerReport {
+    let parameter = |row: punctual_fmu::configuration::Parameter<ControllerConfiguration>| ParameterReport {
+        value: row.get(&mut c.clone()),
+        name: row.name,
+        unit: row.unit,
+        description: row.description,
+    };
+    ControllerReport {
+        kind: "controller",
+        name: c.name.clone(),
+        model: c.plant.model.name(),
+        controller: c.controller.name(),
+        parameters: c.parameters().into_iter().map(parameter).collect(),
+        step: c.experiment.step_size,
+    }
+}
+
 fn filter_text(report: &FilterReport) -> String {
     let mut lines =
         vec![format!("{}: filter for {}, steps of {} s", report.name, report.model, number(report.step))];
@@ -382,5 +436,23 @@ fn plant_text(report: &PlantReport) -> String {
         number(report.step),
         report.substeps,
         number(report.inner_step)
+    )
+}
+
+fn controller_text(report: &ControllerReport) -> String {
+    let mut rows = vec![["parameter", "value", "unit", "meaning"].map(str::to_owned).to_vec()];
+    rows.extend(
+        report
+            .parameters
+            .iter()
+            .map(|p| vec![p.name.clone(), number(p.value), p.unit.to_owned(), p.description.clone()]),
+    );
+    format!(
+        "{}: controller, {} of {}\n\n{}\n\nsteps of {} s; it promises nothing",
+        report.name,
+        report.controller,
+        report.model,
+        output::table(&rows, &[false, true]),
+        number(report.step)
     )
 }

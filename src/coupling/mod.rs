@@ -11,6 +11,7 @@ mod system;
 
 pub use grid::Grid;
 pub use master::{Outcome, Simulation, Statistics};
+pub use network::{Link, Port, links};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,

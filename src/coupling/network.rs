@@ -8,20 +8,24 @@ use crate::host::{Causality, Description, Kind, Variable};
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Port {
+pub struct Port {
     /// Position of the component in the system.
-    pub(super) component: usize,
+    pub component: usize,
     /// Position of the variable in its description.
-    pub(super) variable: usize,
+    pub variable: usize,
 }
 
-/// A resolved connection.
+/// A resolved connection: `to = factor · from + offset`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Link {
-    pub(super) from: Port,
-    pub(super) to: Port,
-    pub(super) factor: f64,
-    pub(super) offset: f64,
+pub struct Link {
+    /// An output.
+    pub from: Port,
+    /// An input, of no other connection.
+    pub to: Port,
+    /// Units of the input per unit of the output.
+    pub factor: f64,
+    /// In the unit of the input.
+    pub offset: f64,
 }
 
 /// A resolved start value: Reals as they are, others as integers (Booleans 0 or 1).
@@ -57,6 +61,16 @@ pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<
     resolver.check_pictures(&recorded)?;
     let (direct, delayed, notes) = resolver.order(&links);
     Ok(Network { links, starts, recorded, direct, delayed, notes })
+}
+
+/// The connections of `system`, those by name included, checked against the descriptions of its components'
+/// FMUs, one for each, in order. Start values, recordings and pictures are checked too.
+///
+/// # Errors
+///
+/// A name, type or value that does not fit, with the field of the system file.
+pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>, Error> {
+    resolve(system, descriptions).map(|network| network.links)
 }
 
 /// Whether the output depends on any input at the same instant.

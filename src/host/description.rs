@@ -66,6 +66,8 @@ pub struct Variable {
     pub max: Option<f64>,
     /// What it means.
     pub description: Option<String>,
+    /// The name of the type it is declared to have, if it is.
+    pub declared_type: Option<String>,
     /// The named values, for an enumeration whose type is declared.
     pub items: Vec<Item>,
 }
@@ -239,6 +241,7 @@ fn variable(read: &xml::ModelDescription, source: &xml::ScalarVariable) -> Varia
         min: number(min.as_deref()),
         max: number(max.as_deref()),
         description: source.description.clone(),
+        declared_type: declared.cloned(),
         items,
     }
 }

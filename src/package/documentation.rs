@@ -49,6 +49,7 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
     let use_of = match &product.configuration {
         Configuration::Filter(_) => FILTER,
         Configuration::Plant(_) => PLANT,
+        Configuration::Controller(_) => CONTROLLER,
     };
     let step = product.configuration.experiment().step_size;
     format!(
@@ -78,6 +79,10 @@ cover what that costs.</p>";
 
 const PLANT: &str = "<p>Set the initial state through the parameters <code>x0.*</code>. Inputs are held over a step; the \
 step is divided into equal Runge-Kutta steps of at most <code>inner_step</code>.</p>";
+
+const CONTROLLER: &str = "<p>Connect the measured state to <code>x.*</code> and <code>u_ref.*</code> to the filter. \
+It promises nothing; that is what the filter is for. A state that is not finite gives <code>u_ref.*</code> that are not a \
+number, which the filter reports as <code>invalid_input</code>.</p>";
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

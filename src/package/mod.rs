@@ -1,8 +1,10 @@
 //! From a configuration to an `.fmu` file: model description, library, resources, documentation and
-//! icon. No compiler is needed; the same configuration and library give the same bytes.
+//! icon; and from a system to an `.ssp` file. No compiler is needed; the same configuration and library give
+//! the same bytes.
 
 mod documentation;
 pub mod library;
+pub mod system;
 
 use std::path::Path;
 use std::rc::Rc;
@@ -27,6 +29,19 @@ pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
     Configuration::parse(&text).map_err(|e| Error::from(e).in_file(path))
 }
 
+/// What cannot be written, as it is told.
+fn broken(error: &punctual_modeldescription::Error) -> Error {
+    Error::configuration("", error.to_string())
+}
+
+/// The time of the entries of an archive.
+fn timestamp() -> Result<Timestamp, Error> {
+    match std::env::var_os("SOURCE_DATE_EPOCH") {
+        Some(text) => Timestamp::from_source_date_epoch(&text.to_string_lossy()).map_err(|e| broken(&e)),
+        None => Ok(Timestamp::default()),
+    }
+}
+
 /// The entries of the FMU of `product` around the shared library `binary`. Entries carry the time of
 /// the environment variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
 ///
@@ -34,11 +49,8 @@ pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
 ///
 /// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold.
 pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
-    let broken = |e: punctual_modeldescription::Error| Error::configuration("", e.to_string());
-    let timestamp = match std::env::var_os("SOURCE_DATE_EPOCH") {
-        Some(text) => Timestamp::from_source_date_epoch(&text.to_string_lossy()).map_err(broken)?,
-        None => Timestamp::default(),
-    };
+    let broken = |e: punctual_modeldescription::Error| broken(&e);
+    let timestamp = timestamp()?;
     let description = product.model_description();
     let canonical = product.configuration.canonical()?;
     let page = documentation::page(product, &description, &canonical);

@@ -67,7 +67,7 @@ impl Fmu {
     pub(crate) fn filter(&self) -> &FilterConfiguration {
         match &self.product.configuration {
             Configuration::Filter(c) => c,
-            Configuration::Plant(_) => panic!("not a filter"),
+            Configuration::Plant(_) | Configuration::Controller(_) => panic!("not a filter"),
         }
     }
 }

@@ -74,7 +74,11 @@ fn what_is_not_even_text() {
 #[test]
 fn a_system_file_instead_of_a_configuration() {
     let system = fs::read(examples().join("unicycle.toml")).expect("the example");
-    build_text(system).fails(2, "my.toml: kind: missing: this is a system file, which `punctual run` takes");
+    build_text(system).fails(
+        2,
+        "my.toml: kind: missing: this is a system file, which `punctual run` takes, and `punctual build` with an \
+         output that ends in .ssp",
+    );
 }
 
 #[test]

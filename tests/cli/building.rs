@@ -19,6 +19,7 @@ fn every_example_configuration_is_built() {
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
         ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 54 variables"),
         ("escort-plant", "Reference plant: point mass in the plane with 11 variables"),
+        ("tour-controller", "Nominal controller (waypoints) for a unicycle with 20 variables"),
     ] {
         let (toml, fmu) = (format!("{stem}.toml"), format!("{stem}.fmu"));
         workshop.write(&toml, fs::read(examples().join(&toml)).expect("an example"));

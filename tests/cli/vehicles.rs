@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use punctual_core::nominal::Heading;
+
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -107,4 +109,39 @@ fn a_goal_that_is_another_fmu() {
         assert!(clear >= 1.0, "{clear} m from the buoy at {t} s");
     }
     assert!(lead_x[time.len() - 1] < 20.0 + 3.0 * 20.0 - 15.0, "the leader brakes");
+}
+
+/// Three FMUs, wired by name alone: the controller tours its points, the filter keeps the deadline.
+#[test]
+fn a_controller_a_filter_and_a_plant() {
+    let workshop = Workshop::with_library();
+    for stem in ["tour-controller", "unicycle-filter", "unicycle-plant"] {
+        let (toml, fmu) = (format!("{stem}.toml"), format!("{stem}.fmu"));
+        workshop.write(&toml, fs::read(examples().join(&toml)).expect("an example"));
+        workshop.punctual(["build", &toml, "-o", &fmu]).success();
+    }
+    workshop.write("tour.toml", fs::read(examples().join("tour.toml")).expect("an example"));
+    workshop.punctual(["run", "tour.toml", "--out", "out"]).success();
+    let table = Table::parse(&workshop.text("out/tour.csv"));
+    every_filter_step_is_satisfied(&table);
+    let (time, h) = (table.column("time"), table.column("filter.goal.h"));
+    assert!((0..time.len()).all(|k| time[k] < 10.0 || h[k] >= 0.0), "late, or left again");
+    // It came by every point, in order, and what it wants is what the filter reads.
+    let waypoint = table.column("controller.waypoint");
+    assert!(waypoint.windows(2).all(|w| w[0] <= w[1]) && waypoint[0] == 1.0);
+    assert_eq!(waypoint.last(), Some(&3.0));
+    let controller = Heading { speed_limit: 8.0, ..Heading::towards([0.0; 2]) };
+    let points = [[12.0, 6.0], [30.0, 26.0], [44.0, 44.0]];
+    let x = ["x_p", "y_p", "theta", "v"].map(|name| table.column(&format!("plant.x.{name}")));
+    let read = ["a", "omega"].map(|name| table.column(&format!("filter.u_ref.{name}")));
+    for k in 0..time.len() {
+        let at = Heading { goal: points[waypoint[k] as usize - 1], ..controller };
+        let wanted = at.unicycle(&[x[0][k], x[1][k], x[2][k], x[3][k]]);
+        assert_eq!(wanted.map(f64::to_bits), [read[0][k], read[1][k]].map(f64::to_bits), "at {} s", time[k]);
+    }
+}
+
+#[track_caller]
+fn every_filter_step_is_satisfied(table: &Table) {
+    assert!(table.column("filter.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
 }

@@ -114,7 +114,7 @@ impl Block for FilterBlock {
                 *rearm_seen = *now;
                 filter.clone_from(memory.state());
             }
-            BlockState::Plant { .. } => {
+            _ => {
                 *state = BlockState::Filter { rearm_seen: *now, filter: memory.state().clone() };
             }
         }
@@ -122,7 +122,7 @@ impl Block for FilterBlock {
 
     fn restore(&mut self, state: &BlockState) -> Result<(), String> {
         let BlockState::Filter { rearm_seen, filter } = state else {
-            return Err("the state is that of a plant, must be that of a filter".to_owned());
+            return Err(state.mismatch("filter"));
         };
         self.filter.restore(filter).map_err(|e| e.to_string())?;
         self.rearm_seen = *rearm_seen;

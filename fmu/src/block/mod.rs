@@ -1,5 +1,6 @@
-//! What an FMU computes, between arrays of values: a filter or a plant. No FMI, no pointers.
+//! What an FMU computes, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
+mod controller;
 mod filter;
 mod plant;
 
@@ -7,6 +8,7 @@ use punctual_core::filter::FilterState;
 
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
+use controller::ControllerBlock;
 use filter::FilterBlock;
 use plant::PlantBlock;
 
@@ -60,6 +62,23 @@ pub enum BlockState {
         /// The state, in the order and units of the model.
         x: Vec<f64>,
     },
+    /// Of a controller.
+    Controller {
+        /// The present waypoint, counted from 0.
+        waypoint: u32,
+    },
+}
+
+impl BlockState {
+    /// What is wrong with it where one of another kind is wanted.
+    fn mismatch(&self, wanted: &str) -> String {
+        let found = match self {
+            Self::Filter { .. } => "filter",
+            Self::Plant { .. } => "plant",
+            Self::Controller { .. } => "controller",
+        };
+        format!("the state is that of a {found}, must be that of a {wanted}")
+    }
 }
 
 /// The computation behind an instance.
@@ -111,5 +130,6 @@ pub fn build(product: &Product) -> Result<Box<dyn Block>, ConfigurationError> {
     Ok(match &product.configuration {
         Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product.layout)?),
         Configuration::Plant(c) => Box::new(PlantBlock::new(c.clone(), product.layout)?),
+        Configuration::Controller(c) => Box::new(ControllerBlock::new(c.clone(), product.layout)),
     })
 }

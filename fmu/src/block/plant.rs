@@ -74,13 +74,13 @@ impl Block for PlantBlock {
         let Self { x: now, configuration: _, parameters: _, layout: _, plant: _, next: _ } = self;
         match state {
             BlockState::Plant { x } => x.clone_from(now),
-            BlockState::Filter { .. } => *state = BlockState::Plant { x: now.clone() },
+            _ => *state = BlockState::Plant { x: now.clone() },
         }
     }
 
     fn restore(&mut self, state: &BlockState) -> Result<(), String> {
         let BlockState::Plant { x } = state else {
-            return Err("the state is that of a filter, must be that of a plant".to_owned());
+            return Err(state.mismatch("plant"));
         };
         if x.len() != self.x.len() {
             return Err(format!("the state has {} components, must have {}", x.len(), self.x.len()));

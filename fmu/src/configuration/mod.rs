@@ -1,16 +1,18 @@
-//! Configurations: what a filter or plant FMU is made from. The only module that knows TOML.
+//! Configurations: what a filter, plant or controller FMU is made from. The only module that knows TOML.
 //!
 //! A configuration is read, completed with its defaults ("canonical": every value stated) and then
 //! travels inside the FMU as `resources/configuration.toml`. Numbers in it are also the FMU's
 //! parameters: [`Parameter`] is the one table of their names, units, ranges and meaning.
 
 mod barrier;
+mod controller;
 mod filter;
 mod parameter;
 mod plant;
 mod read;
 
 pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, ShapeName};
+pub use controller::{ControllerConfiguration, ControllerName};
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};
@@ -28,14 +30,17 @@ pub enum Configuration {
     Filter(FilterConfiguration),
     /// A reference plant.
     Plant(PlantConfiguration),
+    /// A nominal controller.
+    Controller(ControllerConfiguration),
 }
 
-/// Which of the two a file describes.
+/// Which of them a file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Kind {
     Filter,
     Plant,
+    Controller,
 }
 
 impl Configuration {
@@ -55,14 +60,17 @@ impl Configuration {
         let head = read_toml::<Head>(text)?;
         let Some(kind) = head.kind else {
             let message = match head.component {
-                Some(_) => "missing: this is a system file, which `punctual run` takes",
-                None => "missing, must be \"filter\" or \"plant\"",
+                Some(_) => {
+                    "missing: this is a system file, which `punctual run` takes, and `punctual build` with an output that ends in .ssp"
+                }
+                None => "missing, must be \"filter\", \"plant\" or \"controller\"",
             };
             return Err(ConfigurationError::new("kind", message));
         };
         Ok(match kind {
             Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed()?),
             Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed()?),
+            Kind::Controller => Self::Controller(read_toml::<ControllerConfiguration>(text)?.completed()?),
         })
     }
 
@@ -76,6 +84,16 @@ impl Configuration {
         match self {
             Self::Filter(c) => read::write_toml(c),
             Self::Plant(c) => read::write_toml(c),
+            Self::Controller(c) => read::write_toml(c),
+        }
+    }
+
+    /// Which kind it is, in the words of the file.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Filter(_) => "filter",
+            Self::Plant(_) => "plant",
+            Self::Controller(_) => "controller",
         }
     }
 
@@ -84,6 +102,7 @@ impl Configuration {
         match self {
             Self::Filter(c) => &c.name,
             Self::Plant(c) => &c.name,
+            Self::Controller(c) => &c.name,
         }
     }
 
@@ -92,6 +111,7 @@ impl Configuration {
         match self {
             Self::Filter(c) => &c.experiment,
             Self::Plant(c) => &c.experiment,
+            Self::Controller(c) => &c.experiment,
         }
     }
 }

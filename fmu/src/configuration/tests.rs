@@ -23,6 +23,20 @@ x0 = { v = 1.5 }
 inner_step = 0.01
 "#;
 
+const HEADING: &str = r#"
+kind = "controller"
+controller = "heading"
+goal = [4.0, 3.0]
+plant = { model = "unicycle" }
+"#;
+
+const WAYPOINTS: &str = r#"
+kind = "controller"
+controller = "waypoints"
+points = [[4.0, 3.0], [5.0, 6.0]]
+plant = { model = "bicycle" }
+"#;
+
 /// What the defective file is refused with; `from` stands exactly once in `valid`.
 fn refusal(valid: &str, from: &str, to: &str) -> String {
     assert_eq!(valid.matches(from).count(), 1, "{from:?} in {valid}");
@@ -130,6 +144,32 @@ defects! {
     nan_start_value: PLANT, "v = 1.5" => "v = nan", "x0.v: is NaN, must be finite";
     unknown_state: PLANT, "v = 1.5" => "w = 1.5", "x0.w: unknown state, must be one of x_p, y_p, theta, v";
     zero_length: PLANT, "l_r = 3.0" => "l_r = 0.0", "plant.l_r: is 0, must be finite and >= 1e-9";
+    heading_without_a_goal: HEADING, "goal = [4.0, 3.0]" => "", "goal: missing, heading needs it";
+    infinite_goal: HEADING, "[4.0, 3.0]" => "[4.0, inf]", "goal[2]: is inf, must be finite";
+    infinite_goal_that_is_an_input: HEADING, "[4.0, 3.0]" => "[nan, 3.0]\ngoal_input = true",
+        "goal[1]: is NaN, must be finite";
+    points_of_a_heading: HEADING, "goal = [4.0, 3.0]" => "goal = [4.0, 3.0]\npoints = [[1.0, 2.0]]",
+        "points: heading has none";
+    gain_of_a_heading: HEADING, "goal = [4.0, 3.0]" => "goal = [4.0, 3.0]\ngain = 1.0",
+        "gain: heading of unicycle has none";
+    zero_speed_gain: HEADING, "goal = [4.0, 3.0]" => "goal = [4.0, 3.0]\nspeed_gain = 0.0",
+        "speed_gain: is 0, must be finite and >= 1e-9";
+    slip_limit_of_a_unicycle: HEADING, "goal = [4.0, 3.0]" => "goal = [4.0, 3.0]\nslip_limit = 1.0",
+        "slip_limit: heading of unicycle has none";
+    turn_limit_of_a_point_mass: HEADING, "\"unicycle\" }" => "\"point_mass\" }\nturn_limit = 1.0",
+        "turn_limit: heading of point_mass has none";
+    heading_of_a_bicycle_steered_by_a_rate: HEADING, "\"unicycle\"" => "\"bicycle_kinematic\"",
+        "controller: is \"heading\", which bicycle_kinematic has none of; must be \"damping\"";
+    no_points: WAYPOINTS, "points = [[4.0, 3.0], [5.0, 6.0]]" => "points = []",
+        "points: missing, waypoints needs it";
+    infinite_point: WAYPOINTS, "[5.0, 6.0]" => "[5.0, inf]", "points[1][2]: is inf, must be finite";
+    goal_of_waypoints: WAYPOINTS, "points = [[4" => "goal = [1.0, 2.0]\npoints = [[4", "goal: waypoints has none";
+    goal_input_of_waypoints: WAYPOINTS, "points = [[4" => "goal_input = true\npoints = [[4",
+        "goal_input: waypoints has none";
+    zero_acceptance_radius: WAYPOINTS, "points = [[4" => "acceptance_radius = 0.0\npoints = [[4",
+        "acceptance_radius: is 0, must be finite and >= 1e-9";
+    negative_slip_limit: WAYPOINTS, "points = [[4" => "slip_limit = -1.0\npoints = [[4",
+        "slip_limit: is -1, must be finite and >= 1e-9";
     zero_inner_step: PLANT, "0.01" => "0.0", "integration.inner_step: is 0, must be finite and >= 1e-9";
 }
 
@@ -163,7 +203,10 @@ fn unknown_and_missing_keys_and_wrong_types() {
         (FILTER, "\"filter\"", "\"filters\"", ["kind", "`plant`"]),
         (FILTER, "radius = 2.0", "radius = = 2.0", ["line 8", "radius"]),
         (PLANT, "inner_step", "inner", ["integration", "`inner_step`"]),
-        (PLANT, "kind", "knd", ["kind: missing, must be \"filter\" or \"plant\"", ""]),
+        (HEADING, "\"heading\"", "\"pursuit\"", ["controller", "`waypoints`"]),
+        (HEADING, "[4.0, 3.0]", "[4.0]", ["goal", "length 2"]),
+        (WAYPOINTS, "points = [[4", "pionts = [[4", ["pionts", "unknown field"]),
+        (PLANT, "kind", "knd", ["kind: missing, must be \"filter\", \"plant\" or \"controller\"", ""]),
     ] {
         let message = refusal(valid, from, to);
         assert!(wanted.iter().all(|w| message.contains(w)), "{to:?} gives {message:?}, wanted {wanted:?}");
@@ -182,8 +225,9 @@ const MODELS: [&str; 6] = [
 
 /// Valid configurations of every kind: models × shapes × methods, and some with everything stated.
 fn every_kind() -> Vec<String> {
-    let mut texts = vec![FILTER.to_owned(), PLANT.to_owned()];
+    let mut texts = vec![FILTER.to_owned(), PLANT.to_owned(), HEADING.to_owned(), WAYPOINTS.to_owned()];
     for model in MODELS {
+        texts.push(format!("kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"{model}\""));
         texts.push(format!("kind = \"plant\"\nname = \"p\"\nplant.model = \"{model}\"\nx0.x_p = 1e-300"));
         if model == "bicycle_small_slip" {
             continue;
@@ -237,6 +281,12 @@ fn models_and_shapes_are_named_as_in_the_file() {
             Configuration::Plant(c) => {
                 assert!(canonical.contains(&format!("model = \"{}\"", c.plant.model.name())), "{canonical}");
             }
+            Configuration::Controller(c) => {
+                assert!(
+                    canonical.contains(&format!("controller = \"{}\"", c.controller.name())),
+                    "{canonical}"
+                );
+            }
         }
     }
 }
@@ -283,6 +333,7 @@ fn parameter_rows_have_own_names_and_reach_their_own_number() {
         match Configuration::parse(&text).unwrap() {
             Configuration::Filter(c) => walk(&c, &c.parameters()),
             Configuration::Plant(c) => walk(&c, &c.parameters()),
+            Configuration::Controller(c) => walk(&c, &c.parameters()),
         }
     }
 }

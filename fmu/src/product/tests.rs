@@ -29,7 +29,28 @@ fn every_product() -> Vec<Product> {
             }
         }
     }
+    products.extend(controllers().iter().map(|text| product(text)));
     products
+}
+
+/// Every controller along every model that has it.
+fn controllers() -> Vec<String> {
+    let mut texts = Vec::new();
+    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip"] {
+        for rest in [
+            "controller = \"damping\"",
+            "controller = \"heading\"\ngoal = [4.0, -3.0]",
+            "controller = \"heading\"\ngoal = [4.0, -3.0]\ngoal_input = true",
+            "controller = \"waypoints\"\npoints = [[1.0, 2.0], [3.0, 4.0]]",
+            "controller = \"waypoints\"\npoints = [[1.0, 2.0]]\ndirect_feedthrough = false",
+        ] {
+            texts.push(format!("kind = \"controller\"\nplant.model = \"{model}\"\n{rest}\n"));
+        }
+    }
+    for model in ["bicycle_small_slip_rate", "bicycle_kinematic"] {
+        texts.push(format!("kind = \"controller\"\nplant.model = \"{model}\"\ncontroller = \"damping\"\n"));
+    }
+    texts
 }
 
 #[test]
@@ -130,10 +151,48 @@ fn dependencies_say_whether_outputs_follow_inputs_at_once() {
         let all: Vec<u32> = (0..product.layout.outputs as u32).collect();
         let wanted = match &product.configuration {
             Configuration::Filter(c) if c.direct_feedthrough => all,
+            // Below, one by one.
+            Configuration::Controller(_) => continue,
             _ => Vec::new(),
         };
         for output in &product.variables[product.layout.outputs..product.layout.parameters] {
             assert_eq!(output.dependencies.as_ref(), Some(&wanted), "{}", output.name);
+        }
+    }
+}
+
+/// What a controller's outputs depend on, by name, found by changing one input at a time.
+#[test]
+fn dependencies_of_controllers_are_those_found() {
+    for text in controllers() {
+        let product = product(&text);
+        let outputs = product.layout.outputs..product.layout.parameters;
+        let mut block = crate::block::build(&product).unwrap();
+        let mut values = crate::block::Values::zeros(product.variables.len());
+        for (value, variable) in values.reals.iter_mut().zip(&product.variables) {
+            if let VariableKind::Real { start: Some(start), .. } = variable.kind {
+                *value = start;
+            }
+        }
+        // Small speeds and a near goal: no limit is active.
+        values.reals[..product.layout.states.min(4)].copy_from_slice(&[0.9, 2.1, 0.3, 0.2]);
+        block.configure(&values).unwrap();
+        let mut sampled = |values: &mut crate::block::Values| {
+            block.output(0.0, values);
+            outputs.clone().map(|i| (values.reals[i], values.integers[i])).collect::<Vec<_>>()
+        };
+        let before = sampled(&mut values.clone());
+        let declared = |i: usize| product.variables[i].dependencies.as_deref().unwrap();
+        for input in 0..product.layout.outputs {
+            let mut moved = values.clone();
+            moved.reals[input] += 0.01;
+            for (at, (old, new)) in before.iter().zip(sampled(&mut moved)).enumerate() {
+                let known = declared(outputs.start + at).contains(&(input as u32));
+                assert!(
+                    known || *old == new || text.contains("direct_feedthrough = false"),
+                    "{text}: {input}"
+                );
+            }
         }
     }
 }

@@ -15,6 +15,7 @@ fn variable(name: &str, kind: Kind, causality: Causality) -> Variable {
         min: None,
         max: None,
         description: None,
+        declared_type: None,
         items: vec![],
     }
 }

@@ -1,0 +1,133 @@
+//! A nominal controller: from the state to what is wanted. Only waypoints remember anything, which is
+//! the present one.
+
+use punctual_core::nominal::damping;
+
+use super::{Block, BlockState, Values};
+use crate::configuration::{
+    ConfigurationError, ControllerConfiguration, ControllerName, ModelName, Parameter, updated,
+};
+use crate::product::Layout;
+
+/// The inputs of every model.
+const INPUTS: usize = 2;
+
+pub(super) struct ControllerBlock {
+    configuration: ControllerConfiguration,
+    parameters: Vec<Parameter<ControllerConfiguration>>,
+    layout: Layout,
+    /// The present point of `waypoints`, from 0: the whole state.
+    waypoint: usize,
+}
+
+impl ControllerBlock {
+    pub(super) fn new(configuration: ControllerConfiguration, layout: Layout) -> Self {
+        Self { parameters: configuration.parameters(), configuration, layout, waypoint: 0 }
+    }
+
+    /// The present point at the position of `x`: those reached are passed, but for the last.
+    fn present(&self, x: &[f64]) -> usize {
+        let (points, radius) = (&self.configuration.points, self.configuration.acceptance());
+        let mut present = self.waypoint;
+        while present + 1 < points.len()
+            && (points[present][0] - x[0]).hypot(points[present][1] - x[1]) <= radius
+        {
+            present += 1;
+        }
+        present
+    }
+
+    /// What is wanted at the inputs `x`: the state, and the goal behind it where that is an input. An
+    /// input that is not finite gives what is not a number, which a filter or plant refuses by name;
+    /// limits would make a number of it.
+    fn wanted(&self, x: &[f64], waypoint: usize) -> [f64; INPUTS] {
+        let c = &self.configuration;
+        if x.iter().any(|v| !v.is_finite()) {
+            return [f64::NAN; INPUTS];
+        }
+        let states = c.plant.model.states().len();
+        let goal = match c.controller {
+            ControllerName::Damping => {
+                let mut u = [0.0; INPUTS];
+                for &(state, input) in c.damped() {
+                    u[input] = damping(x[state], c.damping_gain());
+                }
+                return u;
+            }
+            ControllerName::Heading if c.goal_input => [x[states], x[states + 1]],
+            ControllerName::Heading => c.goal.unwrap_or_default(),
+            ControllerName::Waypoints => c.points[waypoint],
+        };
+        let heading = c.heading(goal);
+        let x = &[x[0], x[1], x[2], x[3]];
+        match (c.plant.model, c.plant.l_r) {
+            (ModelName::PointMass, _) => heading.point_mass(x),
+            (_, None) => heading.unicycle(x),
+            (_, Some(l_r)) => heading.bicycle(x, l_r),
+        }
+    }
+
+    fn write(&self, values: &mut Values, waypoint: usize, u: [f64; INPUTS]) {
+        let at = self.layout.outputs;
+        values.reals[at..][..INPUTS].copy_from_slice(&u);
+        if self.configuration.controller == ControllerName::Waypoints {
+            values.integers[at + INPUTS] = i32::try_from(waypoint + 1).unwrap_or(i32::MAX);
+        }
+    }
+
+    /// One sample; returns the point that it is for.
+    fn sample(&self, values: &mut Values) -> usize {
+        let x = &values.reals[..self.layout.states];
+        let waypoint = self.present(x);
+        let u = self.wanted(x, waypoint);
+        self.write(values, waypoint, u);
+        waypoint
+    }
+}
+
+impl Block for ControllerBlock {
+    fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError> {
+        let numbers = &values.reals[self.layout.parameters..self.layout.end];
+        self.configuration = updated(&self.configuration, &self.parameters, numbers)?;
+        self.waypoint = 0;
+        Ok(())
+    }
+
+    fn output(&mut self, _t: f64, values: &mut Values) {
+        self.sample(values);
+    }
+
+    fn step(&mut self, _t: f64, _h: f64, values: &mut Values) -> Result<(), String> {
+        self.waypoint = self.sample(values);
+        Ok(())
+    }
+
+    fn save(&self, state: &mut BlockState) {
+        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        let Self { waypoint, configuration: _, parameters: _, layout: _ } = self;
+        *state = BlockState::Controller { waypoint: u32::try_from(*waypoint).unwrap_or(u32::MAX) };
+    }
+
+    fn restore(&mut self, state: &BlockState) -> Result<(), String> {
+        let BlockState::Controller { waypoint } = state else {
+            return Err(state.mismatch("controller"));
+        };
+        self.waypoint = *waypoint as usize;
+        Ok(())
+    }
+
+    fn direct_feedthrough(&self) -> bool {
+        self.configuration.direct_feedthrough
+    }
+
+    fn accepts_gaps(&self) -> bool {
+        true
+    }
+
+    fn show_refusal(&self, values: &mut Values) {
+        self.write(values, self.waypoint, [f64::NAN; INPUTS]);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,243 @@
+//! From a system file to an `.ssp` package: its FMUs, connections and start values as System Structure and
+//! Parameterization 1.0, for other masters. Nothing is run; the same files give the same bytes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use punctual_modeldescription::{
+    Archive, Causality, Connector, ConnectorKind, DefaultExperiment, EnumerationItem, EnumerationType,
+    ParameterSet, ParameterValue, SystemComponent, SystemConnection, SystemStructure,
+};
+
+use crate::coupling::{self, Link, Port, StartValue, System};
+use crate::error::Error;
+use crate::host::{Description, Fmu, Kind, Variable};
+
+/// The parameter set with the start values, in the archive.
+const START_VALUES: &str = "resources/start_values.ssv";
+
+/// What was packed.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed {
+    /// Number of components.
+    pub components: usize,
+    /// Number of FMU files; components can share one.
+    pub fmus: usize,
+    /// Number of connections, those by name included.
+    pub connections: usize,
+    /// Number of start values.
+    pub start_values: usize,
+}
+
+/// Writes the package of the system at `path` to `file`.
+///
+/// # Errors
+///
+/// A system file that cannot be used, an FMU that is not there or cannot be used, a file that cannot be
+/// written.
+pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
+    let system = System::read(path)?;
+    let base = path.parent().unwrap_or(Path::new(""));
+    let name = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy());
+    let (archive, packed) = archive(&system, &name, base).map_err(|e| e.in_file(path))?;
+    let bytes = archive.to_bytes().map_err(|e| super::broken(&e))?;
+    std::fs::write(file, bytes).map_err(|e| Error::io("write", file, e))?;
+    Ok(packed)
+}
+
+/// The FMUs of a system, each file once.
+struct Store {
+    /// Each with its place in the archive and its bytes.
+    fmus: Vec<(Fmu, String, Vec<u8>)>,
+    /// Which of them each component has.
+    of_component: Vec<usize>,
+}
+
+impl Store {
+    fn open(system: &System, base: &Path) -> Result<Self, Error> {
+        let mut store = Self { fmus: Vec::new(), of_component: Vec::new() };
+        let mut known = BTreeMap::new();
+        for (i, component) in system.components().iter().enumerate() {
+            let path = base.join(&component.fmu);
+            if let Some(&index) = known.get(&path) {
+                store.of_component.push(index);
+                continue;
+            }
+            if !path.is_file() {
+                let source = Path::new(&component.fmu).with_extension("toml");
+                let advice = if base.join(&source).is_file() {
+                    format!("; make it with `punctual build {} -o {}`", source.display(), component.fmu)
+                } else {
+                    String::new()
+                };
+                let message = format!("there is no file {}{advice}", path.display());
+                return Err(Error::configuration(format!("component[{i}].fmu"), message));
+            }
+            let fmu = Fmu::open(&path).map_err(|e| e.in_component(&component.name))?;
+            let bytes = std::fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
+            let place = store.place(&path);
+            known.insert(path, store.fmus.len());
+            store.of_component.push(store.fmus.len());
+            store.fmus.push((fmu, place, bytes));
+        }
+        Ok(store)
+    }
+
+    /// A place in the archive that is no one else's, whose name is also a URI.
+    fn place(&self, path: &Path) -> String {
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
+        let stem: String = stem.chars().map(plain).collect();
+        let mut place = format!("resources/{stem}.fmu");
+        let mut number = 1;
+        while self.fmus.iter().any(|(_, taken, _)| *taken == place) {
+            number += 1;
+            place = format!("resources/{stem}-{number}.fmu");
+        }
+        place
+    }
+
+    fn of(&self, component: usize) -> &(Fmu, String, Vec<u8>) {
+        &self.fmus[self.of_component[component]]
+    }
+}
+
+fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed), Error> {
+    let store = Store::open(system, base)?;
+    let descriptions: Vec<&Description> =
+        (0..system.components().len()).map(|c| store.of(c).0.description()).collect();
+    let links = coupling::links(system, &descriptions)?;
+    let parameters = start_values(system, &descriptions);
+    let experiment = system.experiment();
+    let mut enumerations = Enumerations::default();
+    let components = system.components().iter().zip(&descriptions).enumerate();
+    let components = components
+        .map(|(c, (component, description))| {
+            let shown = |v: &usize| {
+                let variable = &description.variables[*v];
+                let port = Port { component: c, variable: *v };
+                // An input that is neither connected nor set keeps the start value of its FMU; some masters
+                // write zero to every input that is a connector.
+                variable.causality != Causality::Input
+                    || component.start.contains_key(&variable.name)
+                    || links.iter().any(|link| link.to == port)
+            };
+            let connectors = (0..description.variables.len()).filter(shown);
+            let connectors = connectors
+                .filter_map(|v| connector(&component.name, &description.variables[v], &mut enumerations));
+            SystemComponent {
+                name: component.name.clone(),
+                source: store.of(c).1.clone(),
+                connectors: connectors.collect(),
+            }
+        })
+        .collect();
+    let end = |port: Port| {
+        let variable = &descriptions[port.component].variables[port.variable];
+        (system.components()[port.component].name.clone(), variable.name.clone())
+    };
+    let connection = |link: &Link| SystemConnection {
+        start: end(link.from),
+        end: end(link.to),
+        factor: link.factor,
+        offset: link.offset,
+    };
+    let structure = SystemStructure {
+        name: name.to_owned(),
+        description: format!("coupled with a communication step of {} s", experiment.step),
+        generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
+        start_values: (!parameters.is_empty()).then(|| START_VALUES.to_owned()),
+        components,
+        connections: links.iter().map(connection).collect(),
+        enumerations: enumerations.0,
+        default_experiment: Some(DefaultExperiment {
+            start_time: experiment.start_time,
+            stop_time: Some(experiment.stop_time),
+            ..DefaultExperiment::default()
+        }),
+    };
+    let packed = Packed {
+        components: structure.components.len(),
+        fmus: store.fmus.len(),
+        connections: links.len(),
+        start_values: parameters.len(),
+    };
+    let broken = |e: punctual_modeldescription::Error| super::broken(&e);
+    let mut archive = Archive::new().with_timestamp(super::timestamp()?);
+    archive.add("SystemStructure.ssd", structure.to_xml().map_err(broken)?).map_err(broken)?;
+    if !parameters.is_empty() {
+        let set = ParameterSet { name: "start_values".to_owned(), parameters };
+        archive.add(START_VALUES, set.to_xml().map_err(broken)?).map_err(broken)?;
+    }
+    for (_, place, bytes) in store.fmus {
+        archive.add(&place, bytes).map_err(broken)?;
+    }
+    Ok((archive, packed))
+}
+
+/// The enumerations of all components, each once. Where two share a name but not the items, the later one
+/// is named after its component too.
+#[derive(Default)]
+struct Enumerations(Vec<EnumerationType>);
+
+impl Enumerations {
+    fn declare(&mut self, component: &str, variable: &Variable) -> String {
+        let item = |item: &crate::host::Item| EnumerationItem {
+            name: item.name.clone(),
+            value: item.value,
+            description: String::new(),
+        };
+        let items: Vec<_> = variable.items.iter().map(item).collect();
+        let mut name = variable.declared_type.clone().unwrap_or_else(|| variable.name.clone());
+        while let Some(other) = self.0.iter().find(|e| e.name == name) {
+            if other.items == items {
+                return name;
+            }
+            name = format!("{component}.{name}");
+        }
+        self.0.push(EnumerationType { name: name.clone(), description: String::new(), items });
+        name
+    }
+}
+
+/// The connector of a variable that can have one.
+fn connector(component: &str, variable: &Variable, enumerations: &mut Enumerations) -> Option<Connector> {
+    use Causality::{CalculatedParameter, Input, Output, Parameter};
+    if !matches!(variable.causality, Input | Output | Parameter | CalculatedParameter) {
+        return None;
+    }
+    let kind = match variable.kind {
+        Kind::Real => ConnectorKind::Real,
+        Kind::Boolean => ConnectorKind::Boolean,
+        Kind::String => ConnectorKind::String,
+        Kind::Enumeration if !variable.items.is_empty() => {
+            ConnectorKind::Enumeration(enumerations.declare(component, variable))
+        }
+        Kind::Integer | Kind::Enumeration => ConnectorKind::Integer,
+    };
+    Some(Connector { name: variable.name.clone(), causality: variable.causality, kind })
+}
+
+/// The start values by `component.variable`; `coupling` has checked names, types and ranges.
+fn start_values(system: &System, descriptions: &[&Description]) -> Vec<(String, ParameterValue)> {
+    let mut values = Vec::new();
+    for (component, description) in system.components().iter().zip(descriptions) {
+        for (name, value) in &component.start {
+            let Some(variable) = description.index_of(name).map(|i| &description.variables[i]) else {
+                continue;
+            };
+            let item = |number: i64| variable.items.iter().find(|item| i64::from(item.value) == number);
+            let value = match *value {
+                StartValue::Real(x) => ParameterValue::Real(x),
+                StartValue::Boolean(b) => ParameterValue::Boolean(b),
+                StartValue::Integer(i) if variable.kind == Kind::Real => ParameterValue::Real(i as f64),
+                StartValue::Integer(i) => match item(i) {
+                    Some(item) => ParameterValue::Enumeration(item.name.clone()),
+                    None => ParameterValue::Integer(i32::try_from(i).unwrap_or_default()),
+                },
+            };
+            values.push((format!("{}.{name}", component.name), value));
+        }
+    }
+    values
+}
