@@ -10,7 +10,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Status};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Sampling, Status};
 use punctual_core::lie::{self, Derivatives};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
@@ -59,6 +59,13 @@ fn steps(c: &mut Criterion) {
     filtered("step/bicycle, two barriers", two.expect("valid settings"));
     filtered("step/10 obstacles", goal_and_obstacles(10));
     filtered("step/60 obstacles", goal_and_obstacles(60));
+    let boxed = |builder: FilterBuilder| builder.bounds(&[-60.0; 2], &[60.0; 2]).expect("valid bounds");
+    filtered("step/point mass, box", boxed(goal(PointMass)));
+    filtered("step/10 obstacles, box", boxed(goal_and_obstacles(10)));
+    // The default: the constraint over the sampling period, with the state at its end predicted.
+    let held = |builder: FilterBuilder| builder.sampling(Sampling::Period(0.001)).expect("valid period");
+    filtered("step/point mass, over the period", held(goal(PointMass)));
+    filtered("step/10 obstacles, over the period", held(goal_and_obstacles(10)));
     for (name, obstacles) in [("step/safe, 10 obstacles", 10), ("step/safe, 60 obstacles", 60)] {
         bench_filter(c, name, goal_and_obstacles(obstacles), SAFE, Status::Unchanged);
     }

@@ -5,7 +5,7 @@
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
@@ -25,13 +25,14 @@ pub(crate) fn disc() -> DistanceDisc {
     DistanceDisc::new(CENTRE, RADIUS, SMOOTHING).expect("valid disc")
 }
 
-/// One goal, reached within [`DEADLINE`].
+/// One goal, reached within [`DEADLINE`]; the constraint at the samples only.
 pub(crate) fn goal<P>(plant: P) -> FilterBuilder
 where
     P: ControlAffine<4, 2> + Send + 'static,
 {
     SafetyFilter::builder(4, 2)
         .barrier("goal", plant, disc(), BarrierSettings::within(DEADLINE))
+        .and_then(|b| b.sampling(Sampling::Pointwise))
         .expect("valid settings")
 }
 
