@@ -5,6 +5,8 @@
 //! no jets, no programme; with the constraint at the samples and a margin of 1 %, and with the constraint
 //! over the period and the margin that it chooses itself.
 
+#![allow(clippy::print_stdout, reason = "the figures are read from the output")]
+
 use punctual_core::convergence::comparison::factorial;
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 

@@ -1,5 +1,7 @@
 //! Reach–avoid: unicycle and bicycle through ten obstacles into the goal by a deadline, inputs bounded.
 
+#![allow(clippy::print_stdout, reason = "the figures are read from the output")]
+
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
@@ -112,9 +114,9 @@ fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
 fn table(count: usize) {
     let starts = feasible_starts(count);
     let unicycle: Vec<Run> =
-        starts.iter().map(|x0| run(&Unicycle, [8.0, 3.0], |h, x| h.unicycle(x).into(), *x0)).collect();
+        starts.iter().map(|x0| run(&Unicycle, [8.0, 3.0], |h, x| h.unicycle(x), *x0)).collect();
     let bicycle: Vec<Run> =
-        starts.iter().map(|x0| run(&bicycle(), [8.0, 1.2], |h, x| h.bicycle(x, 10.0).into(), *x0)).collect();
+        starts.iter().map(|x0| run(&bicycle(), [8.0, 1.2], |h, x| h.bicycle(x, 10.0), *x0)).collect();
     for (name, runs) in
         [("unicycle, |a| <= 8, |omega| <= 3", unicycle), ("bicycle, |a| <= 8, |beta| <= 1.2", bicycle)]
     {

@@ -1,6 +1,8 @@
 //! The hundred starts at 1, 10 and 50 ms with the sampled form of the constraint: 100/100/100 on time
 //! and inside until 2T, for the given starts and for three hundred drawn here.
 
+#![allow(clippy::print_stdout, reason = "the figures are read from the output")]
+
 use punctual_core::filter::{BarrierSettings, Sampling};
 use punctual_core::nalgebra::SVector;
 use punctual_core::nominal::Heading;
