@@ -5,9 +5,9 @@
 //! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
 //! through the plant. It is solved by Newton's method on the rows: linearise them at the present
 //! guess, solve the quadratic programme, and go towards its answer as far as the violation decreases
-//! (halving the way). The guesses start from the answer of the pointwise rows and from the input of the
-//! step before; the better result is taken, by violation and then by distance from u_ref. The
-//! second guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries
+//! (halving the way), that of the rows which the programme does not give up. The guesses start from the
+//! answer of the pointwise rows and from the input of the step before; the better result is taken, by the
+//! number of rows given up, then by violation, then by distance from u_ref. The second guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries
 //! the turn that was begun on through the instants at which the linearisation cannot see it.
 
 use super::{Channel, FilterState};

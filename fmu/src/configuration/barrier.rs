@@ -194,13 +194,15 @@ pub struct BarrierSection {
     /// What is done where the bounds certainly do not allow the deadline. Default `report`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub when_infeasible: InfeasibleName,
-    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline.
+    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline, at most
+    /// 0.5 / step.
     #[serde(default)]
     pub rate: f64,
     /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`. Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<f64>,
-    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`, 20 / deadline where there are `rates`.
+    /// Rate of the stay constraint in 1/s, ≥ 0. Default 0: as `rate`, and
+    /// as the default of that where there are `rates`.
     #[serde(default)]
     pub stay_rate: f64,
     /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added. Default: a
@@ -323,7 +325,7 @@ impl BarrierSection {
             "rate",
             "1/s",
             non_negative,
-            "decay rate of an error against the profile; 0: 20 / deadline",
+            "decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step",
             |b| &mut b.rate,
         );
         row(
