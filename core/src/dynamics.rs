@@ -88,7 +88,7 @@ impl Region {
     /// The distance in m from `point` (m), 0 inside.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let [x, y] = [0, 1].map(|i| (self.sides[i][0] - point[i]).max(point[i] - self.sides[i][1]).max(0.0));
-        (x.hypot(y) - self.radius).max(0.0)
+        ((x * x + y * y).sqrt() - self.radius).max(0.0)
     }
 }
 
@@ -102,12 +102,13 @@ impl Region {
 /// ```
 pub fn chain(from: &[f64], input: [f64; 2], time: [f64; 2]) -> [f64; 2] {
     let (n, length) = (from.len(), time[1] - time[0]);
+    let terms = if length > 0.0 { n } else { 0 };
     let mut ends = [0.0; 2];
     for (side, end) in ends.iter_mut().enumerate() {
         let order = |k: usize| if k < n { from[k] } else { input[side] };
         // The derivatives at time[0], then the rest of the interval by Taylor's formula, term by term.
         let mut power = 1.0;
-        for k in 0..=n {
+        for k in 0..terms + 1 {
             let shifted = (k..=n).rev().fold(0.0, |sum, j| order(j) + sum * time[0] / (j - k + 1) as f64);
             let term = shifted * power;
             *end += if k == 0 {

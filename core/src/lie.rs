@@ -31,6 +31,7 @@ use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind};
 use crate::jet::{Response, Taylor};
+use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
@@ -102,9 +103,7 @@ impl Derivatives {
     /// Whether every number is finite.
     #[inline]
     pub fn is_finite(&self) -> bool {
-        // Without a branch per number.
-        let all = |values: &[f64]| values.iter().fold(true, |all, v| all & v.is_finite());
-        all(&self.drift) & all(&self.row) & self.lower_sensitivity.is_finite()
+        all_finite(&self.drift) & all_finite(&self.row) & self.lower_sensitivity.is_finite()
     }
 }
 

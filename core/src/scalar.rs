@@ -132,3 +132,12 @@ impl Scalar for f64 {
         f64::powf(self, exponent)
     }
 }
+
+/// Whether all of `values` are finite, without a branch per number.
+#[inline]
+pub(crate) fn all_finite(values: &[f64]) -> bool {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    const ONE: u64 = 1 << 52;
+    // The largest exponent, that of infinities and NaN, carries into the sign.
+    values.iter().fold(0, |carry, v| carry | ((v.to_bits() & EXPONENT) + ONE)) >> 63 == 0
+}

@@ -31,19 +31,17 @@ impl Centre {
     }
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
-    #[inline]
+    #[inline(always)]
     fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
-        let away = |i: usize| {
-            match self {
-                Self::Given { start, velocity } => {
-                    let from_start = x[i] - start[i];
-                    // At rest there is nothing to multiply.
-                    if velocity[i] == 0.0 { from_start } else { from_start - t * velocity[i] }
-                }
-                Self::State(first) => x[i] - x[first + i],
+        let away = match self {
+            // At rest there is nothing to multiply.
+            Self::Given { start, velocity: [0.0, 0.0] } => [x[0] - start[0], x[1] - start[1]],
+            Self::Given { start, velocity } => {
+                [x[0] - start[0] - t * velocity[0], x[1] - start[1] - t * velocity[1]]
             }
+            Self::State(first) => [x[0] - x[*first], x[1] - x[first + 1]],
         };
-        away(0).squared() + away(1).squared()
+        away[0].squared() + away[1].squared()
     }
 
     /// The least distance in m of the point from a position in `region` between the two times.
@@ -98,7 +96,7 @@ impl QuadraticDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
-    #[inline]
+    #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
@@ -153,13 +151,13 @@ impl DistanceDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
-    #[inline]
+    #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
     }
 
     fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let nearest = self.centre.nearest(time, region)?;
-        Some(self.level - nearest.hypot(self.smoothing))
+        Some(self.level - (nearest * nearest + self.smoothing * self.smoothing).sqrt())
     }
 }

@@ -42,7 +42,7 @@ const PASCAL: [[f64; MAX_RELATIVE_DEGREE + 1]; MAX_RELATIVE_DEGREE + 1] = {
 /// # Panics
 ///
 /// If n or k is above [`MAX_RELATIVE_DEGREE`].
-#[inline]
+#[inline(always)]
 pub fn binomial(n: usize, k: usize) -> f64 {
     PASCAL[n][k]
 }
@@ -55,16 +55,23 @@ pub fn factorial(k: usize) -> f64 {
 
 /// The part of (D + a)ⁿ e below the highest derivative: Σ_{j<n} C(n, j) a^{n−j} e⁽ʲ⁾, where
 /// `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾ and its length is n.
-#[inline]
+#[inline(always)]
 pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
-    let n = e.len();
-    e.iter().enumerate().fold(0.0, |sum, (j, &ej)| (sum + binomial(n, j) * ej) * rate)
+    let (n, mut sum) = (e.len(), 0.0);
+    for j in 0..n {
+        sum = (sum + binomial(n, j) * e[j]) * rate;
+    }
+    sum
 }
 
 /// A_k = k! c_k = Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0) for `k` below the length of `e`.
-#[inline]
+#[inline(always)]
 pub fn scaled_coefficient(rate: f64, e: &[f64], k: usize) -> f64 {
-    (0..=k).fold(0.0, |sum, j| sum * rate + binomial(k, j) * e[j])
+    let mut sum = 0.0;
+    for j in 0..k + 1 {
+        sum = sum * rate + binomial(k, j) * e[j];
+    }
+    sum
 }
 
 /// The coefficients c_0 … c_{n−1} of P in (L); `e` holds e⁽⁰⁾(0) … e⁽ⁿ⁻¹⁾(0).

@@ -196,6 +196,12 @@ impl FixedTime {
         Ok(self)
     }
 
+    /// n.
+    #[inline]
+    pub fn relative_degree(&self) -> usize {
+        self.n
+    }
+
     /// The settings.
     pub fn settings(&self) -> &FixedTimeSettings {
         &self.settings
@@ -390,9 +396,12 @@ impl FixedTime {
                 (exponent.floor(anchor[0], deadline, e[0]), bound)
             }
             Method::ReferenceProfile => {
-                let r = match &self.own {
-                    Some(_) => self.profile(state, elapsed),
-                    None => HermiteProfile::new(anchor, state.deadline).evaluate(elapsed),
+                let r = match (&self.own, self.settings.profile) {
+                    // As below, with n known to the compiler.
+                    (None, ProfileKind::Hermite) => {
+                        HermiteProfile::new(anchor, state.deadline).evaluate(elapsed)
+                    }
+                    _ => self.profile(state, elapsed),
                 };
                 let error: [f64; N] = from_fn(|k| e[k] - r[k]);
                 // h below r: what held inputs cost has used up the margin, and the deadline may be missed.

@@ -19,9 +19,13 @@ use super::polynomial::first;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
 /// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
-#[inline]
+#[inline(always)]
 pub fn is_invariant(rate: f64, e: &[f64]) -> bool {
-    (0..e.len()).all(|k| scaled_coefficient(rate, e, k) >= 0.0)
+    let mut all = true;
+    for k in 0..e.len() {
+        all = all && scaled_coefficient(rate, e, k) >= 0.0;
+    }
+    all
 }
 
 /// The smallest rate a ≥ 0 in 1/s with [`is_invariant`]; `None` if no finite rate has it. For n = 2,

@@ -359,6 +359,7 @@ impl FilterBuilder {
             state_dim,
             input_dim,
             channels,
+            bounded: bounds != Bounds::NONE,
             bounds,
             correction_limit,
             sampling,

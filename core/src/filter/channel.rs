@@ -76,7 +76,13 @@ impl Channel {
 
     /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it
     /// where it has ceased to be.
+    #[inline]
     pub(super) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
+        let begun = !matches!(barriers[index].phase, Phase::Waiting | Phase::Released);
+        begun && self.end == End::Never || self.is_due(barriers, index, t, h)
+    }
+
+    fn is_due(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
         let start = *barriers[index].start_time.get_or_insert(t);
         let reached = |seconds: f64| t - start >= seconds - SAME_TIME * t.abs().max(seconds);
         let begun = barriers[index].phase != Phase::Waiting
@@ -103,6 +109,7 @@ impl Channel {
 
     /// Anchors `promise` at time `begin` where it waits for that, `delay` after its sample; and where samples
     /// turn out to be further apart than was thought then, takes the margin for that into account.
+    #[inline]
     pub(super) fn anchor(
         &self,
         promise: &mut FixedTimeState,
@@ -110,12 +117,15 @@ impl Channel {
         h: &[f64],
         (period, measured_first): (Option<f64>, bool),
     ) {
+        if promise.phase != Phase::Waiting && !measured_first {
+            return;
+        }
         let period = period.unwrap_or(0.0);
         if promise.phase == Phase::Waiting {
             let waited = begin - delay - promise.start_time.unwrap_or(begin - delay);
             let deadline = self.promise.settings().deadline - waited - delay;
             self.promise.anchor(promise, begin, h, deadline, period);
-        } else if measured_first && promise.phase == Phase::Approach && period > promise.period {
+        } else if promise.phase == Phase::Approach && period > promise.period {
             self.promise.resample(promise, period);
         }
     }

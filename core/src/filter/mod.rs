@@ -26,6 +26,7 @@ use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Row};
 use crate::reach;
+use crate::scalar::all_finite;
 use sampling::Held;
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -85,6 +86,8 @@ pub struct SafetyFilter {
     input_dim: usize,
     channels: Vec<Channel>,
     bounds: Bounds,
+    /// Whether an input has a bound: without any nothing is ruled out.
+    bounded: bool,
     correction_limit: f64,
     sampling: Sampling,
     delay: f64,
@@ -151,7 +154,7 @@ impl SafetyFilter {
             &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
-        if !t.is_finite() || !finite(x) || !finite(u_ref) {
+        if !t.is_finite() || !all_finite(x) || !all_finite(u_ref) {
             report.status = Status::InvalidInput;
             report.barriers.fill(BarrierReport::BLANK);
             abstain(&self.state, &self.bounds, next, report, u);
@@ -161,51 +164,63 @@ impl SafetyFilter {
         let period = self.sampling.period(&self.state, t, self.first_period);
         let first = self.sampling.measures_first(&self.state, t);
         let mut sampled = period;
-        for (i, channel) in self.channels.iter().enumerate() {
+        // Slices of one length, so that indices need no check.
+        let count = self.channels.len();
+        let (rows, enforcement, demands) =
+            (&mut rows[..count], &mut enforcement[..count], &mut demands[..count]);
+        let (promises, reports) = (&mut next.barriers[..count], &mut report.barriers[..count]);
+        for i in 0..count {
+            let channel = &self.channels[i];
             // Evaluate: h and its derivatives along the plant, where the input begins to act.
             channel.source.evaluate(t, x, derivatives);
             let h = derivatives.drift[0];
-            let from = &mut predicted[i * x.len()..(i + 1) * x.len()];
-            from.copy_from_slice(x);
-            if self.delay > 0.0 {
-                channel.source.predict(from, &acting[..u.len()], self.delay);
-                channel.source.evaluate(begin, from, derivatives);
+            let mut from = x;
+            if self.delay > 0.0 || period.is_some() {
+                let own = &mut predicted[i * x.len()..(i + 1) * x.len()];
+                own.copy_from_slice(x);
+                if self.delay > 0.0 {
+                    channel.source.predict(own, &acting[..u.len()], self.delay);
+                    channel.source.evaluate(begin, own, derivatives);
+                }
+                from = own;
             }
-            let n = channel.source.relative_degree();
-            let report_b = &mut report.barriers[i];
-            if !channel.in_force(&mut next.barriers, i, t, h) {
+            if !channel.in_force(promises, i, t, h) {
                 (rows[i], demands[i]) = (Row::ZERO, SampledDemand::ZERO);
-                *report_b = BarrierReport { h, ..BarrierReport::BLANK };
-                report_b.remember(&next.barriers[i]);
+                reports[i] = BarrierReport { h, ..BarrierReport::BLANK };
+                reports[i].remember(&promises[i]);
                 continue;
             }
-            let promise = &mut next.barriers[i];
+            let promise = &mut promises[i];
+            let n = channel.promise.relative_degree();
             if let Some(status) = defect(derivatives) {
                 report.status = status;
-                *report_b = BarrierReport { h, ..BarrierReport::BLANK };
+                reports[i] = BarrierReport { h, ..BarrierReport::BLANK };
                 continue;
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
-            channel.anchor(promise, (begin, self.delay), &derivatives.drift[..n], (period, first));
             let stack = &derivatives.drift[..n];
+            channel.anchor(promise, (begin, self.delay), stack, (period, first));
             let mut demand = channel.promise.advance(promise, begin, stack);
-            let (now, time_left) = ((begin, &*from), demand.time_left);
-            let mut late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
-            if late_certain && channel.postpone(promise, now, &self.bounds, stack, period) {
-                demand = channel.promise.advance(promise, begin, stack);
-                late_certain = false;
+            let mut late_certain = promise.phase == Phase::Late;
+            if late_certain || self.bounded {
+                let (now, time_left) = ((begin, from), demand.time_left);
+                late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
+                if late_certain && channel.postpone(promise, now, &self.bounds, stack, period) {
+                    demand = channel.promise.advance(promise, begin, stack);
+                    late_certain = false;
+                }
             }
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
             let row = Row { normal: derivatives.row, floor: demand.floor - derivatives.drift[n] };
             rows[i] = row;
             enforcement[i] = channel.enforcement(promise);
             if let Some(period) = period {
-                match channel.promise.over_period(promise, begin, &derivatives.drift[..n], period) {
+                match channel.promise.over_period(promise, begin, stack, period) {
                     Some(demand) => demands[i] = demand,
                     None => sampled = None,
                 }
             }
-            *report_b = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
+            reports[i] = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
             if !row.floor.is_finite() {
                 report.status = Status::Singular;
             }
@@ -216,24 +231,28 @@ impl SafetyFilter {
         }
 
         // Solve, and report what came of it.
-        let limit = self.correction_limit;
-        let held = sampled.and_then(|period| {
+        let (bounds, correction_limit) = (&self.bounds, self.correction_limit);
+        let mut held = None;
+        if let Some(period) = sampled {
             report.period = period;
-            let (channels, bounds) = (&self.channels[..], &self.bounds);
-            let (t, x) = (begin, &predicted[..]);
-            let enforcement = &enforcement[..];
-            let held =
-                Held { channels, demands, t, x, period, bounds, u_ref, enforcement, correction_limit: limit };
+            let (channels, enforcement) = (&self.channels[..], &*enforcement);
+            let (t, x, demands) = (begin, &predicted[..], &*demands);
+            let problem =
+                Held { channels, demands, t, x, period, bounds, u_ref, enforcement, correction_limit };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
-            held.solve(rows, last, programme, u)
-        });
-        report.predicted = held.is_some();
-        let solution = held.unwrap_or_else(|| {
-            if sampled.is_some() {
-                rows.iter_mut().zip(&report.barriers).for_each(|(row, b)| *row = b.row);
+            held = problem.solve(rows, last, programme, u);
+            if held.is_none() {
+                rows.iter_mut().zip(&*reports).for_each(|(row, b)| *row = b.row);
             }
-            programme.solve(&Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) }, u)
-        });
+        }
+        report.predicted = held.is_some();
+        let solution = match held {
+            Some(solution) => solution,
+            None => {
+                let problem = Problem { enforcement, ..Problem::new(rows, bounds, u_ref, correction_limit) };
+                programme.solve(&problem, u)
+            }
+        };
         if matches!(self.sampling, Sampling::Measured { .. }) && self.state.time.is_some_and(|last| t > last)
         {
             next.period = period;
@@ -250,8 +269,8 @@ impl SafetyFilter {
             Outcome::Failed => Status::SolverFailed,
         };
         let mut blocked = false;
-        for (i, row) in rows.iter().enumerate() {
-            let (promise, report_b) = (&mut next.barriers[i], &mut report.barriers[i]);
+        for i in 0..count {
+            let (row, promise, report_b) = (&rows[i], &mut promises[i], &mut reports[i]);
             if matches!(promise.phase, Phase::Waiting | Phase::Released) {
                 continue;
             }
@@ -415,6 +434,7 @@ fn abstain(state: &FilterState, bounds: &Bounds, next: &mut FilterState, report:
 }
 
 /// Why derivatives cannot carry a constraint, if they cannot.
+#[inline]
 fn defect(derivatives: &Derivatives) -> Option<Status> {
     /// An input that enters below the declared degree by more than this part of the row (or of 1)
     /// is real; round-off of cancelling terms stays far below.
@@ -427,8 +447,4 @@ fn defect(derivatives: &Derivatives) -> Option<Status> {
     }
     let size = derivatives.row.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
     (derivatives.lower_sensitivity > ROUND_OFF * size).then_some(Status::WrongRelativeDegree)
-}
-
-fn finite(values: &[f64]) -> bool {
-    values.iter().all(|v| v.is_finite())
 }

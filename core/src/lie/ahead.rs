@@ -20,7 +20,7 @@ use nalgebra::SVector;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::jet::{Dual, Taylor};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// Runge-Kutta steps per prediction.
@@ -45,7 +45,7 @@ impl Ahead {
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
-        self.value.iter().chain(self.gradient.as_flattened()).all(|v| v.is_finite())
+        all_finite(&self.value) & all_finite(self.gradient.as_flattened())
     }
 }
 

@@ -7,6 +7,7 @@
 //! with a diagonal W > 0, the identity by default.
 //!
 //! - u_ref feasible: it is returned unchanged, bit for bit.
+//! - one row active and no bound, W = 1: closed form, whatever the number of rows (module `one_active`).
 //! - one row, W = 1: closed form, with or without bounds (module `single_row`).
 //! - else: a dual active-set method (module `dual_active_set`), exact up to round-off.
 //!
@@ -27,12 +28,17 @@ mod dual_active_set;
 mod factors;
 mod interior_point;
 mod kkt;
+mod one_active;
 mod single_row;
 
 pub use kkt::Residuals;
 
 use crate::{MAX_INPUTS, MAX_ROWS};
 use dual_active_set::DualActiveSet;
+use one_active::Answer;
+
+/// A slack up to this part of its terms is round-off.
+const ROUND_OFF: f64 = 1e-12;
 
 /// One row aᵀu ≥ b.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +65,7 @@ impl Row {
 
     /// The slack counted as round-off: 1e-12 of its [`Self::size`].
     pub fn round_off(&self, u: &[f64]) -> f64 {
-        1e-12 * self.size(u)
+        ROUND_OFF * self.size(u)
     }
 
     /// Whether the row holds at `u` up to [`Self::round_off`].
@@ -179,7 +185,7 @@ pub enum Solver {
     /// None was needed: u_ref was feasible.
     #[default]
     Unchanged = 0,
-    /// The closed form for one row.
+    /// A closed form, for one row or where one is active.
     ClosedForm = 1,
     /// The interior-point method.
     InteriorPoint = 2,
@@ -276,10 +282,20 @@ impl Workspace {
     /// More than [`MAX_ROWS`] rows.
     pub fn solve(&mut self, p: &Problem, u: &mut [f64]) -> Solution {
         assert!(p.rows.len() <= MAX_ROWS, "{} rows, must be at most {MAX_ROWS}", p.rows.len());
+        (self.active_len, self.relaxed, self.lost) = (0, 0, 0);
+        if let Some(answer) = one_active::solve(p, u)
+            && (self.backend == Backend::DualActiveSet || matches!(answer, Answer::Reference))
+        {
+            let mut solver = Solver::Unchanged;
+            if let Answer::Row(row, multiplier) = answer {
+                self.active[0] = Active { constraint: Constraint::Row(row), multiplier };
+                (self.active_len, solver) = (1, Solver::ClosedForm);
+            }
+            return Solution { outcome: Outcome::Optimal, solver, iterations: 0 };
+        }
         for (i, (ui, r)) in u.iter_mut().zip(p.u_ref).enumerate() {
             *ui = p.bounds.clamp(i, *r);
         }
-        (self.active_len, self.relaxed, self.lost) = (0, 0, 0);
         if p.rows.iter().all(|row| row.slack(u) >= 0.0) {
             self.take_over(p, u, 0.0);
             return Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 };
