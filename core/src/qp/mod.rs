@@ -27,6 +27,7 @@ mod dual_active_set;
 mod factors;
 mod interior_point;
 mod kkt;
+pub(crate) mod sensitivity;
 mod single_row;
 
 pub use kkt::Residuals;
