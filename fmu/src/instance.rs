@@ -83,12 +83,14 @@ pub enum Call {
     Set,
     /// `fmi2DoStep`.
     DoStep,
+    /// `fmi2GetDirectionalDerivative`.
+    GetDirectionalDerivative,
 }
 
 /// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11).
 /// Wider than the standard where importers are: values may be read in every mode. Calls that are not
 /// here are legal in every mode.
-pub const LEGAL: [(Call, Mode); 7] = [
+pub const LEGAL: [(Call, Mode); 8] = [
     (Call::SetupExperiment, Mode::INSTANTIATED),
     (Call::EnterInitializationMode, Mode::INSTANTIATED),
     (Call::ExitInitializationMode, Mode::INITIALIZATION),
@@ -96,6 +98,7 @@ pub const LEGAL: [(Call, Mode); 7] = [
     (Call::Get, Mode::ANY),
     (Call::Set, Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
     (Call::DoStep, Mode::STEP),
+    (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
 /// Why a call failed, for the log: what was given and what is allowed.
@@ -140,6 +143,8 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
+    /// Scratch: a direction and the derivative along it, at the indices of the variables.
+    derivative: [Vec<f64>; 2],
 }
 
 impl Instance {
@@ -160,7 +165,8 @@ impl Instance {
             ));
         }
         let block = block::build(&product).map_err(|e| e.to_string())?;
-        let values = Values::zeros(product.variables.len());
+        let len = product.variables.len();
+        let values = Values::zeros(len);
         let mut instance = Self {
             product,
             block,
@@ -171,6 +177,7 @@ impl Instance {
             values,
             fresh: false,
             configured: false,
+            derivative: [vec![0.0; len], vec![0.0; len]],
         };
         instance.start_values();
         Ok(instance)
@@ -296,7 +303,8 @@ impl Instance {
     /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
     pub fn save(&self, state: &mut State) {
         // Without `..`: whoever adds a field decides here whether it belongs to the state.
-        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured } = self;
+        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured, derivative: _ } =
+            self;
         state.guid.clone_from(&product.guid);
         (state.mode, state.time, state.last_step) = (*mode, *time, *last_step);
         (state.stepped, state.fresh, state.configured) = (*stepped, *fresh, *configured);
@@ -468,6 +476,65 @@ impl Instance {
             self.values.booleans[reference as usize] = value != 0;
         }
         self.fresh &= references.is_empty();
+        Ok(())
+    }
+
+    /// Writes the derivatives of the outputs `unknowns` along `seed`, one number for each of the inputs
+    /// `knowns`: of the outputs that would be read now had these inputs just been set, with the units of the
+    /// output over those of the input. Does not allocate once configured, and changes no value.
+    ///
+    /// # Errors
+    ///
+    /// The wrong mode; an unknown that is no real output, a known that is no real input; a seed that is not
+    /// finite; parameters that contradict each other; a derivative that is not known or not finite.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), Failure> {
+        self.check(Call::GetDirectionalDerivative)?;
+        for (references, causality, which) in
+            [(unknowns, Causality::Output, "unknown"), (knowns, Causality::Input, "known")]
+        {
+            for &reference in references {
+                let Variable { name, causality: found, .. } = self.variable(BaseType::Real, reference)?;
+                if *found != causality {
+                    let (found, wanted) = (found.as_str(), causality.as_str());
+                    return Err(format!(
+                        "{name} is of causality {found}: each {which} must be a real {wanted}"
+                    ));
+                }
+            }
+        }
+        if let Some(i) = seed.iter().position(|v| !v.is_finite()) {
+            let name = &self.product.variables[knowns[i] as usize].name;
+            return Err(format!("the seed of {name} is {}, must be finite", seed[i]));
+        }
+        if !self.configured {
+            self.configure().map_err(|e| e.to_string())?;
+        }
+        let [direction, derivative] = &mut self.derivative;
+        direction.fill(0.0);
+        derivative.fill(0.0);
+        for (&known, seed) in knowns.iter().zip(seed) {
+            direction[known as usize] += seed;
+        }
+        // After initialization outputs without direct feedthrough change in steps only.
+        if self.mode == Mode::INITIALIZATION || self.block.direct_feedthrough() {
+            self.block.differentiate(self.time, &self.values, direction, derivative)?;
+        }
+        for &unknown in unknowns {
+            let value = derivative[unknown as usize];
+            if !value.is_finite() {
+                let name = &self.product.variables[unknown as usize].name;
+                return Err(format!("the derivative of {name} is {value}, must be finite"));
+            }
+        }
+        for (&unknown, o) in unknowns.iter().zip(out) {
+            *o = derivative[unknown as usize];
+        }
         Ok(())
     }
 

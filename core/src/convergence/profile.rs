@@ -106,12 +106,7 @@ impl Profile for LowPeak {
     }
 
     /// Linear but for n = 2, where (B) gives Ȧ (2A + 4w) = 2vv̇ − 4Aẇ.
-    fn along(
-        &self,
-        [anchor, direction]: [&[f64]; 2],
-        deadline: f64,
-        elapsed: f64,
-    ) -> Option<Derivatives> {
+    fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
         let ([e, de], [e_along, de_along]) = (anchor, direction) else {
             return Some(self.evaluate(direction, deadline, elapsed));
         };

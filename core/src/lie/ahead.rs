@@ -161,8 +161,7 @@ pub(super) fn predict_along<P, const NX: usize, const NU: usize>(
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let from =
-        SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], along: dx[i] });
+    let from = SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], along: dx[i] });
     let held = SVector::<Tangent<f64>, NU>::from_fn(|i, _| Tangent::from(u[i]));
     let to = flow(plant, &from, &held, duration, SUBSTEPS);
     for i in 0..NX {
