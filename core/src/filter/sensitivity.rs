@@ -71,8 +71,8 @@ pub enum NoDerivative {
     Profile(usize),
     /// Its deadline is given up at this sample for a later one, which a search found.
     Postponed(usize),
-    /// The search over the period ended more than 1e-3 of its size away from the input that is nearest to u_ref
-    /// on the rows linearised there.
+    /// The search over the period ended more than 1e-3 of its size (1e-6 where the rows are not met) away from
+    /// the input that is nearest to u_ref on the rows linearised there.
     NotConverged,
     /// The active rows do not determine the change of the input.
     Dependent,
@@ -120,6 +120,9 @@ impl Motion {
 /// but where Newton's method ran into its limit of iterations, some of 100 samples. The derivative is then in
 /// error by a number of that order.
 const SAME_INPUT: f64 = 1e-3;
+
+/// The same where the rows are not met, which says that the search got stuck.
+const SAME_INPUT_UNMET: f64 = 1e-6;
 
 /// A multiplier from this part of its largest on is at it.
 const SATURATED: f64 = 1.0 - 1e-9;
@@ -221,7 +224,8 @@ impl SafetyFilter {
             programme.solve(&problem, again);
         }
         let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
-        if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > SAME_INPUT * size) {
+        let same = if report.status.is_satisfied() { SAME_INPUT } else { SAME_INPUT_UNMET };
+        if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
             return Err(NoDerivative::NotConverged);
         }
         let active = programme.active();
