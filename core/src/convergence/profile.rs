@@ -105,7 +105,7 @@ impl Profile for LowPeak {
         r
     }
 
-    /// Linear but for n = 2, where (B) gives Ȧ (2A + 4w) = 2vv̇ − 4Aẇ.
+    /// Linear but for n = 2, where (B) gives A' (2A + 4w) = 2vv' − 4Aw'.
     fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
         let ([e, de], [e_along, de_along]) = (anchor, direction) else {
             return Some(self.evaluate(direction, deadline, elapsed));

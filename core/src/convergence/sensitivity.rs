@@ -5,14 +5,12 @@
 //! functions, but for the first-order condition. At a sample that anchors, the anchor is h itself; margin
 //! and the repeated root follow it:
 //!
-//! ```math
-//! \begin{aligned}
-//! e &= h - \mu(h), \qquad \dot r = \frac{\partial r}{\partial e_0}\,\dot e_0, \\
-//! \dot s &= -\frac{\sum_j \dot y_j E_{n-1-j}(s)}{\sum_j y_j s^{n-1-j}/(n-1-j)!} \qquad \text{for the root of (R)},
-//! \end{aligned}
+//! ```text
+//! e = h − μ(h),   r' = (∂r/∂e₀) e₀',
+//! s' = −Σ_j y_j' E_{n−1−j}(s) / (dR/ds),   dR/ds = −Σ_j y_j s^{n−1−j}/(n−1−j)!   for the root of (R),
 //! ```
 //!
-//! where the dot is the derivative along a direction. Where a phase changes, a maximum has two candidates or a
+//! where the prime is the derivative along a direction. Where a phase changes, a maximum has two candidates or a
 //! profile a kink, it is the derivative of the piece in force.
 
 use super::comparison::{Stack, binomial, lower_terms};

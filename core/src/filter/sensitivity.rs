@@ -2,17 +2,14 @@
 //!
 //! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds, G_i the row i: affine in u
 //! for the pointwise constraint, not where it is enforced over the period. With the active ones A, their
-//! multipliers λ and the dot for the derivative along the direction (ẋ, u̇_ref),
+//! multipliers λ and a prime for the derivative along the direction (x', u_ref'),
 //!
-//! ```math
-//! \begin{aligned}
-//! \dot u - \sum_{i \in A} \Bigl( \dot\lambda_i \nabla_u G_i + \lambda_i \bigl( \nabla_u^2 G_i\, \dot u
-//!   + \nabla^2_{ux} G_i\, \dot x \bigr) \Bigr) &= \dot u_\mathrm{ref}, \\
-//! \nabla_u G_i^\mathsf{T} \dot u + \nabla_x G_i^\mathsf{T} \dot x &= 0 \qquad \text{for } i \in A,
-//! \end{aligned} \tag{8}
+//! ```text
+//! u' − Σ_{i∈A} (λ_i' ∇_u G_i + λ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
+//! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
 //! ```
 //!
-//! by the implicit function theorem. A bound that holds u_j has u̇_j = 0. A soft row at its largest
+//! by the implicit function theorem. A bound that holds u_j has u_j' = 0. A soft row at its largest
 //! multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
 //! direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
@@ -411,7 +408,7 @@ fn is_saturated(normal: &[f64; MAX_INPUTS], multiplier: f64, penalty: f64) -> bo
     multiplier * dot(normal, normal).sqrt() >= SATURATED * penalty
 }
 
-/// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) ȧ κ/‖a‖ where
+/// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖ where
 /// n = a/‖a‖.
 fn pull_saturated(
     equations: &mut Equations,

@@ -3,9 +3,8 @@
 //! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Along a
 //! direction in which everything they are made of moves, with the multipliers' change μ,
 //!
-//! ```math
-//! \begin{bmatrix} H & -A^\mathsf{T} \\ A & 0 \end{bmatrix} \begin{bmatrix} \dot u \\ \mu \end{bmatrix}
-//! = \begin{bmatrix} c \\ d \end{bmatrix}, \tag{7}
+//! ```text
+//! H u' − Aᵀ μ = c,   A u' = d,                                                            (7)
 //! ```
 //!
 //! H the Hessian of the Lagrangian, c what moves its gradient and d what moves the constraints, at a fixed u.
@@ -50,7 +49,7 @@ impl Equations {
         }
     }
 
-    /// Adds an active constraint: u̇ along `normal` is `change`. Returns false where there are more than inputs.
+    /// Adds an active constraint: u' along `normal` is `change`. Returns false where there are more than inputs.
     #[must_use]
     pub(crate) fn hold(&mut self, normal: &[f64; MAX_INPUTS], change: f64) -> bool {
         if self.rows == self.inputs {
@@ -69,7 +68,7 @@ impl Equations {
         true
     }
 
-    /// Writes u̇; false where the equations do not determine it.
+    /// Writes u'; false where the equations do not determine it.
     #[must_use]
     pub(crate) fn solve(mut self, out: &mut [f64]) -> bool {
         let solved = self.matrix.lu().solve_mut(&mut self.right);
