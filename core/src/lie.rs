@@ -134,6 +134,26 @@ pub trait DerivativeSource: Send {
         false
     }
 
+    /// Writes how what [`Self::ahead`] writes changes along a direction: `state` is x and its direction,
+    /// `input` the held u and its direction; for [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default
+    /// does not know: it returns false.
+    fn ahead_along(
+        &self,
+        _t: f64,
+        _state: [&[f64]; 2],
+        _input: [&[f64]; 2],
+        _duration: f64,
+        _out: &mut Ahead,
+    ) -> bool {
+        false
+    }
+
+    /// As [`Self::predict`], and moves the direction `dx` by its derivative. The default does not know: it
+    /// returns false.
+    fn predict_along(&self, _x: &mut [f64], _dx: &mut [f64], _u: &[f64], _duration: f64) -> bool {
+        false
+    }
+
     /// A number that h does not exceed between `time[0]` and `time[1]` s after `t` and `x`, under any input
     /// with `bounds[0]` ≤ u ≤ `bounds[1]`; for [`crate::reach`]. The default knows none.
     fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
@@ -192,6 +212,24 @@ where
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
         let x = SVector::from_column_slice(x);
         ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
+        true
+    }
+
+    fn ahead_along(
+        &self,
+        t: f64,
+        state: [&[f64]; 2],
+        input: [&[f64]; 2],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> bool {
+        let model = (&self.plant, &self.barrier);
+        ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), state, input, out);
+        true
+    }
+
+    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
+        ahead::predict_along::<P, NX, NU>(&self.plant, x, dx, u, duration);
         true
     }
 

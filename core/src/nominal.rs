@@ -5,11 +5,12 @@
 //! is the least that belongs into every loop; [`Heading`] drives to a goal.
 
 use crate::error::{Error, finite, positive};
+use crate::scalar::Scalar;
 
 /// Damping: −gain · v for a velocity or speed v (m/s), in m/s²; `gain` in 1/s, 1 in the figures of the
 /// documentation. On the point mass for each component, on unicycle and bicycle for the acceleration.
-pub fn damping(v: f64, gain: f64) -> f64 {
-    -gain * v
+pub fn damping<S: Scalar>(v: S, gain: f64) -> S {
+    v * -gain
 }
 
 /// Drives a vehicle to a goal in the plane: turn towards it, or away from it where that is nearer, and
@@ -112,53 +113,71 @@ impl Heading {
     }
 
     /// Acceleration (m/s²) of the point mass, x = (x_p, y_p, v_x, v_y).
-    pub fn point_mass(&self, x: &[f64; 4]) -> [f64; 2] {
+    pub fn point_mass<S: Scalar>(&self, x: &[S; 4]) -> [S; 2] {
         let (d, distance) = self.offset(x);
-        let speed = self.speed(distance) / distance.max(f64::MIN_POSITIVE);
-        let wanted = [0, 1].map(|i| self.acceleration_gain * (d[i] * speed - x[i + 2]));
+        let far = distance.value();
+        let per_distance = if self.speed_gain * far >= self.speed_limit {
+            S::from(self.speed_limit) / distance
+        } else if far > 0.0 {
+            // The gain, with the round-off of speed and distance.
+            S::from(self.speed_gain * far / far)
+        } else {
+            S::from(self.speed_gain)
+        };
+        let wanted = [0, 1].map(|i| (d[i] * per_distance - x[i + 2]) * self.acceleration_gain);
         let size = wanted[0].hypot(wanted[1]);
-        let part = if size > self.acceleration_limit { self.acceleration_limit / size } else { 1.0 };
-        wanted.map(|a| a * part)
+        if size.value() <= self.acceleration_limit {
+            return wanted;
+        }
+        wanted.map(|a| a * (S::from(self.acceleration_limit) / size))
     }
 
     /// Acceleration (m/s²) and turning rate (rad/s) of the unicycle, x = (x_p, y_p, θ, v).
-    pub fn unicycle(&self, x: &[f64; 4]) -> [f64; 2] {
+    pub fn unicycle<S: Scalar>(&self, x: &[S; 4]) -> [S; 2] {
         let (d, distance) = self.offset(x);
-        let ([sin, cos], v) = ([x[2].sin(), x[2].cos()], x[3]);
+        let ((sin, cos), v) = (x[2].sin_cos(), x[3]);
         // The components of d along the heading and across it, to the left.
         let (along, across) = (d[0] * cos + d[1] * sin, d[1] * cos - d[0] * sin);
-        let sign = if along < 0.0 { -1.0 } else { 1.0 };
-        let angle = if distance < Self::NEAR { 0.0 } else { (sign * across).atan2(along.abs()) };
-        let speed = sign * self.speed(distance) * angle.cos();
-        let acceleration = self.acceleration_gain * (speed - v);
-        [within(self.acceleration_limit, acceleration), within(self.turn_limit, self.turn_gain * angle)]
+        let sign = if along.value() < 0.0 { -1.0 } else { 1.0 };
+        let ahead = if along.value().is_sign_negative() { -along } else { along };
+        let near = distance.value() < Self::NEAR;
+        let angle = if near { S::zero() } else { (across * sign).atan2(ahead) };
+        let speed = self.speed(distance) * sign * angle.cos();
+        let acceleration = (speed - v) * self.acceleration_gain;
+        [within(self.acceleration_limit, acceleration), within(self.turn_limit, angle * self.turn_gain)]
     }
 
     /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v);
     /// `l_r` > 0 in m. At rest it cannot turn: the slip angle is on its limit, to the side that turns
     /// right once it moves.
-    pub fn bicycle(&self, x: &[f64; 4], l_r: f64) -> [f64; 2] {
+    pub fn bicycle<S: Scalar>(&self, x: &[S; 4], l_r: f64) -> [S; 2] {
         let [acceleration, turning] = self.unicycle(x);
-        if turning == 0.0 {
-            return [acceleration, 0.0];
+        let at_rest = x[3].value() == 0.0;
+        let v = if at_rest { S::from(f64::MIN_POSITIVE.copysign(acceleration.value())) } else { x[3] };
+        if at_rest && turning.value() == 0.0 {
+            return [acceleration, S::zero()];
         }
-        let v = if x[3] == 0.0 { f64::MIN_POSITIVE.copysign(acceleration) } else { x[3] };
-        [acceleration, within(self.slip_limit, turning * l_r / v)]
+        // No angle is 0, not −0.
+        [acceleration, within(self.slip_limit, turning * l_r / v + 0.0)]
     }
 
-    fn offset(&self, x: &[f64; 4]) -> ([f64; 2], f64) {
-        let d = [self.goal[0] - x[0], self.goal[1] - x[1]];
+    fn offset<S: Scalar>(&self, x: &[S; 4]) -> ([S; 2], S) {
+        let d = [0, 1].map(|i| S::from(self.goal[i]) - x[i]);
         (d, d[0].hypot(d[1]))
     }
 
-    fn speed(&self, distance: f64) -> f64 {
-        (self.speed_gain * distance).min(self.speed_limit)
+    fn speed<S: Scalar>(&self, distance: S) -> S {
+        within(self.speed_limit, distance * self.speed_gain)
     }
 }
 
 /// `value` moved into ±`limit`.
-fn within(limit: f64, value: f64) -> f64 {
-    value.max(-limit).min(limit)
+fn within<S: Scalar>(limit: f64, value: S) -> S {
+    match value.value() {
+        v if v > limit => S::from(limit),
+        v if v < -limit => S::from(-limit),
+        _ => value,
+    }
 }
 
 #[cfg(test)]
@@ -192,6 +211,40 @@ mod tests {
             assert!(a.abs() <= 10.0 && slip.abs() <= 1.0);
             let [a, b] = heading.point_mass(&x);
             assert!(a.hypot(b) <= 10.0 + 1e-9);
+        }
+    }
+
+    /// In every quadrant, within and beyond the limits, and for the point mass at the goal itself.
+    #[test]
+    fn derivatives_are_those_of_the_laws() {
+        use crate::jet::Tangent;
+        let heading = Heading::towards([4.0, -3.0]);
+        let along = [0.3, -0.7, 0.4, 0.9];
+        let states = [
+            [1.0, 2.0, 0.3, 3.0],
+            [9.0, 2.0, -2.5, 1.0],
+            [3.0, -9.0, 1.0, -2.0],
+            [40.0, -70.0, 2.0, 5.0],
+            [4.2, -3.1, 0.5, 0.7],
+            [4.0, -3.0, 0.1, 0.2],
+        ];
+        for (i, x) in states.into_iter().enumerate() {
+            let laws = |x: &[f64; 4]| [heading.point_mass(x), heading.unicycle(x), heading.bicycle(x, 2.0)];
+            let moved = |by: f64| std::array::from_fn(|k| x[k] + by * along[k]);
+            let x: [_; 4] = std::array::from_fn(|k| Tangent { value: x[k], along: along[k] });
+            let found = [heading.point_mass(&x), heading.unicycle(&x), heading.bicycle(&x, 2.0)];
+            let step = 1e-6;
+            let (plus, minus) = (laws(&moved(step)), laws(&moved(-step)));
+            // At the goal the speed of a vehicle that has a heading has a kink.
+            let compared = if i == 5 { 1 } else { 3 };
+            for law in 0..compared {
+                for k in 0..2 {
+                    let wanted = (plus[law][k] - minus[law][k]) / (2.0 * step);
+                    // Round-off of numbers of order 10 over the step.
+                    let error = (found[law][k].along - wanted).abs();
+                    assert!(error < 1e-6 * (1.0 + wanted.abs()), "state {i}, law {law}: {found:?} {wanted}");
+                }
+            }
         }
     }
 

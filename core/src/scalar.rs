@@ -75,6 +75,26 @@ pub trait Scalar:
         sin / cos
     }
 
+    /// √(self² + other²); its derivatives are 0 where both are 0.
+    #[must_use]
+    #[inline]
+    fn hypot(self, other: Self) -> Self {
+        if self.value() == 0.0 && other.value() == 0.0 {
+            return Self::zero();
+        }
+        (self.squared() + other.squared()).sqrt()
+    }
+
+    /// The angle in radians of the point (`x`, `self`), from −π to π.
+    #[must_use]
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        // Of the two quotients the one that does not exceed 1; the branch is that of the values.
+        let angle =
+            if self.value().abs() <= x.value().abs() { (self / x).atan() } else { -(x / self).atan() };
+        angle - angle.value() + self.value().atan2(x.value())
+    }
+
     /// `self · self`.
     #[must_use]
     #[inline]
@@ -126,6 +146,14 @@ impl Scalar for f64 {
     #[inline]
     fn atan(self) -> Self {
         f64::atan(self)
+    }
+    #[inline]
+    fn hypot(self, other: Self) -> Self {
+        f64::hypot(self, other)
+    }
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        f64::atan2(self, x)
     }
     #[inline]
     fn powf(self, exponent: f64) -> Self {

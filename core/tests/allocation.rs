@@ -9,7 +9,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use punctual_core::convergence::repeated_root;
-use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, SampleDerivative, Sampling, Status};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::Solver;
 use scenario::{distance_disc, one, quadratic_disc};
@@ -120,6 +120,9 @@ fn a_step_allocates_nothing() {
             filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
         });
         assert_eq!(first, 0, "{name}: the first step");
+        let mut derivative = SampleDerivative::default();
+        let (dx, du_ref) = ([0.1, -0.2, 0.3, -0.4], [0.5, -0.6]);
+        filter.differentiate(0.0, [&[0.0; 4], &dx], [&[0.0; 2], &du_ref], &mut derivative).expect("lengths");
         let found = allocations(|| {
             for k in 1..2000 {
                 let t = f64::from(k) * 0.005;
@@ -133,6 +136,7 @@ fn a_step_allocates_nothing() {
                 }
                 let u_ref = [0.1, -0.1];
                 filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions");
+                filter.differentiate(t, [&x, &dx], [&u_ref, &du_ref], &mut derivative).expect("lengths");
                 let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
                 seen[report.status as usize] = true;
                 assert_ne!(report.solver, Solver::InteriorPoint);

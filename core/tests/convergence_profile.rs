@@ -3,8 +3,8 @@
 use punctual_core::convergence::comparison::factorial;
 use punctual_core::convergence::hermite::HermiteProfile;
 use punctual_core::convergence::operator::Operator;
-use punctual_core::convergence::profile::{Derivatives, Hermite, Profile, ProfileError, check};
-use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, Refusal};
+use punctual_core::convergence::profile::{Derivatives, Hermite, LowPeak, Profile, ProfileError, check};
+use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, ProfileKind, Refusal};
 
 /// The Hermite profile with one derivative changed from a time on.
 struct Broken {
@@ -135,4 +135,19 @@ fn rates_have_to_fit_the_barrier() {
     assert_eq!(refused(2, both), "rates: given beside `rate`, which it replaces");
     let root = FixedTimeSettings { method: punctual_core::convergence::Method::RepeatedRoot, ..settings };
     assert_eq!(refused(2, root), "rates: belongs to the reference profile");
+}
+
+/// On the profile of the settings the floor is its own r⁽ⁿ⁾.
+#[test]
+fn the_low_peak_profile_is_followed_from_sample_to_sample() {
+    let settings = FixedTimeSettings { profile: ProfileKind::LowPeak, ..FixedTimeSettings::within(2.0) };
+    let promise = FixedTime::new(2, settings).expect("valid");
+    let (anchor, mut state) = ([-1.0, 0.25], FixedTimeState::default());
+    promise.advance(&mut state, 0.0, &anchor);
+    for elapsed in [0.5, 1.5] {
+        let r = LowPeak.evaluate(&anchor, 2.0, elapsed);
+        let demand = promise.advance(&mut state, elapsed, &r[..2]);
+        assert_eq!((demand.profile, demand.floor), (r[0], r[2]), "{elapsed}");
+        assert_ne!(r[2], Hermite.evaluate(&anchor, 2.0, elapsed)[2]);
+    }
 }

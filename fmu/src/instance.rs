@@ -8,6 +8,8 @@
 //! sample at its start and remembers it; after the step, outputs stay that sample (a filter) or show
 //! the new state (a plant) until inputs change.
 
+mod derivative;
+
 use punctual_modeldescription::{BaseType, Causality, Variable, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
@@ -83,12 +85,14 @@ pub enum Call {
     Set,
     /// `fmi2DoStep`.
     DoStep,
+    /// `fmi2GetDirectionalDerivative`.
+    GetDirectionalDerivative,
 }
 
 /// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11).
 /// Wider than the standard where importers are: values may be read in every mode. Calls that are not
 /// here are legal in every mode.
-pub const LEGAL: [(Call, Mode); 7] = [
+pub const LEGAL: [(Call, Mode); 8] = [
     (Call::SetupExperiment, Mode::INSTANTIATED),
     (Call::EnterInitializationMode, Mode::INSTANTIATED),
     (Call::ExitInitializationMode, Mode::INITIALIZATION),
@@ -96,6 +100,7 @@ pub const LEGAL: [(Call, Mode); 7] = [
     (Call::Get, Mode::ANY),
     (Call::Set, Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
     (Call::DoStep, Mode::STEP),
+    (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
 /// Why a call failed, for the log: what was given and what is allowed.
@@ -140,6 +145,8 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
+    /// Scratch: a direction and the derivative along it, at the indices of the variables.
+    derivative: [Vec<f64>; 2],
 }
 
 impl Instance {
@@ -160,7 +167,8 @@ impl Instance {
             ));
         }
         let block = block::build(&product).map_err(|e| e.to_string())?;
-        let values = Values::zeros(product.variables.len());
+        let len = product.variables.len();
+        let values = Values::zeros(len);
         let mut instance = Self {
             product,
             block,
@@ -171,6 +179,7 @@ impl Instance {
             values,
             fresh: false,
             configured: false,
+            derivative: [vec![0.0; len], vec![0.0; len]],
         };
         instance.start_values();
         Ok(instance)
@@ -296,7 +305,8 @@ impl Instance {
     /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
     pub fn save(&self, state: &mut State) {
         // Without `..`: whoever adds a field decides here whether it belongs to the state.
-        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured } = self;
+        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured, derivative: _ } =
+            self;
         state.guid.clone_from(&product.guid);
         (state.mode, state.time, state.last_step) = (*mode, *time, *last_step);
         (state.stepped, state.fresh, state.configured) = (*stepped, *fresh, *configured);

@@ -99,6 +99,7 @@ impl Product {
                 can_not_use_memory_management_functions: true,
                 can_get_and_set_state: true,
                 can_serialize_state: true,
+                provides_directional_derivative: true,
                 ..CoSimulation::default()
             },
             units: units(&self.variables),

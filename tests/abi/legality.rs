@@ -86,9 +86,12 @@ const FUNCTIONS: [Function; 30] = [
     ),
     (
         "fmi2GetDirectionalDerivative",
-        None,
-        |s| (API.directional_derivative)(s.component, null(), 0, null(), 0, null(), null_mut()),
-        ERROR,
+        Some(Call::GetDirectionalDerivative),
+        |s| {
+            let output = s.fmu.product.layout.outputs as u32;
+            (API.directional_derivative)(s.component, &output, 1, &0, 1, &1.0, &mut 0.0)
+        },
+        OK,
     ),
 ];
 

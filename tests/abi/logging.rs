@@ -96,11 +96,6 @@ fn excluded_functions_name_their_flag() {
         let refs = references.as_ptr();
         for (status, name, flag) in [
             (
-                (API.directional_derivative)(c, refs, 1, refs, 1, [1.0].as_ptr(), result.as_mut_ptr()),
-                "fmi2GetDirectionalDerivative",
-                "providesDirectionalDerivative is false",
-            ),
-            (
                 (API.set_input_derivatives)(c, refs, 1, order.as_ptr(), [1.0].as_ptr()),
                 "fmi2SetRealInputDerivatives",
                 "canInterpolateInputs is false",

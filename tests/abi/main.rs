@@ -13,12 +13,14 @@
 //! | `outputs` | lazy outputs of a filter, anchors, re-arming |
 //! | `times` | odd communication points and steps |
 //! | `plant` | inner steps, initial states, refusals |
+//! | `derivatives` | directional derivatives against differences, and what is refused |
 //! | `states` | snapshots: layout, lifetime, what is refused |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
 mod arguments;
+mod derivatives;
 mod exports;
 mod fmu;
 mod instantiate;

@@ -80,6 +80,15 @@ impl Exponent {
         -self.rate(deadline) * anchor * (e / anchor).powf(self.0)
     }
 
+    /// The derivatives of [`Self::floor`] by `anchor` and by `e`, in 1/s.
+    pub(super) fn floor_along(self, anchor: f64, deadline: f64, e: f64) -> [f64; 2] {
+        if e >= 0.0 {
+            return [0.0; 2];
+        }
+        let (rate, power) = (self.rate(deadline), (e / anchor).powf(self.0));
+        [-rate * (1.0 - self.0) * power, -rate * self.0 * power * anchor / e]
+    }
+
     /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e₀ < 0, `[e]`; 0 from T on.
     pub fn lower_bound(self, anchor: f64, deadline: f64, elapsed: f64) -> f64 {
         anchor * (1.0 - elapsed / deadline).max(0.0).powf(1.0 / (1.0 - self.0))

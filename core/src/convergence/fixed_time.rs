@@ -363,23 +363,27 @@ impl FixedTime {
     }
 
     /// The profile of the settings.
-    fn built_in(&self) -> &'static dyn Profile {
+    pub(super) fn built_in(&self) -> &'static dyn Profile {
         match self.settings.profile {
             ProfileKind::Hermite => &Hermite,
             ProfileKind::LowPeak => &LowPeak,
         }
     }
 
+    /// The profile in force.
+    pub(super) fn in_force(&self, state: &FixedTimeState) -> &dyn Profile {
+        match &self.own {
+            Some(own) if !state.fallback => &**own,
+            _ => self.built_in(),
+        }
+    }
+
     /// The profile in force and its derivatives, without the margin.
     pub(super) fn profile(&self, state: &FixedTimeState, elapsed: f64) -> Derivatives {
-        let anchor = &state.anchor[..self.n];
-        match &self.own {
-            Some(own) if !state.fallback && state.deadline > 0.0 => {
-                own.evaluate(anchor, state.deadline, elapsed)
-            }
-            _ if state.deadline > 0.0 => self.built_in().evaluate(anchor, state.deadline, elapsed),
-            _ => [0.0; MAX_RELATIVE_DEGREE + 1],
+        if state.deadline <= 0.0 {
+            return [0.0; MAX_RELATIVE_DEGREE + 1];
         }
+        self.in_force(state).evaluate(&state.anchor[..self.n], state.deadline, elapsed)
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.

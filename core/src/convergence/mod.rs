@@ -25,8 +25,10 @@ pub mod polynomial;
 pub mod profile;
 pub mod repeated_root;
 pub mod sampled;
+mod sensitivity;
 mod settings;
 pub mod stay;
 
 pub use fixed_time::{Demand, FixedTime, FixedTimeState, Phase, Refusal, Unmet};
+pub use sensitivity::DemandDerivative;
 pub use settings::{FixedTimeSettings, Infeasible, Method, ProfileKind};

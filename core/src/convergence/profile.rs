@@ -35,6 +35,13 @@ pub trait Profile {
     /// r⁽⁰⁾ … r⁽ⁿ⁾ at `elapsed` = τ ≥ 0 in s, from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
+
+    /// The derivative of what [`Self::evaluate`] gives, where the anchor (`anchor[0]`) moves along a direction
+    /// (`anchor[1]`); for [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not
+    /// know it.
+    fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
+        None
+    }
 }
 
 impl<F: Fn(&[f64], f64, f64) -> Derivatives> Profile for F {
@@ -50,6 +57,11 @@ pub struct Hermite;
 impl Profile for Hermite {
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
         HermiteProfile::new(anchor, deadline).evaluate(elapsed)
+    }
+
+    /// Linear in the anchor.
+    fn along(&self, [_, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
+        Some(self.evaluate(direction, deadline, elapsed))
     }
 }
 
@@ -91,6 +103,29 @@ impl Profile for LowPeak {
             _ => return Hermite.evaluate(anchor, deadline, elapsed),
         }
         r
+    }
+
+    /// Linear but for n = 2, where (B) gives A' (2A + 4w) = 2vv' − 4Aw'.
+    fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
+        let ([e, de], [e_along, de_along]) = (anchor, direction) else {
+            return Some(self.evaluate(direction, deadline, elapsed));
+        };
+        let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
+        if elapsed >= deadline {
+            return Some(r);
+        }
+        let s = elapsed / deadline;
+        let (v, v_along) = (de * deadline, de_along * deadline);
+        let (w, w_along) = (e + v / 2.0, e_along + v_along / 2.0);
+        let a = -2.0 * (w + w.hypot(v / 2.0).copysign(w));
+        let a_along = (2.0 * v * v_along - 4.0 * a * w_along) / (2.0 * a + 4.0 * w);
+        let values = if a != 0.0 && s < 0.5 - v / (2.0 * a) {
+            [e_along + s * (v_along + s * a_along / 2.0), v_along + s * a_along, a_along]
+        } else {
+            [-a_along * (1.0 - s) * (1.0 - s) / 2.0, a_along * (1.0 - s), -a_along]
+        };
+        (r[0], r[1], r[2]) = (values[0], values[1] / deadline, values[2] / (deadline * deadline));
+        Some(r)
     }
 }
 

@@ -237,6 +237,19 @@ pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
     4.0 * n as f64 * f64::EPSILON * size / (slope.abs() * deadline)
 }
 
+/// The derivative in 1/s of a simple root `rate` of (R) where the anchor `e` moves along `direction`; not
+/// finite at a double root.
+pub(super) fn rate_along(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
+    let (n, s) = (e.len(), rate * deadline);
+    let power = |k: usize| s.powi(k as i32) / factorial(k);
+    let y = |e: &[f64], j: usize| e[j] * deadline.powi(j as i32) / factorial(j);
+    let change: f64 = (0..n).map(|j| y(direction, j) * (0..n - j).map(power).sum::<f64>()).sum();
+    // R' = R − c_{n−1} T^{n−1}, and R = 0.
+    let slope: f64 = (0..n).map(|j| y(e, j) * power(n - 1 - j)).sum();
+    // dR/ds = Σ y_j E_{n−2−j} is that sum with the sign changed.
+    change / (slope * deadline)
+}
+
 /// y_j = e⁽ʲ⁾ Tʲ/j!, divided by the largest of them; `None` if that is 0 or not finite.
 fn scaled(e: &[f64], deadline: f64) -> Option<Stack> {
     let mut y = [0.0; MAX_RELATIVE_DEGREE];

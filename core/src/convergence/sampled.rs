@@ -68,22 +68,74 @@ impl SampledDemand {
 /// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
 /// `attenuation` as in [`SampledDemand`].
 pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
-    const PANELS: usize = 32;
-    let n = anchor.len();
-    let panel = deadline / PANELS as f64;
-    let at = |i: usize| profile.evaluate(anchor, deadline, panel * i as f64)[n];
+    // A profile of a few samples is followed on average only: its own size bounds what that can cost.
+    let (size, _) = size(anchor, deadline);
+    let loss = steepest(profile, anchor, deadline).slope.abs() * period / 2.0 * period / 4.0 / attenuation;
+    (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
+}
+
+/// Where a profile is steepest.
+struct Steepest {
+    /// The number of the panel.
+    panel: usize,
+    /// The mean slope of r⁽ⁿ⁾ over it.
+    slope: f64,
+}
+
+/// Parts of the deadline that are looked at.
+const PANELS: usize = 32;
+
+fn panel_start(deadline: f64, i: usize) -> f64 {
+    deadline / PANELS as f64 * i as f64
+}
+
+fn steepest(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Steepest {
+    let at = |i: usize| profile.evaluate(anchor, deadline, panel_start(deadline, i))[anchor.len()];
     // The last panel ends where r⁽ⁿ⁾ drops to zero.
-    let mut steepest: f64 = 0.0;
+    let mut steepest = Steepest { panel: 0, slope: 0.0 };
     let mut left = at(0);
-    for i in 1..PANELS {
-        let right = at(i);
-        steepest = steepest.max((right - left).abs() / panel);
+    for panel in 0..PANELS - 1 {
+        let right = at(panel + 1);
+        let slope = (right - left) / panel_start(deadline, 1);
+        if slope.abs() > steepest.slope.abs() {
+            steepest = Steepest { panel, slope };
+        }
         left = right;
     }
-    // A profile of a few samples is followed on average only: its own size bounds what that can cost.
-    let size = (0..n).fold(0.0, |m: f64, k| m.max((anchor[k] * deadline.powi(k as i32)).abs()));
-    let loss = steepest * period / 2.0 * period / 4.0 / attenuation;
-    (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
+    steepest
+}
+
+/// The largest |e⁽ᵏ⁾| Tᵏ, and its k.
+fn size(anchor: &[f64], deadline: f64) -> (f64, usize) {
+    let mut largest = (0.0, 0);
+    for (k, e) in anchor.iter().enumerate() {
+        let size = (e * deadline.powi(k as i32)).abs();
+        if size > largest.0 {
+            largest = (size, k);
+        }
+    }
+    largest
+}
+
+/// The derivative of [`margin`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); `None`
+/// where the profile does not know its own.
+pub(super) fn margin_along(
+    profile: &dyn Profile,
+    [anchor, direction]: [&[f64]; 2],
+    deadline: f64,
+    attenuation: f64,
+    period: f64,
+) -> Option<f64> {
+    let n = anchor.len();
+    let Steepest { panel, slope } = steepest(profile, anchor, deadline);
+    let at = |i: usize| Some(profile.along([anchor, direction], deadline, panel_start(deadline, i))?[n]);
+    let slope_along = (at(panel + 1)? - at(panel)?) * slope.signum() / panel_start(deadline, 1);
+    let (size, k) = size(anchor, deadline);
+    let size_along = anchor[k].signum() * direction[k] * deadline.powi(k as i32);
+    let per_slope = 2.0 * (period / 2.0 * period / 4.0 / attenuation);
+    let capped = slope.abs() * per_slope >= LARGEST_MARGIN * size;
+    let held = if capped { LARGEST_MARGIN * size_along } else { slope_along * per_slope };
+    Some(held + ROUND_OFF * size_along)
 }
 
 /// The largest margin that is taken for held inputs, as a part of the anchor's size.
@@ -98,6 +150,16 @@ fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
         rate.powi(order)
     } else {
         factorial(n - 1) * (rate * time_left).exp() / time_left.powi(order)
+    }
+}
+
+/// The derivative of [`attenuation`] by the rate.
+pub(super) fn attenuation_along(rate: f64, n: usize, time_left: f64) -> f64 {
+    let order = n as i32 - 1;
+    match n {
+        1 if rate > 0.0 => 0.0,
+        _ if rate > 0.0 => f64::from(order) * rate.powi(order - 1),
+        _ => time_left * attenuation(rate, n, time_left),
     }
 }
 

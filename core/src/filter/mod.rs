@@ -9,6 +9,7 @@ mod builder;
 mod channel;
 mod report;
 mod sampling;
+mod sensitivity;
 
 pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
@@ -18,6 +19,7 @@ use channel::Channel;
 pub use channel::{Begin, End, Strictness};
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
+pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 
 use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;

@@ -2,14 +2,17 @@
 //!
 //! `Taylor<Dual<M>, K>` holds the first `K` Taylor coefficients of a function of time, each with its
 //! exact derivative along `M` directions (here: the inputs). [`Response`] is the same where the first
-//! coefficient depends on none of them, at a fraction of the work. No finite differences anywhere.
+//! coefficient depends on none of them, at a fraction of the work; [`Tangent`] adds one direction to any of
+//! them. No finite differences anywhere.
 
 mod dual;
 mod response;
+mod tangent;
 mod taylor;
 
 pub use dual::Dual;
 pub use response::Response;
+pub use tangent::Tangent;
 pub use taylor::Taylor;
 
 /// The arithmetic that follows from `+ − × ÷` on two values and their `f64` mixtures.

@@ -13,13 +13,11 @@
 //! The error is the integrator's, O(s⁵) over [`SUBSTEPS`] substeps; (4) is the exact derivative of what
 //! is computed, so that Newton's method on it converges quadratically.
 
-use std::array::from_fn;
-
 use nalgebra::SVector;
 
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
-use crate::jet::{Dual, Taylor};
+use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
@@ -42,6 +40,15 @@ impl Ahead {
         value: [0.0; MAX_RELATIVE_DEGREE + 1],
         gradient: [[0.0; MAX_INPUTS]; MAX_RELATIVE_DEGREE + 1],
     };
+
+    /// Overwrites all with the derivatives of order 0, 1, …
+    fn write<const NU: usize>(&mut self, derivatives: impl Iterator<Item = Dual<NU>>) {
+        *self = Self::ZERO;
+        for (k, derivative) in derivatives.enumerate() {
+            self.value[k] = derivative.value;
+            self.gradient[k][..NU].copy_from_slice(&derivative.gradient);
+        }
+    }
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
@@ -76,12 +83,37 @@ where
     x
 }
 
+/// The series of h `duration` ≥ 0 seconds after `t` and `x` along the held input `u`, `K` = n + 1
+/// coefficients.
+fn series<P, B, S, const NX: usize, const NU: usize, const K: usize>(
+    (plant, barrier): (&P, &B),
+    (t, duration): (f64, f64),
+    x: &SVector<S, NX>,
+    u: &SVector<S, NU>,
+) -> Taylor<S, K>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+    S: Scalar,
+{
+    let x = flow(plant, x, u, duration, SUBSTEPS);
+    let held = SVector::<Taylor<S, K>, NU>::from_fn(|i, _| Taylor::constant(u[i]));
+    let mut series = SVector::<Taylor<S, K>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
+    for k in 0..K - 1 {
+        let dx = plant.derivative(&series, &held);
+        for i in 0..NX {
+            series[i].coefficients[k + 1] = dx[i].coefficients[k] * (1.0 / (k + 1) as f64);
+        }
+    }
+    barrier.value(Taylor::time(t + duration), &series)
+}
+
 /// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead;
 /// `K` = n + 1.
 pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     barrier: &B,
-    (t, duration): (f64, f64),
+    time: (f64, f64),
     x: &SVector<f64, NX>,
     u: &[f64],
     out: &mut Ahead,
@@ -91,20 +123,48 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
 {
     let u = SVector::<Dual<NU>, NU>::from_fn(|i, _| Dual::variable(u[i], i));
     let x = SVector::<Dual<NU>, NX>::from_fn(|i, _| Dual::from(x[i]));
-    let x = flow(plant, &x, &u, duration, SUBSTEPS);
-    let held = SVector::<Taylor<Dual<NU>, K>, NU>::from_fn(|i, _| Taylor::constant(u[i]));
-    let mut series = SVector::<Taylor<Dual<NU>, K>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
-    for k in 0..K - 1 {
-        let dx = plant.derivative(&series, &held);
-        for i in 0..NX {
-            series[i].coefficients[k + 1] = dx[i].coefficients[k] * (1.0 / (k + 1) as f64);
-        }
-    }
-    let h = barrier.value(Taylor::time(t + duration), &series);
-    let derivatives: [Dual<NU>; K] = from_fn(|k| h.derivative(k));
-    *out = Ahead::ZERO;
-    for (k, derivative) in derivatives.iter().enumerate() {
-        out.value[k] = derivative.value;
-        out.gradient[k][..NU].copy_from_slice(&derivative.gradient);
+    let h: Taylor<_, K> = series((plant, barrier), time, &x, &u);
+    out.write((0..K).map(|k| h.derivative(k)));
+}
+
+/// As [`evaluate`], the derivative of what that writes along the direction (`dx`, `du`) of state and input.
+pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usize>(
+    (plant, barrier): (&P, &B),
+    time: (f64, f64),
+    [x, dx]: [&[f64]; 2],
+    [u, du]: [&[f64]; 2],
+    out: &mut Ahead,
+) where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    type Second<const NU: usize> = Tangent<Dual<NU>>;
+    let u = SVector::<Second<NU>, NU>::from_fn(|i, _| Tangent {
+        value: Dual::variable(u[i], i),
+        along: Dual::from(du[i]),
+    });
+    let x = SVector::<Second<NU>, NX>::from_fn(|i, _| Tangent {
+        value: Dual::from(x[i]),
+        along: Dual::from(dx[i]),
+    });
+    let h: Taylor<_, K> = series((plant, barrier), time, &x, &u);
+    out.write((0..K).map(|k| h.derivative(k).along));
+}
+
+/// Moves `x` by `duration` ≥ 0 seconds under the held input `u`, and the direction `dx` with it.
+pub(super) fn predict_along<P, const NX: usize, const NU: usize>(
+    plant: &P,
+    x: &mut [f64],
+    dx: &mut [f64],
+    u: &[f64],
+    duration: f64,
+) where
+    P: ControlAffine<NX, NU>,
+{
+    let from = SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], along: dx[i] });
+    let held = SVector::<Tangent<f64>, NU>::from_fn(|i, _| Tangent::from(u[i]));
+    let to = flow(plant, &from, &held, duration, SUBSTEPS);
+    for i in 0..NX {
+        (x[i], dx[i]) = (to[i].value, to[i].along);
     }
 }

@@ -55,6 +55,36 @@ impl DerivativeSource for Embedded {
         self.source.ahead(t, &own[..self.picks.len()], u, duration, out)
     }
 
+    fn ahead_along(
+        &self,
+        t: f64,
+        state: [&[f64]; 2],
+        input: [&[f64]; 2],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> bool {
+        let mut own = [[0.0; MAX_PICKED]; 2];
+        for (own, all) in own.iter_mut().zip(state) {
+            self.picked(all, own);
+        }
+        let own = own.each_ref().map(|own| &own[..self.picks.len()]);
+        self.source.ahead_along(t, own, input, duration, out)
+    }
+
+    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
+        let mut own = [[0.0; MAX_PICKED]; 2];
+        for (own, all) in own.iter_mut().zip([&*x, &*dx]) {
+            self.picked(all, own);
+        }
+        let [own_x, own_dx] = &mut own;
+        let n = self.picks.len();
+        let known = self.source.predict_along(&mut own_x[..n], &mut own_dx[..n], u, duration);
+        for (i, &pick) in self.picks.iter().enumerate() {
+            (x[pick], dx[pick]) = (own_x[i], own_dx[i]);
+        }
+        known
+    }
+
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
         let mut own = [0.0; MAX_PICKED];
         self.picked(x, &mut own);

@@ -29,6 +29,7 @@ mod factors;
 mod interior_point;
 mod kkt;
 mod one_active;
+pub(crate) mod sensitivity;
 mod single_row;
 
 pub use kkt::Residuals;

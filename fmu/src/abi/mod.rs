@@ -273,6 +273,36 @@ unsafe extern "C" fn fmi2SetString(
     unsafe { guarded(component, "fmi2SetString", body) }
 }
 
+/// The derivative of outputs along a direction of inputs.
+///
+/// # Safety
+///
+/// See the module; `unknowns` and `result` have `unknown_count` elements, `knowns` and `seed` `known_count`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetDirectionalDerivative(
+    component: Component,
+    unknowns: *const ValueReference,
+    unknown_count: usize,
+    knowns: *const ValueReference,
+    known_count: usize,
+    seed: *const f64,
+    result: *mut f64,
+) -> Status {
+    let body = |handle: &mut Handle| {
+        // SAFETY: the caller's contract for arrays.
+        let unknowns = unsafe { slice("vUnknown_ref", unknowns, unknown_count) }?;
+        // SAFETY: the caller's contract for arrays.
+        let knowns = unsafe { slice("vKnown_ref", knowns, known_count) }?;
+        // SAFETY: the caller's contract for arrays.
+        let seed = unsafe { slice("dvKnown", seed, known_count) }?;
+        // SAFETY: the caller's contract for arrays.
+        let result = unsafe { slice_mut("dvUnknown", result, unknown_count) }?;
+        handle.instance.directional_derivative(unknowns, knowns, seed, result).map(|()| Status::Ok)
+    };
+    // SAFETY: the caller's contract for components.
+    unsafe { guarded(component, "fmi2GetDirectionalDerivative", body) }
+}
+
 /// Makes a communication step. The last argument is ignored: importers pass true while rolling back.
 ///
 /// # Safety

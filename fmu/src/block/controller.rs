@@ -1,7 +1,9 @@
 //! A nominal controller: from the state to what is wanted. Only waypoints remember anything, which is
 //! the present one.
 
+use punctual_core::jet::Tangent;
 use punctual_core::nominal::damping;
+use punctual_core::scalar::Scalar;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{
@@ -40,26 +42,27 @@ impl ControllerBlock {
     /// What is wanted at the inputs `x`: the state, and the goal behind it where that is an input. An
     /// input that is not finite gives what is not a number, which a filter or plant refuses by name;
     /// limits would make a number of it.
-    fn wanted(&self, x: &[f64], waypoint: usize) -> [f64; INPUTS] {
+    fn wanted<S: Scalar>(&self, x: impl Fn(usize) -> S, waypoint: usize) -> [S; INPUTS] {
         let c = &self.configuration;
-        if x.iter().any(|v| !v.is_finite()) {
-            return [f64::NAN; INPUTS];
+        if (0..self.layout.states).any(|i| !x(i).value().is_finite()) {
+            return [S::from(f64::NAN); INPUTS];
         }
         let states = c.plant.model.states().len();
         let goal = match c.controller {
             ControllerName::Damping => {
-                let mut u = [0.0; INPUTS];
+                let mut u = [S::zero(); INPUTS];
                 for &(state, input) in c.damped() {
-                    u[input] = damping(x[state], c.damping_gain());
+                    u[input] = damping(x(state), c.damping_gain());
                 }
                 return u;
             }
-            ControllerName::Heading if c.goal_input => [x[states], x[states + 1]],
-            ControllerName::Heading => c.goal.unwrap_or_default(),
-            ControllerName::Waypoints => c.points[waypoint],
+            ControllerName::Heading if c.goal_input => [x(states), x(states + 1)],
+            ControllerName::Heading => c.goal.unwrap_or_default().map(S::from),
+            ControllerName::Waypoints => c.points[waypoint].map(S::from),
         };
-        let heading = c.heading(goal);
-        let x = &[x[0], x[1], x[2], x[3]];
+        // Seen from the goal.
+        let heading = c.heading([0.0; 2]);
+        let x = &[x(0) - goal[0], x(1) - goal[1], x(2), x(3)];
         match (c.plant.model, c.plant.l_r) {
             (ModelName::PointMass, _) => heading.point_mass(x),
             (_, None) => heading.unicycle(x),
@@ -79,7 +82,7 @@ impl ControllerBlock {
     fn sample(&self, values: &mut Values) -> usize {
         let x = &values.reals[..self.layout.states];
         let waypoint = self.present(x);
-        let u = self.wanted(x, waypoint);
+        let u = self.wanted(|i| x[i], waypoint);
         self.write(values, waypoint, u);
         waypoint
     }
@@ -95,6 +98,23 @@ impl Block for ControllerBlock {
 
     fn output(&mut self, _t: f64, values: &mut Values) {
         self.sample(values);
+    }
+
+    fn differentiate(
+        &mut self,
+        _t: f64,
+        values: &Values,
+        direction: &[f64],
+        derivative: &mut [f64],
+    ) -> Result<(), String> {
+        let x = &values.reals[..self.layout.states];
+        let along = |i: usize| Tangent { value: x[i], along: direction[i] };
+        let u = self.wanted(along, self.present(x));
+        for (slot, u) in derivative[self.layout.outputs..].iter_mut().zip(u) {
+            // Where there is no value there is no derivative.
+            *slot = if u.value.is_finite() { u.along } else { u.value };
+        }
+        Ok(())
     }
 
     fn step(&mut self, _t: f64, _h: f64, values: &mut Values) -> Result<(), String> {

@@ -1,6 +1,6 @@
 //! A filter: samples its inputs, remembers its promises.
 
-use punctual_core::filter::{FilterState, SafetyFilter, Status};
+use punctual_core::filter::{FilterState, NoDerivative, SafetyFilter, SampleDerivative, Status};
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
@@ -17,6 +17,8 @@ pub(super) struct FilterBlock {
     kept: FilterState,
     /// Scratch: the safe input.
     u: Vec<f64>,
+    /// Scratch: the derivative of a sample.
+    change: SampleDerivative,
 }
 
 impl FilterBlock {
@@ -26,25 +28,36 @@ impl FilterBlock {
     ) -> Result<Self, ConfigurationError> {
         let (parameters, filter) = (configuration.parameters(), configuration.build()?);
         let (kept, u) = (filter.state().clone(), vec![0.0; layout.inputs]);
-        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, kept, u })
+        let change = SampleDerivative::default();
+        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, kept, u, change })
     }
 
     fn rearm_index(&self) -> usize {
         self.layout.states + self.layout.inputs
     }
 
-    /// One sample at `t`: with `commit` it is remembered, else only looked at.
-    fn sample(&mut self, t: f64, commit: bool, values: &mut Values) -> Result<(), String> {
-        let rearm = values.booleans[self.rearm_index()];
-        let rising = rearm && !self.rearm_seen;
+    /// State and reference in an array of all reals.
+    fn inputs<'a>(&self, reals: &'a [f64]) -> [&'a [f64]; 2] {
+        let (x, rest) = reals.split_at(self.layout.states);
+        [x, &rest[..self.layout.inputs]]
+    }
+
+    /// Re-arms where `values` has a rising edge; returns whether it did. What was is in `kept`.
+    fn rearm(&mut self, values: &Values) -> bool {
+        let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
             self.kept.clone_from(self.filter.state());
             self.filter.rearm();
         }
-        let (x, rest) = values.reals.split_at(self.layout.states);
-        let u_ref = &rest[..self.layout.inputs];
+        rising
+    }
+
+    /// One sample at `t`: with `commit` it is remembered, else only looked at.
+    fn sample(&mut self, t: f64, commit: bool, values: &mut Values) -> Result<(), String> {
+        let rising = self.rearm(values);
+        let [x, u_ref] = self.inputs(&values.reals);
         let done = if commit {
-            self.rearm_seen = rearm;
+            self.rearm_seen = values.booleans[self.rearm_index()];
             self.filter.step(t, x, u_ref, &mut self.u).map(|_| ())
         } else {
             let looked = self.filter.peek(t, x, u_ref, &mut self.u).map(|_| ());
@@ -56,6 +69,20 @@ impl FilterBlock {
         done.map_err(|e| e.to_string())?;
         self.write(values);
         Ok(())
+    }
+
+    /// Why there is no derivative, the barrier by its name.
+    fn named(&self, reason: NoDerivative) -> String {
+        let barrier = match reason {
+            NoDerivative::Source(i) | NoDerivative::Profile(i) | NoDerivative::Postponed(i) => {
+                self.filter.barrier_names().nth(i)
+            }
+            _ => None,
+        };
+        match barrier {
+            Some(name) => format!("no derivative at this sample: {reason} ({name})"),
+            None => format!("no derivative at this sample: {reason}"),
+        }
     }
 
     /// Writes the last sample to the outputs, in the order of the variable table.
@@ -94,6 +121,36 @@ impl Block for FilterBlock {
         debug_assert!(sampled.is_ok(), "{sampled:?}");
     }
 
+    fn differentiate(
+        &mut self,
+        t: f64,
+        values: &Values,
+        direction: &[f64],
+        derivative: &mut [f64],
+    ) -> Result<(), String> {
+        let rising = self.rearm(values);
+        let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
+        let unknown = self.filter.differentiate(t, [x, dx], [u_ref, du_ref], &mut self.change);
+        if rising {
+            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
+        }
+        if let Some(reason) = unknown.map_err(|e| e.to_string())? {
+            return Err(self.named(reason));
+        }
+        let mut at = self.layout.outputs;
+        let inputs = self.layout.inputs;
+        derivative[at..][..inputs].copy_from_slice(&self.change.u[..inputs]);
+        // `status` is in between.
+        at += inputs + 1;
+        for b in &self.change.barriers {
+            // The time left does not depend on the inputs.
+            let reals = [b.h, b.profile, 0.0, b.slack, b.margin, b.sampling_loss];
+            derivative[at..][..6].copy_from_slice(&reals);
+            at += BARRIER_OUTPUTS;
+        }
+        Ok(())
+    }
+
     fn step(&mut self, t: f64, _h: f64, values: &mut Values) -> Result<(), String> {
         self.sample(t, true, values)
     }
@@ -108,6 +165,7 @@ impl Block for FilterBlock {
             layout: _,
             kept: _,
             u: _,
+            change: _,
         } = self;
         match state {
             BlockState::Filter { rearm_seen, filter } => {

@@ -94,6 +94,21 @@ pub trait Block: Send {
     /// Writes the outputs that belong to the inputs at time `t` (s), remembering nothing.
     fn output(&mut self, t: f64, values: &mut Values);
 
+    /// Writes to `derivative` how the real outputs that [`Self::output`] would write change along `direction`,
+    /// which has a number for every real input; both at the indices of the variables. `derivative` comes as
+    /// zeros; nothing is remembered.
+    ///
+    /// # Errors
+    ///
+    /// Why the derivative is not known.
+    fn differentiate(
+        &mut self,
+        t: f64,
+        values: &Values,
+        direction: &[f64],
+        derivative: &mut [f64],
+    ) -> Result<(), String>;
+
     /// Makes the step from `t` to `t + h` (s; h ≥ 0, both finite) and writes the outputs after it.
     ///
     /// # Errors

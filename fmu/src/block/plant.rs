@@ -43,6 +43,17 @@ impl Block for PlantBlock {
         values.reals[self.layout.outputs..][..self.layout.states].copy_from_slice(&self.x);
     }
 
+    /// The state does not depend on the inputs before a step.
+    fn differentiate(
+        &mut self,
+        _t: f64,
+        _values: &Values,
+        _direction: &[f64],
+        _derivative: &mut [f64],
+    ) -> Result<(), String> {
+        Ok(())
+    }
+
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
         let u = &values.reals[..self.layout.inputs];
         if let Some(i) = u.iter().position(|v| !v.is_finite()) {

@@ -62,10 +62,13 @@ fn every_product_has_a_valid_model_description() {
         for (flag, there) in [
             ("canGetAndSetFMUstate", true),
             ("canSerializeFMUstate", true),
-            ("providesDirectionalDerivative", false),
+            ("providesDirectionalDerivative", true),
+            ("canInterpolateInputs", false),
+            ("canRunAsynchronuously", false),
         ] {
             assert_eq!(xml.contains(&format!("{flag}=\"true\"")), there, "{name}: {flag}");
         }
+        assert!(!xml.contains("maxOutputDerivativeOrder"), "{name}: 0, its default");
     }
 }
 

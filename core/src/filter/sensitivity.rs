@@ -1,0 +1,448 @@
+//! How the input that a filter returns changes with the state and the input wanted.
+//!
+//! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds, G_i the row i: affine in u
+//! for the pointwise constraint, not where it is enforced over the period. With the active ones A, their
+//! multipliers λ and a prime for the derivative along the direction (x', u_ref'),
+//!
+//! ```text
+//! u' − Σ_{i∈A} (λ_i' ∇_u G_i + λ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
+//! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
+//! ```
+//!
+//! by the implicit function theorem. A bound that holds u_j has u_j' = 0. A soft row at its largest
+//! multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
+//! direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
+//! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
+//!
+//! # References
+//!
+//! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
+//! Press 1983, theorem 3.2.2.
+
+use std::fmt;
+
+use super::{FixedTimeState, Phase, SafetyFilter, Status};
+use crate::convergence::DemandDerivative;
+use crate::convergence::sampled::SampledDemand;
+use crate::error::{Error, finite, length};
+use crate::lie::{Ahead, Derivatives};
+use crate::qp::sensitivity::Equations;
+use crate::qp::{self, Constraint, Enforcement, Problem, Solver, dot};
+use crate::{MAX_INPUTS, MAX_ROWS};
+
+/// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleDerivative {
+    /// Of the returned input, unit of u over that of the direction; zeros above the number of inputs.
+    pub u: [f64; MAX_INPUTS],
+    /// In the order of the barriers.
+    pub barriers: Vec<BarrierDerivative>,
+    /// State, direction and zeros.
+    scratch: [Vec<f64>; 3],
+}
+
+/// The derivative of what of a [`BarrierReport`](super::BarrierReport) varies continuously; its time left does not vary with
+/// the direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BarrierDerivative {
+    /// Of [`BarrierReport::h`](super::BarrierReport::h).
+    pub h: f64,
+    /// Of [`BarrierReport::profile`](super::BarrierReport::profile).
+    pub profile: f64,
+    /// Of [`BarrierReport::margin`](super::BarrierReport::margin).
+    pub margin: f64,
+    /// Of [`BarrierReport::slack`](super::BarrierReport::slack).
+    pub slack: f64,
+    /// Of [`BarrierReport::sampling_loss`](super::BarrierReport::sampling_loss).
+    pub sampling_loss: f64,
+}
+
+/// Why a derivative is not known. The number is that of the barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NoDerivative {
+    /// Its [`DerivativeSource`](crate::lie::DerivativeSource) does not give derivatives along a direction.
+    Source(usize),
+    /// Its promise is anchored at this sample along a profile of one's own that does not give its
+    /// [derivative](crate::convergence::profile::Profile::along).
+    Profile(usize),
+    /// Its deadline is given up at this sample for a later one, which a search found.
+    Postponed(usize),
+    /// The search over the period ended more than 1e-3 of its size (1e-6 where the rows are not met) away from
+    /// the input that is nearest to u_ref on the rows linearised there.
+    NotConverged,
+    /// The active rows do not determine the change of the input.
+    Dependent,
+}
+
+impl fmt::Display for NoDerivative {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source(i) => write!(f, "the source of barrier {i} gives no derivatives along a direction"),
+            Self::Profile(i) => write!(f, "the profile of barrier {i} gives no derivative by its anchor"),
+            Self::Postponed(i) => write!(f, "the deadline of barrier {i} is given up at this sample"),
+            Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
+            Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
+        }
+    }
+}
+
+impl std::error::Error for NoDerivative {}
+
+/// How one row moves.
+#[derive(Clone, Copy)]
+struct Motion {
+    /// The slack at a fixed u.
+    slack: f64,
+    /// The normal.
+    normal: [f64; MAX_INPUTS],
+    /// The same of the pointwise slack, and its normal.
+    pointwise: f64,
+    pointwise_normal: [f64; MAX_INPUTS],
+    /// Of the loss per pointwise slack.
+    attenuation: f64,
+}
+
+impl Motion {
+    const NONE: Self = Self {
+        slack: 0.0,
+        normal: [0.0; MAX_INPUTS],
+        pointwise: 0.0,
+        pointwise_normal: [0.0; MAX_INPUTS],
+        attenuation: 0.0,
+    };
+}
+
+/// How far, as a part of its size, the input may be from the answer to the rows linearised at it: round-off,
+/// but where Newton's method ran into its limit of iterations, some of 100 samples. The derivative is then in
+/// error by a number of that order.
+const SAME_INPUT: f64 = 1e-3;
+
+/// The same where the rows are not met, which says that the search got stuck.
+const SAME_INPUT_UNMET: f64 = 1e-6;
+
+/// A multiplier from this part of its largest on is at it.
+const SATURATED: f64 = 1.0 - 1e-9;
+
+impl SafetyFilter {
+    /// Computes how what [`Self::peek`] returns changes along a direction: where `state` is x and its
+    /// direction, `reference` is u_ref and its direction. Remembers nothing; the report is that of the sample.
+    ///
+    /// Exact for the piece in force. The input is a piecewise smooth function: where rows, bounds, a phase
+    /// or the better of two searches change, it has a kink or a jump, and this is the derivative of the piece
+    /// that the sample was computed on. By status:
+    ///
+    /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
+    ///   in components that a bound holds.
+    /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and
+    ///   [`Degenerate`](Status::Degenerate): (8) with the active rows, those that hold back a row that cannot be
+    ///   met among them; rows given up or left out take no part. A single row that cannot be met: 0 in the
+    ///   components at their bounds, the direction of u_ref in the others.
+    /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
+    ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
+    ///
+    /// Does not allocate where `out` has been used with this filter before. Where the answer is not `None`, the
+    /// derivative is not known and `out` means nothing.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a direction that is not finite.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// let mut filter = SafetyFilter::builder(4, 2)
+    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .build()?;
+    /// let mut derivative = SampleDerivative::default();
+    /// // Wanted sideways: the row, which is on the x axis, lets it pass. Wanted forwards: it makes up for it.
+    /// for (direction, wanted) in [([0.0, 1.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.0])] {
+    ///     let unknown =
+    ///         filter.differentiate(0.0, [&[0.0; 4], &[0.0; 4]], [&[0.0; 2], &direction], &mut derivative)?;
+    ///     assert_eq!(unknown, None);
+    ///     assert!((0..2).all(|i| (derivative.u[i] - wanted[i]).abs() < 1e-4));
+    /// }
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    pub fn differentiate(
+        &mut self,
+        t: f64,
+        [x, dx]: [&[f64]; 2],
+        [u_ref, du_ref]: [&[f64]; 2],
+        out: &mut SampleDerivative,
+    ) -> Result<Option<NoDerivative>, Error> {
+        for (name, direction, len) in [("dx", dx, self.state_dim), ("du_ref", du_ref, self.input_dim)] {
+            length(name, direction.len(), len)?;
+            if let Some(i) = direction.iter().position(|v| !v.is_finite()) {
+                finite(&format!("{name}[{}]", i + 1), direction[i])?;
+            }
+        }
+        let mut u = [0.0; MAX_INPUTS];
+        let u = &mut u[..self.input_dim];
+        self.peek(t, x, u_ref, u)?;
+        out.u = [0.0; MAX_INPUTS];
+        out.barriers.clear();
+        out.barriers.resize(self.channels.len(), BarrierDerivative::default());
+        let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
+        if constant.contains(&self.report().status) {
+            return Ok(None);
+        }
+        Ok(self.along(t, [x, dx], [u_ref, du_ref], u, out).err())
+    }
+
+    fn along(
+        &self,
+        t: f64,
+        state: [&[f64]; 2],
+        [u_ref, du_ref]: [&[f64]; 2],
+        u: &[f64],
+        out: &mut SampleDerivative,
+    ) -> Result<(), NoDerivative> {
+        let SampleDerivative { u: du, barriers, scratch } = out;
+        let du = &mut du[..u.len()];
+        scratch[2].clear();
+        scratch[2].resize(self.state_dim, 0.0);
+        let mut motions = [Motion::NONE; MAX_ROWS];
+        for (i, motion) in motions[..self.channels.len()].iter_mut().enumerate() {
+            (*motion, barriers[i]) = self.motion(i, t, state, u, scratch)?;
+        }
+
+        // The active rows of the sample, whichever method found it.
+        let workspace = &self.workspace;
+        let (rows, enforcement, report) = (&workspace.rows, &workspace.enforcement, &workspace.report);
+        let limit = self.correction_limit;
+        let problem = Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) };
+        let mut programme = qp::Workspace::default();
+        let mut again = [0.0; MAX_INPUTS];
+        let again = &mut again[..u.len()];
+        for (i, v) in again.iter_mut().enumerate() {
+            *v = self.bounds.clamp(i, u_ref[i]);
+        }
+        if !matches!(report.solver, Solver::Unchanged) && report.status != Status::SolverFailed {
+            programme.solve(&problem, again);
+        }
+        let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
+        let same = if report.status.is_satisfied() { SAME_INPUT } else { SAME_INPUT_UNMET };
+        if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
+            return Err(NoDerivative::NotConverged);
+        }
+        let active = programme.active();
+        if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
+            let mut equations = Equations::new(du_ref);
+            for active in active {
+                let mut normal = [0.0; MAX_INPUTS];
+                let held = match active.constraint {
+                    Constraint::Lower(i) | Constraint::Upper(i) => {
+                        normal[i] = 1.0;
+                        equations.hold(&normal, 0.0)
+                    }
+                    Constraint::Row(k) => {
+                        let motion = &motions[k];
+                        let curvature = self.curvature(k, t, state[0], u, scratch)?;
+                        let row = &rows[k].normal;
+                        match enforcement[k] {
+                            Enforcement::Soft { penalty }
+                                if is_saturated(row, active.multiplier, penalty) =>
+                            {
+                                pull_saturated(&mut equations, row, penalty, motion, &curvature);
+                                true
+                            }
+                            _ => {
+                                let by = active.multiplier;
+                                let curvature = curvature.map(|row| row.map(|c| by * c));
+                                equations.pull(&motion.normal.map(|a| by * a), &curvature);
+                                equations.hold(row, -motion.slack)
+                            }
+                        }
+                    }
+                };
+                if !held {
+                    return Err(NoDerivative::Dependent);
+                }
+            }
+            if !equations.solve(du) {
+                return Err(NoDerivative::Dependent);
+            }
+        } else {
+            for i in 0..du.len() {
+                du[i] = if again[i] == u_ref[i] { du_ref[i] } else { 0.0 };
+            }
+        }
+
+        for (i, (b, motion)) in barriers.iter_mut().zip(&motions).enumerate() {
+            b.slack = motion.slack + dot(&rows[i].normal, du);
+            let loss = report.barriers[i].sampling_loss;
+            if loss > 0.0 {
+                let demand = &workspace.demands[i];
+                let pointwise = motion.pointwise + dot(&motion.pointwise_normal, du);
+                b.sampling_loss = -pointwise * report.period / 4.0 / demand.attenuation
+                    - loss * motion.attenuation / demand.attenuation;
+            }
+        }
+        Ok(())
+    }
+
+    /// The state from which barrier `i` is held, and its direction, in `scratch`.
+    fn begin(&self, i: usize, [x, dx]: [&[f64]; 2], scratch: &mut [Vec<f64>; 3]) -> Result<(), NoDerivative> {
+        let [from, along, _] = scratch;
+        from.clear();
+        from.extend_from_slice(x);
+        along.clear();
+        along.extend_from_slice(dx);
+        let acting = self.acting();
+        let known = self.delay <= 0.0
+            || self.channels[i].source.predict_along(from, along, &acting[..self.input_dim], self.delay);
+        if known { Ok(()) } else { Err(NoDerivative::Source(i)) }
+    }
+
+    /// How row `i` and what is reported of its barrier move at the fixed input `u`.
+    fn motion(
+        &self,
+        i: usize,
+        t: f64,
+        state: [&[f64]; 2],
+        u: &[f64],
+        scratch: &mut [Vec<f64>; 3],
+    ) -> Result<(Motion, BarrierDerivative), NoDerivative> {
+        let (channel, workspace) = (&self.channels[i], &self.workspace);
+        let held = [u, &[0.0; MAX_INPUTS][..u.len()]];
+        let mut change = Ahead::ZERO;
+        if !channel.source.ahead_along(t, state, held, 0.0, &mut change) {
+            return Err(NoDerivative::Source(i));
+        }
+        let mut derivative = BarrierDerivative { h: change.value[0], ..BarrierDerivative::default() };
+        let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
+        if matches!(promise.phase, Phase::Waiting | Phase::Released) {
+            return Ok((Motion::NONE, derivative));
+        }
+        if promise.postponed != before.postponed {
+            return Err(NoDerivative::Postponed(i));
+        }
+        let begin = t + self.delay;
+        self.begin(i, state, scratch)?;
+        let [from, along, _] = &*scratch;
+        if self.delay > 0.0 && !channel.source.ahead_along(begin, [from, along], held, 0.0, &mut change) {
+            return Err(NoDerivative::Source(i));
+        }
+        let n = channel.source.relative_degree();
+        let mut now = Derivatives::ZERO;
+        channel.source.evaluate(begin, from, &mut now);
+        let period = workspace.report.predicted.then_some(workspace.report.period);
+        let anchors = is_anchored(before, promise, begin);
+        let stack = [&now.drift[..n], &change.value[..n]];
+        let DemandDerivative { floor, profile, margin, sampled } = channel
+            .promise
+            .differentiate(promise, anchors, begin, stack, period)
+            .ok_or(NoDerivative::Profile(i))?;
+        (derivative.profile, derivative.margin) = (profile, margin);
+        let pointwise = change.value[n] - floor;
+        let mut motion = Motion {
+            slack: pointwise,
+            normal: change.gradient[n],
+            pointwise,
+            pointwise_normal: now.row,
+            attenuation: sampled.attenuation,
+        };
+        if let Some(period) = period {
+            let mut ahead = Ahead::ZERO;
+            let known = channel.source.ahead(begin, from, u, period, &mut ahead)
+                && channel.source.ahead_along(begin, [from, along], held, period, &mut change);
+            if !known {
+                return Err(NoDerivative::Source(i));
+            }
+            let demand = &workspace.demands[i];
+            let (value, normal) = weighted(demand, &change, n, period);
+            let (by_weights, normal_by_weights) = weighted(&sampled, &ahead, n, period);
+            motion.slack = value + by_weights - sampled.floor / period;
+            for (slot, (a, b)) in motion.normal.iter_mut().zip(normal.iter().zip(&normal_by_weights)) {
+                *slot = a + b;
+            }
+        }
+        Ok((motion, derivative))
+    }
+
+    /// The derivative of row `k`'s normal by u: `[i][j]` of its component i by u_j.
+    fn curvature(
+        &self,
+        k: usize,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        scratch: &mut [Vec<f64>; 3],
+    ) -> Result<[[f64; MAX_INPUTS]; MAX_INPUTS], NoDerivative> {
+        let mut curvature = [[0.0; MAX_INPUTS]; MAX_INPUTS];
+        let report = &self.workspace.report;
+        if !report.predicted {
+            return Ok(curvature);
+        }
+        let (source, demand) = (&self.channels[k].source, &self.workspace.demands[k]);
+        let [from, _, zeros] = scratch;
+        from.clear();
+        from.extend_from_slice(x);
+        if self.delay > 0.0 {
+            source.predict(from, &self.acting()[..u.len()], self.delay);
+        }
+        let mut change = Ahead::ZERO;
+        for j in 0..u.len() {
+            let mut direction = [0.0; MAX_INPUTS];
+            direction[j] = 1.0;
+            let held = [u, &direction[..u.len()]];
+            if !source.ahead_along(t + self.delay, [from, zeros], held, report.period, &mut change) {
+                return Err(NoDerivative::Source(k));
+            }
+            let (_, normal) = weighted(demand, &change, source.relative_degree(), report.period);
+            for i in 0..u.len() {
+                curvature[i][j] = normal[i];
+            }
+        }
+        Ok(curvature)
+    }
+}
+
+/// Whether the sample at `begin` anchored the promise.
+fn is_anchored(before: &FixedTimeState, after: &FixedTimeState, begin: f64) -> bool {
+    after.anchor_time == begin && (before.phase == Phase::Waiting || before.recoveries != after.recoveries)
+}
+
+/// Whether a soft row has its largest multiplier.
+fn is_saturated(normal: &[f64; MAX_INPUTS], multiplier: f64, penalty: f64) -> bool {
+    multiplier * dot(normal, normal).sqrt() >= SATURATED * penalty
+}
+
+/// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖ where
+/// n = a/‖a‖.
+fn pull_saturated(
+    equations: &mut Equations,
+    row: &[f64; MAX_INPUTS],
+    penalty: f64,
+    motion: &Motion,
+    curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS],
+) {
+    let square = dot(row, row);
+    let by = penalty / square.sqrt();
+    let turned = |a: &[f64; MAX_INPUTS]| {
+        let inside = dot(row, a) / square;
+        std::array::from_fn(|i| by * (a[i] - inside * row[i]))
+    };
+    let mut pull = [[0.0; MAX_INPUTS]; MAX_INPUTS];
+    for j in 0..MAX_INPUTS {
+        let column: [f64; MAX_INPUTS] = turned(&std::array::from_fn(|i| curvature[i][j]));
+        for i in 0..MAX_INPUTS {
+            pull[i][j] = column[i];
+        }
+    }
+    let change: [f64; MAX_INPUTS] = turned(&motion.normal);
+    equations.pull(&change, &pull);
+}
+
+/// The sampled row's value and normal, from derivatives at the end of the period.
+fn weighted(demand: &SampledDemand, ahead: &Ahead, n: usize, period: f64) -> (f64, [f64; MAX_INPUTS]) {
+    let (mut value, mut normal) = (0.0, [0.0; MAX_INPUTS]);
+    for k in 0..n {
+        let weight = demand.weights[k] / period;
+        value += weight * ahead.value[k];
+        for (a, d) in normal.iter_mut().zip(&ahead.gradient[k]) {
+            *a += weight * d;
+        }
+    }
+    (value, normal)
+}

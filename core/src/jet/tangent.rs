@@ -1,0 +1,191 @@
+//! Numbers of any kind with their derivative along one direction.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::derived_operators;
+use crate::scalar::Scalar;
+
+/// `v + d ε` with `ε² = 0` over any scalar: with a [`Dual`](super::Dual) inside, the gradient and its
+/// derivative along a further direction, which is what second derivatives are made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangent<C> {
+    /// The value.
+    pub value: C,
+    /// Its derivative along the direction.
+    pub along: C,
+}
+
+impl<C: Scalar> Tangent<C> {
+    /// `φ(self)` from `φ`'s value and slope at `self.value` (the chain rule).
+    #[inline]
+    fn chain(self, value: C, slope: C) -> Self {
+        Self { value, along: self.along * slope }
+    }
+}
+
+impl<C: Scalar> From<f64> for Tangent<C> {
+    #[inline]
+    fn from(value: f64) -> Self {
+        Self { value: C::from(value), along: C::zero() }
+    }
+}
+
+impl<C: Scalar> Neg for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { value: -self.value, along: -self.along }
+    }
+}
+
+impl<C: Scalar> Add for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { value: self.value + other.value, along: self.along + other.along }
+    }
+}
+
+impl<C: Scalar> Sub for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self { value: self.value - other.value, along: self.along - other.along }
+    }
+}
+
+impl<C: Scalar> Mul for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        Self { value: self.value * other.value, along: self.along * other.value + self.value * other.along }
+    }
+}
+
+impl<C: Scalar> Div for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        Self { value, along: (self.along - value * other.along) / other.value }
+    }
+}
+
+impl<C: Scalar> Add<f64> for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: f64) -> Self {
+        Self { value: self.value + other, ..self }
+    }
+}
+
+impl<C: Scalar> Sub<f64> for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: f64) -> Self {
+        Self { value: self.value - other, ..self }
+    }
+}
+
+impl<C: Scalar> Mul<f64> for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: f64) -> Self {
+        Self { value: self.value * other, along: self.along * other }
+    }
+}
+
+impl<C: Scalar> Div<f64> for Tangent<C> {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: f64) -> Self {
+        Self { value: self.value / other, along: self.along / other }
+    }
+}
+
+derived_operators!([C: Scalar] Tangent<C>);
+
+impl<C: Scalar> Scalar for Tangent<C> {
+    #[inline]
+    fn value(self) -> f64 {
+        self.value.value()
+    }
+    #[inline]
+    fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        self.chain(root, C::from(0.5) / root)
+    }
+    #[inline]
+    fn exp(self) -> Self {
+        let value = self.value.exp();
+        self.chain(value, value)
+    }
+    #[inline]
+    fn ln(self) -> Self {
+        self.chain(self.value.ln(), C::one() / self.value)
+    }
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+    #[inline]
+    fn atan(self) -> Self {
+        self.chain(self.value.atan(), C::one() / (self.value.squared() + 1.0))
+    }
+    #[inline]
+    fn powf(self, exponent: f64) -> Self {
+        self.chain(self.value.powf(exponent), self.value.powf(exponent - 1.0) * exponent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jet::Dual;
+
+    /// Every operation, at arguments where all are smooth.
+    fn operations<S: Scalar>(a: S, b: S) -> [S; 10] {
+        let (sin, cos) = a.sin_cos();
+        [
+            a * b - a / b,
+            (-a) / 3.0 + 1.0,
+            (b * 2.0 - 0.5).squared(),
+            a.sqrt(),
+            (a - b).exp(),
+            b.ln(),
+            sin * b,
+            cos.atan(),
+            a.powf(1.7),
+            b.powi(-3),
+        ]
+    }
+
+    /// On plain numbers it is a dual number of one direction; over dual numbers, second derivatives are
+    /// symmetric.
+    #[test]
+    fn first_derivatives_agree_and_second_ones_are_symmetric() {
+        let (a, b) = (0.7, 1.3);
+        let plain = |value, along| Tangent { value, along };
+        let dual = |value, along| Dual { value, gradient: [along] };
+        let found = operations(plain(a, 0.4), plain(b, -0.2));
+        let wanted = operations(dual(a, 0.4), dual(b, -0.2));
+        for (i, (found, wanted)) in found.iter().zip(wanted).enumerate() {
+            assert_eq!(found.value, wanted.value, "operation {i}");
+            // Of order 1, computed in another order.
+            assert!((found.along - wanted.gradient[0]).abs() < 1e-14, "operation {i}");
+        }
+        // The directions p and q, each inside and outside.
+        let (p, q) = ([0.4, -0.2], [0.1, 0.6]);
+        let both = |inner: [f64; 2], outer: [f64; 2]| {
+            let number = |v: f64, i: usize| Tangent {
+                value: Dual { value: v, gradient: [inner[i]] },
+                along: Dual { value: outer[i], gradient: [0.0] },
+            };
+            operations(number(a, 0), number(b, 1)).map(|s| s.along.gradient[0])
+        };
+        for (i, (pq, qp)) in both(p, q).into_iter().zip(both(q, p)).enumerate() {
+            assert!((pq - qp).abs() < 1e-13 && pq.is_finite(), "operation {i}: {pq} {qp}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! How the solution of a programme moves: one linear system.
+//!
+//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Along a
+//! direction in which everything they are made of moves, with the multipliers' change μ,
+//!
+//! ```text
+//! H u' − Aᵀ μ = c,   A u' = d,                                                            (7)
+//! ```
+//!
+//! H the Hessian of the Lagrangian, c what moves its gradient and d what moves the constraints, at a fixed u.
+//!
+//! # References
+//!
+//! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
+//! Press 1983, theorem 3.2.2.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::dot;
+use crate::MAX_INPUTS;
+
+const SIZE: usize = 2 * MAX_INPUTS;
+
+/// The equations (7), for one direction.
+pub(crate) struct Equations {
+    inputs: usize,
+    rows: usize,
+    matrix: SMatrix<f64, SIZE, SIZE>,
+    right: SVector<f64, SIZE>,
+}
+
+impl Equations {
+    /// For the gradient u − r, where r moves along `direction`: H is the identity, and nothing is active.
+    pub(crate) fn new(direction: &[f64]) -> Self {
+        let mut right = SVector::<f64, SIZE>::zeros();
+        right.as_mut_slice()[..direction.len()].copy_from_slice(direction);
+        // What is not used stays the identity.
+        Self { inputs: direction.len(), rows: 0, matrix: SMatrix::identity(), right }
+    }
+
+    /// Adds a part −λ a(u) of the gradient: `change` is how λ a moves at a fixed u, `curvature[i][j]` the
+    /// derivative of its component i by u_j.
+    pub(crate) fn pull(&mut self, change: &[f64], curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS]) {
+        for i in 0..self.inputs {
+            self.right[i] += change[i];
+            for j in 0..self.inputs {
+                self.matrix[(i, j)] -= curvature[i][j];
+            }
+        }
+    }
+
+    /// Adds an active constraint: u' along `normal` is `change`. Returns false where there are more than inputs.
+    #[must_use]
+    pub(crate) fn hold(&mut self, normal: &[f64; MAX_INPUTS], change: f64) -> bool {
+        if self.rows == self.inputs {
+            return false;
+        }
+        let row = MAX_INPUTS + self.rows;
+        let norm = dot(normal, normal).sqrt();
+        for j in 0..self.inputs {
+            let component = normal[j] / norm;
+            self.matrix[(row, j)] = component;
+            self.matrix[(j, row)] = -component;
+        }
+        self.matrix[(row, row)] = 0.0;
+        self.right[row] = change / norm;
+        self.rows += 1;
+        true
+    }
+
+    /// Writes u'; false where the equations do not determine it.
+    #[must_use]
+    pub(crate) fn solve(mut self, out: &mut [f64]) -> bool {
+        let solved = self.matrix.lu().solve_mut(&mut self.right);
+        out.copy_from_slice(&self.right.as_slice()[..self.inputs]);
+        solved && self.right.iter().all(|v| v.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn normal(of: &[f64]) -> [f64; MAX_INPUTS] {
+        let mut normal = [0.0; MAX_INPUTS];
+        normal[..of.len()].copy_from_slice(of);
+        normal
+    }
+
+    /// The nearest point of a line that turns, and of a circle that grows, in closed form.
+    #[test]
+    fn nearest_points_move_as_geometry_says() {
+        // On (cos φ, sin φ)ᵀu = 1 from r = 0: u = (cos φ, sin φ), λ = 1; φ moves by 1 at φ = 0.
+        let mut turning = Equations::new(&[0.0, 0.0]);
+        turning.pull(&[0.0, 1.0], &[[0.0; MAX_INPUTS]; MAX_INPUTS]);
+        assert!(turning.hold(&normal(&[1.0, 0.0]), 0.0));
+        let mut u = [0.0; 2];
+        assert!(turning.solve(&mut u));
+        assert_eq!(u, [0.0, 1.0]);
+        // On ½‖u‖² = ½ from r = (3, 0), which moves by (0, 1): u = r/‖r‖ moves by (0, ⅓). λ = −2.
+        let mut circle = Equations::new(&[0.0, 1.0]);
+        let mut curvature = [[0.0; MAX_INPUTS]; MAX_INPUTS];
+        (curvature[0][0], curvature[1][1]) = (-2.0, -2.0);
+        circle.pull(&[0.0, 0.0], &curvature);
+        assert!(circle.hold(&normal(&[1.0, 0.0]), 0.0));
+        assert!(circle.solve(&mut u));
+        assert!((u[0]).abs() < 1e-15 && (u[1] - 1.0 / 3.0).abs() < 1e-15, "{u:?}");
+    }
+
+    #[test]
+    fn dependent_constraints_are_refused() {
+        let mut equations = Equations::new(&[0.0, 1.0]);
+        assert!(equations.hold(&normal(&[1.0, 1.0]), 0.0) && equations.hold(&normal(&[2.0, 2.0]), 1.0));
+        assert!(!equations.hold(&normal(&[1.0, 0.0]), 0.0), "more than inputs");
+        assert!(!equations.solve(&mut [0.0; 2]));
+    }
+}

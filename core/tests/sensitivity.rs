@@ -1,0 +1,351 @@
+//! The derivative of a sample against central differences of the sample itself.
+
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, QuadraticDisc, StateBound};
+use punctual_core::convergence::first_order::Exponent;
+use punctual_core::dynamics::{ControlAffine, WithPoint};
+use punctual_core::filter::{
+    BarrierSettings, FilterBuilder, Infeasible, Method, NoDerivative, Phase, ProfileKind, SafetyFilter,
+    SampleDerivative, Sampling, Status, Strictness,
+};
+use punctual_core::lie::{DerivativeSource, Derivatives};
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
+
+/// Step of the differences, in units of x and u of order 1 to 10.
+const STEP: f64 = 1e-4;
+
+/// Of a derivative of size 1. Newton's method on the rows stops at 1e-9 of their terms, some 10 to 100, and
+/// STEP divides that; the remainder of the differences is of order STEP².
+const TOLERANCE: f64 = 1e-3;
+
+/// The same where Newton's method ran into its limit of iterations, which must be rare.
+const LOOSE: f64 = 0.05;
+
+/// One-sided differences that differ by more than this part of their size show a kink in between: curvature
+/// of order 10 makes STEP times that.
+const KINK: f64 = 0.02;
+
+/// A sample: time, state, reference.
+#[derive(Clone, Debug)]
+struct Sample {
+    t: f64,
+    x: Vec<f64>,
+    u_ref: Vec<f64>,
+}
+
+/// What is compared: u, then five numbers per barrier.
+fn outputs(filter: &mut SafetyFilter, sample: &Sample) -> (Status, Vec<Phase>, Vec<f64>) {
+    let mut values = vec![0.0; sample.u_ref.len()];
+    let report = filter.peek(sample.t, &sample.x, &sample.u_ref, &mut values).expect("right lengths");
+    let phases = report.barriers.iter().map(|b| b.phase).collect();
+    let status = report.status;
+    for b in &report.barriers {
+        values.extend([b.h, b.profile, b.margin, b.slack, b.sampling_loss]);
+    }
+    (status, phases, values)
+}
+
+/// The derivative along `direction` of state and reference, laid out as [`outputs`].
+fn derivative(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Result<Vec<f64>, NoDerivative> {
+    let mut out = SampleDerivative::default();
+    let unknown = filter
+        .differentiate(at.t, [&at.x, &direction.x], [&at.u_ref, &direction.u_ref], &mut out)
+        .expect("right lengths");
+    let mut values = out.u[..at.u_ref.len()].to_vec();
+    for b in &out.barriers {
+        values.extend([b.h, b.profile, b.margin, b.slack, b.sampling_loss]);
+    }
+    unknown.map_or(Ok(values), Err)
+}
+
+/// What a comparison came to.
+enum Compared {
+    Agrees(Status),
+    /// A kink is within a step.
+    Kink,
+    /// Within [`LOOSE`].
+    Roughly,
+    /// The search over the period did not converge.
+    Unknown,
+    Differs(String),
+}
+
+/// Compares at `at` along `direction`.
+fn compare(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Compared {
+    let moved = |by: f64| {
+        let along = |v: &[f64], d: &[f64]| v.iter().zip(d).map(|(v, d)| v + by * d).collect();
+        Sample { t: at.t, x: along(&at.x, &direction.x), u_ref: along(&at.u_ref, &direction.u_ref) }
+    };
+    let (status, phases, here) = outputs(filter, at);
+    let (plus, minus) = (outputs(filter, &moved(STEP)), outputs(filter, &moved(-STEP)));
+    if (plus.0, &plus.1) != (status, &phases) || (minus.0, &minus.1) != (status, &phases) {
+        return Compared::Kink;
+    }
+    let place = || format!("{status:?} {phases:?} at {at:?} along {direction:?}");
+    let found = match derivative(filter, at, direction) {
+        Err(NoDerivative::NotConverged) => return Compared::Unknown,
+        Err(e) => return Compared::Differs(format!("{e}: {}", place())),
+        Ok(found) => found,
+    };
+    let differences = || plus.2.iter().zip(&minus.2).zip(&here);
+    let smooth = differences().all(|((p, m), h)| {
+        let (forward, backward) = ((p - h) / STEP, (h - m) / STEP);
+        (forward - backward).abs() <= KINK * (1.0 + forward.abs().max(backward.abs()))
+    });
+    if !smooth {
+        return Compared::Kink;
+    }
+    let mut compared = Compared::Agrees(status);
+    for (k, ((p, m), _)) in differences().enumerate() {
+        let wanted = (p - m) / (2.0 * STEP);
+        let error = (found[k] - wanted).abs() / (1.0 + wanted.abs());
+        if error > TOLERANCE && error <= LOOSE {
+            compared = Compared::Roughly;
+        } else if error.is_nan() || error > LOOSE {
+            return Compared::Differs(format!("output {k}: {} for {wanted}: {}", found[k], place()));
+        }
+    }
+    compared
+}
+
+/// How the row is formed.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    Pointwise,
+    Measured,
+    Period,
+    Delayed,
+}
+
+const FORMS: [Form; 4] = [Form::Pointwise, Form::Measured, Form::Period, Form::Delayed];
+
+fn formed(builder: FilterBuilder, form: Form) -> SafetyFilter {
+    match form {
+        Form::Pointwise => builder.sampling(Sampling::Pointwise),
+        Form::Measured => builder.sampling(Sampling::Measured { first: None }),
+        Form::Period => builder.sampling(Sampling::Period(0.05)),
+        Form::Delayed => builder.sampling(Sampling::Period(0.05)).and_then(|b| b.actuation_delay(0.03)),
+    }
+    .and_then(FilterBuilder::build)
+    .expect("valid filter")
+}
+
+fn within(deadline: f64) -> BarrierSettings {
+    BarrierSettings::within(deadline)
+}
+
+fn goal() -> DistanceDisc {
+    DistanceDisc::new([12.0, 4.0], 2.0, 1.0).expect("valid disc")
+}
+
+/// A goal, an obstacle on the way and a speed limit, with bounds.
+fn vehicle<P>(plant: P, speed: StateBound, form: Form) -> SafetyFilter
+where
+    P: ControlAffine<4, 2> + Copy + Send + 'static,
+{
+    let obstacle = Outside(DistanceDisc::new([6.0, 3.0], 1.0, 0.5).expect("valid disc"));
+    let builder = SafetyFilter::builder(4, 2)
+        .barrier("goal", plant, goal(), within(5.0))
+        .and_then(|b| b.barrier("clear", plant, obstacle, within(2.0)))
+        .and_then(|b| b.barrier("speed", plant, speed, within(1.0)))
+        .and_then(|b| b.bounds(&[-6.0, -2.0], &[6.0, 2.0]))
+        .expect("valid barriers");
+    formed(builder, form)
+}
+
+/// A goal and a wall, for the bicycles that have their steering as a state.
+fn walled<P>(plant: P, form: Form) -> SafetyFilter
+where
+    P: ControlAffine<5, 2> + Copy + Send + 'static,
+{
+    let wall = HalfPlane::new([-1.0, 0.2], [14.0, 0.0]).expect("valid half-plane");
+    let builder = SafetyFilter::builder(5, 2)
+        .barrier("goal", plant, goal(), within(5.0))
+        .and_then(|b| b.barrier("wall", plant, wall, within(2.0)))
+        .and_then(|b| b.bounds(&[-6.0, -4.0], &[6.0, 4.0]))
+        .expect("valid barriers");
+    formed(builder, form)
+}
+
+/// One barrier by each method, without bounds; `RepeatedRoot` and profiles start from the anchor.
+fn by_method(settings: BarrierSettings, form: Form) -> SafetyFilter {
+    let builder =
+        SafetyFilter::builder(4, 2).barrier("goal", Unicycle, goal(), settings).expect("valid barrier");
+    formed(builder, form)
+}
+
+/// The filters that are tried, by number; the number of states and what u_ref is about.
+fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
+    let speed = || StateBound::at_most(3, 4.0).expect("valid bound");
+    let soft = |b: FilterBuilder| b.strictness(Strictness::Soft(1.5)).expect("valid strictness");
+    match which {
+        0 => (vehicle(PointMass, speed(), form), 4),
+        1 => (vehicle(Unicycle, speed(), form), 4),
+        2 => (vehicle(Bicycle::new(2.0).expect("valid"), speed(), form), 4),
+        3 => (walled(KinematicBicycle::new(1.0, 1.5).expect("valid"), form), 5),
+        4 => (walled(SmallSlipBicycle::new(2.0).expect("valid").with_rate(), form), 5),
+        5 => {
+            let follow = Outside(goal().following(4));
+            let builder = SafetyFilter::builder(8, 2)
+                .barrier::<_, _, 8, 2>("clear", WithPoint::<_, 4>(Unicycle), follow, within(3.0))
+                .expect("valid barrier");
+            (formed(builder, form), 8)
+        }
+        6 => {
+            let builder = SafetyFilter::builder(4, 2)
+                .barrier("goal", PointMass, goal(), within(5.0))
+                .map(soft)
+                .and_then(|b| b.barrier("speed", PointMass, NormBound::new(2, 3.0)?, within(1.0)))
+                .expect("valid barriers");
+            (formed(builder, form), 4)
+        }
+        7 => (by_method(BarrierSettings { method: Method::RepeatedRoot, ..within(4.0) }, form), 4),
+        8 => (by_method(BarrierSettings { profile: ProfileKind::LowPeak, ..within(4.0) }, form), 4),
+        9 => {
+            let method = Method::FirstOrder(Exponent::default());
+            let builder = SafetyFilter::builder(4, 2)
+                .barrier(
+                    "speed",
+                    PointMass,
+                    NormBound::new(2, 1.5).expect("valid"),
+                    BarrierSettings { method, ..within(2.0) },
+                )
+                .expect("valid barrier");
+            (formed(builder, form), 4)
+        }
+        10 => {
+            let quadratic = QuadraticDisc::new([12.0, 4.0], 2.0).expect("valid disc");
+            let settings = BarrierSettings { margin: 0.3, recovery: Some(2.0), ..within(5.0) };
+            let builder =
+                SafetyFilter::builder(4, 2).barrier("goal", Unicycle, quadratic, settings).expect("valid");
+            (formed(builder, form), 4)
+        }
+        _ => unreachable!("eleven filters"),
+    }
+}
+
+const FILTERS: usize = 11;
+
+fn sample() -> impl Strategy<Value = Sample> {
+    let state = prop::collection::vec(-1.0..1.0, 8);
+    (state, prop::collection::vec(-3.0..3.0, 2)).prop_map(|(x, u_ref)| {
+        // Around the place where goal, obstacle and limits meet.
+        let (centre, size) =
+            ([6.0, 2.0, 0.3, 3.0, 8.0, 3.0, 0.5, -0.5], [6.0, 4.0, 1.5, 2.5, 4.0, 4.0, 1.0, 1.0]);
+        let x = (0..8).map(|i| centre[i] + size[i] * x[i]).collect();
+        Sample { t: 0.0, x, u_ref }
+    })
+}
+
+fn direction() -> impl Strategy<Value = Sample> {
+    (prop::collection::vec(-1.0..1.0, 8), prop::collection::vec(-1.0..1.0, 2)).prop_map(|(x, u_ref)| Sample {
+        t: 0.0,
+        x,
+        u_ref,
+    })
+}
+
+/// Every filter in every form at its anchor and later; the statuses met, and how often a kink was close.
+#[test]
+fn derivatives_are_those_of_the_sample() {
+    let (mut met, mut kinks, mut unknown, mut roughly) = (Vec::<Status>::new(), 0, 0, 0);
+    let mut wrong = Vec::new();
+    let mut runner = proptest::test_runner::TestRunner::deterministic();
+    for which in 0..FILTERS {
+        for form in FORMS {
+            for _ in 0..40 {
+                let mut draw = || {
+                    let strategy = (sample(), direction(), sample());
+                    strategy.new_tree(&mut runner).expect("a value").current()
+                };
+                let (mut first, mut along, mut later) = draw();
+                let (mut filter, states) = filters(which, form);
+                for s in [&mut first, &mut along, &mut later] {
+                    s.x.truncate(states);
+                    if states == 5 {
+                        // The steering.
+                        s.x[4] *= 0.05;
+                    }
+                }
+                let mut count = |compared| match compared {
+                    Compared::Agrees(status) => met.push(status),
+                    Compared::Kink => kinks += 1,
+                    Compared::Roughly => roughly += 1,
+                    Compared::Unknown => unknown += 1,
+                    Compared::Differs(how) => wrong.push(format!("filter {which}, {form:?}: {how}")),
+                };
+                count(compare(&mut filter, &first, &along));
+                let mut u = [0.0; 2];
+                for i in 0..3 {
+                    let sample = Sample { t: 0.05 * f64::from(i), ..first.clone() };
+                    filter.step(sample.t, &sample.x, &sample.u_ref, &mut u).expect("right lengths");
+                }
+                // Near where it was, and elsewhere.
+                for part in [0.02, 1.0] {
+                    let between = |a: &[f64], b: &[f64]| {
+                        a.iter().zip(b).map(|(a, b)| a + part * (b - a)).collect::<Vec<f64>>()
+                    };
+                    let x = between(&first.x, &later.x);
+                    let at = Sample { t: 0.15, x, u_ref: later.u_ref.clone() };
+                    count(compare(&mut filter, &at, &along));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{} wrong\n{}", wrong.len(), wrong[..wrong.len().min(30)].join("\n"));
+    let share = |status| met.iter().filter(|s| **s == status).count() as f64 / met.len() as f64;
+    let all = met.len() + kinks + unknown + roughly;
+    let shares = format!("{all}: {kinks} kinks, {unknown} not converged, {roughly} roughly");
+    assert!(kinks * 20 < all && unknown * 20 < all && roughly * 100 < all, "{shares}");
+    for (status, least) in [(Status::Filtered, 0.3), (Status::Infeasible, 0.02), (Status::Unchanged, 0.05)] {
+        assert!(share(status) > least, "{status:?}: {}", share(status));
+    }
+}
+
+/// A source that knows h = 1 − x₁ along ẋ₁ = u and nothing of directions.
+struct Mute;
+
+impl DerivativeSource for Mute {
+    fn relative_degree(&self) -> usize {
+        1
+    }
+    fn state_dim(&self) -> usize {
+        1
+    }
+    fn input_dim(&self) -> usize {
+        1
+    }
+    fn evaluate(&self, _t: f64, x: &[f64], out: &mut Derivatives) {
+        *out = Derivatives::ZERO;
+        (out.drift[0], out.row[0]) = (1.0 - x[0], -1.0);
+    }
+}
+
+#[test]
+fn what_is_not_known_is_said() {
+    let mut filter = SafetyFilter::builder(1, 1)
+        .source("mute", Box::new(Mute), within(1.0))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut out = SampleDerivative::default();
+    let unknown = filter.differentiate(0.0, [&[3.0], &[1.0]], [&[0.0], &[0.0]], &mut out).expect("lengths");
+    assert_eq!(unknown, Some(NoDerivative::Source(0)));
+    let error = filter.differentiate(0.0, [&[3.0], &[1.0]], [&[0.0], &[f64::NAN]], &mut out).unwrap_err();
+    assert_eq!(error.to_string(), "du_ref[1]: is NaN, must be finite");
+    let error = filter.differentiate(0.0, [&[3.0], &[]], [&[0.0], &[0.0]], &mut out).unwrap_err();
+    assert_eq!(error.to_string(), "dx: has 0 components, must have 1");
+    // Where the input is a constant nothing needs to be known.
+    let unknown = filter.differentiate(0.0, [&[f64::NAN], &[1.0]], [&[0.0], &[1.0]], &mut out);
+    assert_eq!((unknown.expect("lengths"), out.u[0]), (None, 0.0));
+    // A deadline that the bounds do not allow is given up for one that a search finds.
+    let infeasible = Infeasible::Soonest;
+    let mut late = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, goal(), BarrierSettings { infeasible, ..within(0.5) })
+        .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2]))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let (x, zeros) = ([0.0; 4], [0.0; 4]);
+    let unknown = late.differentiate(0.0, [&x, &zeros], [&[0.0; 2], &[1.0, 0.0]], &mut out).expect("lengths");
+    assert_eq!(unknown, Some(NoDerivative::Postponed(0)));
+}
