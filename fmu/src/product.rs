@@ -170,6 +170,21 @@ fn base_unit(name: &str) -> Option<BaseUnit> {
     Some(base)
 }
 
+/// The physical quantity that a unit measures, in the words of the Modelica Standard Library.
+fn quantity(unit: &str) -> Option<String> {
+    let name = match unit {
+        "s" => "Time",
+        "m" => "Length",
+        "m/s" => "Velocity",
+        "m/s2" => "Acceleration",
+        "rad" => "Angle",
+        "rad/s" => "AngularVelocity",
+        "rad/s2" => "AngularAcceleration",
+        _ => return None,
+    };
+    Some(name.to_owned())
+}
+
 /// The enumeration type of `status`.
 const STATUS: &str = "Status";
 
@@ -275,7 +290,7 @@ impl Table {
             min: row.range.min,
             max: row.range.max,
             nominal: None,
-            quantity: None,
+            quantity: quantity(row.unit),
             unit: Some(row.unit.to_owned()),
         };
         self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
@@ -316,7 +331,7 @@ fn real(start: Option<f64>, unit: &str) -> VariableKind {
         min: None,
         max: None,
         nominal: None,
-        quantity: None,
+        quantity: quantity(unit),
         unit: Some(unit.to_owned()),
     }
 }

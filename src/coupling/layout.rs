@@ -40,7 +40,12 @@ impl Layout {
             let entry = (position, variable.value_reference, variable.kind);
             if variable.causality == Causality::Output {
                 if recorded.contains(&port) || links.iter().any(|link| link.from == port) {
-                    parts[usize::from(network::has_feedthrough(description, position))].push(entry);
+                    parts[usize::from(network::has_feedthrough(
+                        &system.components()[component],
+                        description,
+                        position,
+                    ))]
+                    .push(entry);
                 }
             } else if links.iter().any(|link| link.to == port) {
                 parts[2].push(entry);

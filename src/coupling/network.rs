@@ -2,9 +2,9 @@
 //! error says which field of the file it comes from. Runs nothing.
 
 use super::graph::{self, Edge};
-use super::system::{Picture, StartValue, System};
+use super::system::{Component, Picture, StartValue, System};
 use crate::error::Error;
-use crate::host::{Causality, Description, Kind, Variable};
+use crate::host::{Causality, Description, Kind, Output, Variable};
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,13 +73,21 @@ pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>
     resolve(system, descriptions).map(|network| network.links)
 }
 
+/// The inputs that `output` depends on at the same instant, as positions in the variables.
+fn direct_inputs(component: &Component, description: &Description, output: &Output) -> Vec<usize> {
+    match output.dependencies {
+        None if !component.feedthrough => Vec::new(),
+        _ => description.direct_inputs(output),
+    }
+}
+
 /// Whether the output depends on any input at the same instant.
-pub(super) fn has_feedthrough(description: &Description, variable: usize) -> bool {
+pub(super) fn has_feedthrough(component: &Component, description: &Description, variable: usize) -> bool {
     description
         .outputs
         .iter()
         .find(|output| output.variable == variable)
-        .is_some_and(|output| !description.direct_inputs(output).is_empty())
+        .is_some_and(|output| !direct_inputs(component, description, output).is_empty())
 }
 
 struct Resolver<'a> {
@@ -364,15 +372,18 @@ impl<'a> Resolver<'a> {
 
     /// Components with and without direct feedthrough, in running order, and notes on late signals.
     fn order(&self, links: &[Link]) -> (Vec<usize>, Vec<usize>, Vec<String>) {
-        let feeds_through = |port: Port| has_feedthrough(self.descriptions[port.component], port.variable);
-        let (direct, delayed): (Vec<usize>, Vec<usize>) = (0..self.descriptions.len()).partition(|&c| {
-            let description = self.descriptions[c];
-            description.outputs.iter().any(|output| !description.direct_inputs(output).is_empty())
-        });
-        let acts_directly = |port: Port| {
-            let description = self.descriptions[port.component];
-            description.outputs.iter().any(|o| description.direct_inputs(o).contains(&port.variable))
+        let (components, descriptions) = (self.system.components(), self.descriptions);
+        let feeds_through = |port: Port| {
+            has_feedthrough(&components[port.component], descriptions[port.component], port.variable)
         };
+        let direct_inputs_of = |c: usize| {
+            let outputs = descriptions[c].outputs.iter();
+            outputs.flat_map(move |output| direct_inputs(&components[c], descriptions[c], output))
+        };
+        let (direct, delayed): (Vec<usize>, Vec<usize>) =
+            (0..descriptions.len()).partition(|&c| direct_inputs_of(c).next().is_some());
+        let acts_directly =
+            |port: Port| direct_inputs_of(port.component).any(|variable| variable == port.variable);
         let edges: Vec<Edge> = links
             .iter()
             .filter(|link| feeds_through(link.from))
@@ -390,7 +401,7 @@ impl<'a> Resolver<'a> {
             .map(|link| {
                 format!(
                     "{} → {} closes a loop of direct feedthrough (or of outputs whose dependencies the FMU \
-                     does not declare): it is read one step late",
+                     does not declare; feedthrough = false says there are none): it is read one step late",
                     self.name(link.from),
                     self.name(link.to),
                 )

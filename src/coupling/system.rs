@@ -64,9 +64,17 @@ pub struct Component {
     pub name: String,
     /// Its FMU, relative to the folder of the system file.
     pub fmu: String,
+    /// Whether outputs whose dependencies the FMU does not declare depend on its inputs at the same instant.
+    /// Default true, as the standard says; false for a plant, whose outputs change in steps only.
+    #[serde(default = "yes")]
+    pub feedthrough: bool,
     /// Start values of parameters and inputs, in the variable's unit.
     #[serde(default)]
     pub start: BTreeMap<String, StartValue>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// A start value.
@@ -345,7 +353,7 @@ impl System {
 
     fn check_components(&self) -> Result<(), ConfigurationError> {
         ensure(!self.component.is_empty(), "component", || "at least one component is needed".to_owned())?;
-        for (i, Component { name, fmu, start }) in self.component.iter().enumerate() {
+        for (i, Component { name, fmu, start, .. }) in self.component.iter().enumerate() {
             let field = format!("component[{i}].name");
             ensure(!name.is_empty(), &field, || "is empty; must be a name".to_owned())?;
             ensure(!name.contains(['.', '\0']), &field, || format!("is {name:?}; must not contain a dot"))?;

@@ -1,8 +1,11 @@
 //! A model description as the rest of this crate sees it: small, with numbers parsed and references
-//! resolved. The XML itself is read by `fmi-rs`.
+//! resolved. The XML itself is read by `fmi-rs`, but for the declared types, of which it keeps the first only.
+
+use std::collections::HashMap;
 
 use fmi_rs::model_description::fmi2 as xml;
 use punctual_modeldescription::{Causality, Variability};
+use roxmltree::{Document, Node};
 
 use crate::error::FmuProblem;
 
@@ -60,9 +63,10 @@ pub struct Variable {
     pub unit: Option<String>,
     /// Its start value as written.
     pub start: Option<String>,
-    /// Its least value (in `unit`); `None` where there is none or it is not a number.
+    /// Its least value (in `unit`), its own or its declared type's; `None` where there is none or it is
+    /// not a number.
     pub min: Option<f64>,
-    /// Its greatest value (in `unit`); `None` where there is none or it is not a number.
+    /// Its greatest value, likewise.
     pub max: Option<f64>,
     /// What it means.
     pub description: Option<String>,
@@ -154,7 +158,9 @@ impl Description {
         if !is_c_identifier(&interface.modelIdentifier) {
             return Err(FmuProblem::ModelIdentifier(interface.modelIdentifier.clone()));
         }
-        let variables: Vec<Variable> = read.modelVariables.iter().map(|v| variable(&read, v)).collect();
+        let document = Document::parse(text).map_err(|e| FmuProblem::Description(e.to_string()))?;
+        let types = declared_types(&document);
+        let variables: Vec<Variable> = read.modelVariables.iter().map(|v| variable(&types, v)).collect();
         let outputs = outputs(&read, &variables)?;
         Ok(Self {
             model_identifier: interface.modelIdentifier.clone(),
@@ -201,22 +207,52 @@ impl Description {
     }
 }
 
-fn variable(read: &xml::ModelDescription, source: &xml::ScalarVariable) -> Variable {
+/// What a declared type gives to the variables that name it.
+#[derive(Default)]
+struct DeclaredType {
+    unit: Option<String>,
+    min: Option<f64>,
+    max: Option<f64>,
+    items: Vec<Item>,
+}
+
+/// The types of `TypeDefinitions` by name. Of one that is declared twice the first counts.
+fn declared_types<'a>(document: &'a Document<'_>) -> HashMap<&'a str, DeclaredType> {
+    let mut types = HashMap::new();
+    let definitions = document.root_element().children().filter(|n| n.has_tag_name("TypeDefinitions"));
+    for declared in definitions.flat_map(|n| n.children()).filter(|n| n.has_tag_name("SimpleType")) {
+        let (Some(name), Some(of)) = (declared.attribute("name"), declared.children().find(Node::is_element))
+        else {
+            continue;
+        };
+        let item = |n: Node<'_, '_>| {
+            let value = n.attribute("value")?.trim().parse().ok()?;
+            Some(Item { name: n.attribute("name")?.to_owned(), value })
+        };
+        types.entry(name).or_insert_with(|| DeclaredType {
+            unit: of.attribute("unit").map(str::to_owned),
+            min: number(of.attribute("min")),
+            max: number(of.attribute("max")),
+            items: of.children().filter(|n| n.has_tag_name("Item")).filter_map(item).collect(),
+        });
+    }
+    types
+}
+
+fn variable(types: &HashMap<&str, DeclaredType>, source: &xml::ScalarVariable) -> Variable {
     use xml::VariableType as T;
     let none = &None;
-    let (kind, min, max, declared) = match &source.variableType {
-        T::Real { min, max, declaredType, .. } => (Kind::Real, min, max, declaredType.as_ref()),
-        T::Integer { min, max, declaredType, .. } => (Kind::Integer, min, max, declaredType.as_ref()),
-        T::Boolean { declaredType, .. } => (Kind::Boolean, none, none, declaredType.as_ref()),
-        T::String { declaredType, .. } => (Kind::String, none, none, declaredType.as_ref()),
-        T::Enumeration { min, max, declaredType, .. } => (Kind::Enumeration, min, max, Some(declaredType)),
-    };
-    let items = match declared.and_then(|name| read.get_type_definition(name)) {
-        Some(xml::SimpleType::Enumeration { items, .. }) => {
-            items.iter().map(|item| Item { name: item.name.clone(), value: item.value }).collect()
+    let (kind, unit, min, max, declared) = match &source.variableType {
+        T::Real { unit, min, max, declaredType, .. } => (Kind::Real, unit, min, max, declaredType.as_ref()),
+        T::Integer { min, max, declaredType, .. } => (Kind::Integer, none, min, max, declaredType.as_ref()),
+        T::Boolean { declaredType, .. } => (Kind::Boolean, none, none, none, declaredType.as_ref()),
+        T::String { declaredType, .. } => (Kind::String, none, none, none, declaredType.as_ref()),
+        T::Enumeration { min, max, declaredType, .. } => {
+            (Kind::Enumeration, none, min, max, Some(declaredType))
         }
-        _ => Vec::new(),
     };
+    let nothing = DeclaredType::default();
+    let given = declared.and_then(|name| types.get(name.as_str())).unwrap_or(&nothing);
     Variable {
         name: source.name.clone(),
         value_reference: source.valueReference,
@@ -236,13 +272,13 @@ fn variable(read: &xml::ModelDescription, source: &xml::ScalarVariable) -> Varia
             xml::Variability::Discrete => Variability::Discrete,
             xml::Variability::Continuous => Variability::Continuous,
         },
-        unit: read.get_unit(source).map(str::to_owned),
+        unit: unit.clone().or_else(|| given.unit.clone()),
         start: source.variableType.start().clone(),
-        min: number(min.as_deref()),
-        max: number(max.as_deref()),
+        min: number(min.as_deref()).or(given.min),
+        max: number(max.as_deref()).or(given.max),
         description: source.description.clone(),
         declared_type: declared.cloned(),
-        items,
+        items: given.items.clone(),
     }
 }
 
@@ -293,12 +329,14 @@ mod tests {
     fn xml(interface: &str, outputs: &str) -> String {
         format!(
             r#"<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">{interface}
-            <TypeDefinitions><SimpleType name="T"><Enumeration><Item name="go" value="1"/><Item name="stop" value="2"/></Enumeration></SimpleType></TypeDefinitions>
+            <TypeDefinitions><SimpleType name="T"><Enumeration><Item name="go" value="1"/><Item name="stop" value="2"/></Enumeration></SimpleType>
+            <SimpleType name="L"><Real unit="m" min="-4" max="9"/></SimpleType></TypeDefinitions>
             <DefaultExperiment stopTime="2.5" stepSize="1e-3"/>
             <ModelVariables>
             <ScalarVariable name="u" valueReference="7" causality="input" description="pull"><Real start="0" unit="N" min="-1" max="INF"/></ScalarVariable>
             <ScalarVariable name="y" valueReference="8" causality="output"><Real/></ScalarVariable>
             <ScalarVariable name="s" valueReference="9" causality="output" variability="discrete"><Enumeration declaredType="T"/></ScalarVariable>
+            <ScalarVariable name="l" valueReference="10"><Real declaredType="L" max="5"/></ScalarVariable>
             </ModelVariables><ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"#
         )
     }
@@ -313,6 +351,9 @@ mod tests {
         assert_eq!(d.variables[0].unit.as_deref(), Some("N"));
         assert_eq!((d.variables[0].min, d.variables[0].max), (Some(-1.0), Some(f64::INFINITY)));
         assert_eq!(d.variables[2].items[1], Item { name: "stop".into(), value: 2 });
+        // From the second declared type, what the variable does not say itself.
+        let l = &d.variables[3];
+        assert_eq!((l.unit.as_deref(), l.min, l.max), (Some("m"), Some(-4.0), Some(5.0)));
         assert_eq!(d.default_experiment.unwrap().step_size, Some(1e-3));
         assert!(d.capabilities.can_get_and_set_fmu_state);
         assert_eq!(d.outputs[0], Output { variable: 1, dependencies: None });
@@ -326,7 +367,7 @@ mod tests {
         let error = |text: &str| Description::parse(text).unwrap_err().to_string();
         assert!(error(&xml("", "")).contains("no co-simulation interface"));
         assert!(error(&xml(r#"<CoSimulation modelIdentifier="../m"/>"#, "")).contains("not a C identifier"));
-        assert!(error(&xml(cs, r#"<Unknown index="4"/>"#)).contains("names variable 4 of 3"));
+        assert!(error(&xml(cs, r#"<Unknown index="5"/>"#)).contains("names variable 5 of 4"));
         assert!(error(&xml(cs, "").replace("\"2.0\"", "\"3.0\"")).contains("Expected FMI version 2.0"));
         assert!(error("nonsense").starts_with("modelDescription.xml: "));
     }

@@ -15,16 +15,34 @@ fn all_34_functions_resolve() {
     let _ = &*API;
 }
 
+/// What a tool of binutils says of the library.
+fn told(tool: &str, arguments: &[&str]) -> String {
+    match Command::new(tool).args(arguments).arg(library_path()).output() {
+        Ok(output) if output.status.success() => String::from_utf8(output.stdout).unwrap(),
+        problem => panic!("this test needs {tool} of binutils: {problem:?}"),
+    }
+}
+
 #[test]
 fn nothing_else_is_exported() {
-    let output = match Command::new("nm").args(["-D", "--defined-only"]).arg(library_path()).output() {
-        Ok(output) if output.status.success() => output,
-        problem => panic!("this test needs nm of binutils: {problem:?}"),
-    };
-    let text = String::from_utf8(output.stdout).unwrap();
+    let text = told("nm", &["-D", "--defined-only"]);
     let found: BTreeSet<_> = text.lines().filter_map(|line| line.split_whitespace().last()).collect();
     let wanted: BTreeSet<_> = SYMBOLS.iter().copied().collect();
     assert_eq!(found, wanted);
+}
+
+/// Distributions of 2014 have glibc 2.17 (RHEL 7) or 2.19 (Debian 8, Ubuntu 14.04).
+#[cfg(all(target_os = "linux", target_env = "gnu", target_arch = "x86_64"))]
+#[test]
+fn a_glibc_of_2014_is_enough() {
+    const NEWEST: [u32; 2] = [2, 17];
+    let text = told("readelf", &["--wide", "--version-info"]);
+    let versions = text.split_whitespace().filter_map(|word| word.strip_prefix("GLIBC_"));
+    let parsed = versions.map(|v| v.split('.').map(|part| part.parse().unwrap()).collect::<Vec<u32>>());
+    let needed: BTreeSet<_> = parsed.collect();
+    assert!(!needed.is_empty(), "{text}");
+    let newer: Vec<_> = needed.iter().filter(|v| v.as_slice() > NEWEST.as_slice()).collect();
+    assert!(newer.is_empty(), "add what needs {newer:?} to fmu/build.rs and fmu/src/abi/glibc.rs:\n{text}");
 }
 
 #[test]

@@ -3,11 +3,19 @@
 import shutil
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
+
+def declared_categories(path):
+    """The log categories that the model description names."""
+    return [category.name for category in fmpy.read_model_description(path).logCategories]
 
 
 class Slave:
-    """One FMU, instantiated and initialised, its variables by name."""
+    """One FMU, instantiated and initialised, its variables by name.
+
+    `logger` gets instance name, status, category and text of every message, in all categories.
+    """
 
     def __init__(self, path, start=None, logger=None):
         description = fmpy.read_model_description(path)
@@ -19,7 +27,18 @@ class Slave:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=description.modelName,
         )
-        self.fmu.instantiate()
+        callbacks = None
+        if logger is not None:
+            # Raw, without FMPy's proxy, which would print the text with its arguments: ours has none.
+            callbacks = fmi2CallbackFunctions()
+            callbacks.logger = fmi2CallbackLoggerTYPE(
+                lambda _, name, status, category, message: logger(
+                    name.decode(), status, category.decode(), message.decode()
+                )
+            )
+        self.fmu.instantiate(callbacks=callbacks, loggingOn=logger is not None)
+        if logger is not None:
+            self.fmu.setDebugLogging(True, declared_categories(path))
         self.set(start or {})
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()

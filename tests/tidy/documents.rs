@@ -24,12 +24,12 @@ fn every_example_is_a_valid_configuration_or_system() {
             continue;
         }
         let system = System::parse(&text.text).unwrap_or_else(|e| panic!("{}: {e}", text.path));
-        // Its own FMUs are built from the configurations of the same name beside it.
+        // Its own FMUs are built from the configurations, or classes, of the same name beside it.
         let folder = Path::new(&text.path).parent().expect("a folder");
         for component in system.components() {
-            let configuration = folder.join(&component.fmu).with_extension("toml");
-            let known = TEXTS.iter().any(|t| Path::new(&t.path) == configuration);
-            assert!(known, "{}: no {}", text.path, configuration.display());
+            let sources = ["toml", "py"].map(|end| folder.join(&component.fmu).with_extension(end));
+            let known = TEXTS.iter().any(|t| sources.iter().any(|source| Path::new(&t.path) == source));
+            assert!(known, "{}: none of {sources:?}", text.path);
         }
     }
     assert!(seen >= 3, "{seen} examples found");

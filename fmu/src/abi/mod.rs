@@ -8,6 +8,8 @@
 //! or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong
 //! counts of zero are met with a status, never with a crash.
 
+#[cfg(old_glibc)]
+mod glibc;
 mod guard;
 mod logger;
 mod resources;

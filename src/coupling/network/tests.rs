@@ -1,7 +1,7 @@
 //! Resolution of system files against made-up descriptions, one defect each.
 
 use super::*;
-use crate::host::{Capabilities, Item, Output, Variability};
+use crate::host::{Capabilities, Item, Variability};
 
 fn variable(name: &str, kind: Kind, causality: Causality) -> Variable {
     Variable {
@@ -85,7 +85,11 @@ fn gain() -> Description {
 }
 
 fn system(wiring: &str, start: &str) -> System {
-    let text = format!(
+    System::parse(&text(wiring, start)).unwrap()
+}
+
+fn text(wiring: &str, start: &str) -> String {
+    format!(
         r#"
 experiment = {{ stop_time = 1.0, step = 0.1 }}
 component = [
@@ -94,8 +98,7 @@ component = [
   {{ name = "gain", fmu = "g" }},
 ]
 {wiring}"#
-    );
-    System::parse(&text).unwrap()
+    )
 }
 
 fn resolved(wiring: &str, start: &str) -> Result<Network, Error> {
@@ -132,6 +135,19 @@ fn a_feedthrough_chain_is_ordered_and_a_cycle_is_noted() {
     assert_eq!(network.direct, [1, 2]);
     assert_eq!(network.notes.len(), 1);
     assert!(network.notes[0].starts_with("gain.o → filter.x closes a loop"), "{}", network.notes[0]);
+}
+
+#[test]
+fn undeclared_dependencies_can_be_said_to_be_none() {
+    let run = |name: &str| {
+        let said = format!("name = \"{name}\", feedthrough = false");
+        let text = text(BY_NAME, "").replace(&format!("name = \"{name}\""), &said);
+        resolve(&System::parse(&text).unwrap(), &[&plant(), &filter(), &gain()]).unwrap()
+    };
+    let network = run("filter");
+    assert_eq!((network.direct.as_slice(), network.delayed.as_slice()), (&[2][..], &[0, 1][..]));
+    // What an FMU declares counts.
+    assert_eq!(run("gain").direct, [1, 2]);
 }
 
 #[test]

@@ -1,0 +1,178 @@
+//! What the C interface adds to a step: `cargo bench --bench abi`.
+//!
+//! The same filter, from the same configuration, once in process (`SafetyFilter::step`) and once through the
+//! shared library as an importer loads it. Steps of about 1 ms on the way to the disc, where the row is active;
+//! after a thousand of them both go back to the state they started from, which costs a thousandth of it. "doStep
+//! adds" is the difference of both, measured in turns, so that a busy machine slows both.
+
+#![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
+
+use std::fmt::Write as _;
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use api::API;
+use criterion::{Criterion, criterion_group, criterion_main};
+use fmu::Fmu;
+use punctual_core::filter::{FilterState, SafetyFilter};
+use slave::Slave;
+use support::{SAFE, T, X};
+
+#[path = "../tests/abi/api.rs"]
+#[allow(dead_code, reason = "a benchmark uses a part")]
+mod api;
+#[path = "../tests/abi/fmu.rs"]
+#[allow(dead_code, reason = "a benchmark uses a part")]
+mod fmu;
+#[path = "../tests/abi/slave.rs"]
+#[allow(dead_code, reason = "a benchmark uses a part")]
+mod slave;
+mod support;
+
+/// The step size in s, 2⁻¹⁰ so that times are exact, and the number of steps from [`T`] on until both go back.
+const H: f64 = 0.000_976_562_5;
+const STEPS: u32 = 1000;
+/// Steps of one turn in the difference: some tenths of a millisecond.
+const TURN: u64 = 500;
+
+/// A point mass on the way to the disc, with a box or obstacles beside the way.
+fn configuration(sampling: &str, bounded: bool, obstacles: usize) -> String {
+    let bounds = if bounded { "bounds = { u_x = [-60.0, 60.0], u_y = [-60.0, 60.0] }\n" } else { "" };
+    let mut text = format!(
+        "kind = \"filter\"\nsampling = \"{sampling}\"\n{bounds}plant.model = \"point_mass\"\n\
+         experiment.step_size = {H:?}\n[[barrier]]\nname = \"goal\"\ncentre = [45.0, 45.0]\nradius = 2.0\n\
+         deadline = 10.0\n"
+    );
+    for i in 0..obstacles {
+        let (x, y) = (-20.0 + 8.0 * (i % 10) as f64, 60.0 + 8.0 * (i / 10) as f64);
+        let _ = write!(
+            text,
+            "[[barrier]]\nname = \"o{i}\"\nshape = \"obstacle\"\ncentre = [{x:?}, {y:?}]\nradius = 2.0\n\
+             deadline = 10.0\n"
+        );
+    }
+    text
+}
+
+/// The filter in process, and where it goes back to.
+struct Plain {
+    filter: SafetyFilter,
+    start: FilterState,
+    u_ref: [f64; 2],
+    u: [f64; 2],
+    k: u32,
+}
+
+impl Plain {
+    fn new(fmu: &Fmu, u_ref: [f64; 2]) -> Self {
+        let mut filter = fmu.filter().build().expect("a valid filter");
+        let mut u = [0.0; 2];
+        filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+        filter.step(T - H, &X, &u_ref, &mut u).expect("right dimensions");
+        let start = filter.state().clone();
+        Self { filter, start, u_ref, u, k: 0 }
+    }
+
+    fn step(&mut self) {
+        if self.k == STEPS {
+            self.filter.restore(&self.start).expect("as many barriers");
+            self.k = 0;
+        }
+        let t = T + H * f64::from(self.k);
+        self.k += 1;
+        let report = self.filter.step(black_box(t), black_box(&X), black_box(&self.u_ref), &mut self.u);
+        black_box(report.expect("right dimensions").status);
+    }
+}
+
+/// The filter behind the shared library, and where it goes back to.
+struct Shared<'a> {
+    slave: Slave<'a>,
+    start: api::State,
+    inputs: [f64; 6],
+    outputs: [u32; 2],
+    k: u32,
+}
+
+impl<'a> Shared<'a> {
+    fn new(fmu: &'a Fmu, u_ref: [f64; 2]) -> Self {
+        let slave = Slave::ready(fmu);
+        slave.set_inputs(&[0.0; 6]);
+        slave.step(0.0, T - H);
+        let inputs = [X[0], X[1], X[2], X[3], u_ref[0], u_ref[1]];
+        slave.set_inputs(&inputs);
+        slave.step(T - H, H);
+        let (start, outputs) = (slave.state(), ["u.u_x", "u.u_y"].map(|name| fmu.reference(name)));
+        Self { slave, start, inputs, outputs, k: 0 }
+    }
+
+    /// The next communication point.
+    fn time(&mut self) -> f64 {
+        if self.k == STEPS {
+            self.slave.restore(self.start);
+            self.k = 0;
+        }
+        self.k += 1;
+        T + H * f64::from(self.k - 1)
+    }
+
+    fn step(&mut self) {
+        let t = self.time();
+        self.slave.step(black_box(t), H);
+    }
+
+    /// A cycle of an importer: inputs, step, outputs.
+    fn cycle(&mut self) -> [f64; 2] {
+        let t = self.time();
+        let (component, references) = (self.slave.component, [0, 1, 2, 3, 4, 5]);
+        self.slave.ok((API.set_real)(component, references.as_ptr(), 6, black_box(self.inputs.as_ptr())));
+        self.slave.step(t, H);
+        let mut u = [0.0; 2];
+        self.slave.ok((API.get_real)(component, self.outputs.as_ptr(), 2, u.as_mut_ptr()));
+        u
+    }
+}
+
+fn timed(n: u64, mut work: impl FnMut()) -> Duration {
+    let start = Instant::now();
+    (0..n).for_each(|_| work());
+    start.elapsed()
+}
+
+fn interface(c: &mut Criterion) {
+    let sizes = [
+        ("goal", false, 0, [0.0; 2]),
+        ("goal, box", true, 0, [0.0; 2]),
+        ("10 obstacles", false, 10, SAFE),
+        ("60 obstacles", false, 60, SAFE),
+    ];
+    for sampling in ["pointwise", "measured"] {
+        for (size, bounded, obstacles, u_ref) in sizes {
+            let fmu = Fmu::new(&configuration(sampling, bounded, obstacles));
+            let (mut plain, mut shared) = (Plain::new(&fmu, u_ref), Shared::new(&fmu, u_ref));
+            for _ in 0..=STEPS {
+                plain.step();
+                let bits = [shared.cycle(), plain.u].map(|u| u.map(f64::to_bits));
+                assert_eq!(bits[0], bits[1], "{size}: the library and the filter in process differ");
+            }
+            let mut group = c.benchmark_group(format!("{size}, {sampling}"));
+            group.bench_function("in process", |b| b.iter(|| plain.step()));
+            group.bench_function("doStep", |b| b.iter(|| shared.step()));
+            group.bench_function("set, doStep, get", |b| b.iter(|| shared.cycle()));
+            group.bench_function("doStep adds", |b| {
+                b.iter_custom(|n| {
+                    let (mut with, mut without) = (Duration::ZERO, Duration::ZERO);
+                    for done in (0..n).step_by(TURN as usize) {
+                        let turn = TURN.min(n - done);
+                        with += timed(turn, || shared.step());
+                        without += timed(turn, || plain.step());
+                    }
+                    with.saturating_sub(without)
+                });
+            });
+        }
+    }
+}
+
+criterion_group!(benches, interface);
+criterion_main!(benches);

@@ -1,0 +1,37 @@
+//! Links the shared library against the oldest glibc that Rust's standard library supports, whichever the
+//! machine has: calls of functions of newer versions go to what `src/abi/glibc.rs` defines.
+
+use std::env;
+
+/// Functions with versions newer than 2.17, which the linker redirects to `__wrap_<name>`.
+const NEWER: [&str; 13] = [
+    "hypot",
+    "exp",
+    "log",
+    "pow",
+    "stat64",
+    "fstat64",
+    "pthread_key_create",
+    "pthread_key_delete",
+    "pthread_setspecific",
+    "gettid",
+    "statx",
+    "getrandom",
+    "__cxa_thread_atexit_impl",
+];
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-check-cfg=cfg(old_glibc)");
+    let target = |key: &str| env::var(format!("CARGO_CFG_TARGET_{key}")).unwrap_or_default();
+    if (target("OS").as_str(), target("ENV").as_str(), target("ARCH").as_str()) != ("linux", "gnu", "x86_64")
+    {
+        return;
+    }
+    println!("cargo::rustc-cfg=old_glibc");
+    for name in NEWER {
+        println!("cargo::rustc-cdylib-link-arg=-Wl,--wrap={name}");
+    }
+    // Before 2.34 threads had a library of their own; since then an empty one has its name.
+    println!("cargo::rustc-cdylib-link-arg=-Wl,--push-state,--no-as-needed,-l:libpthread.so.0,--pop-state");
+}
