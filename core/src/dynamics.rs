@@ -249,7 +249,7 @@ where
 }
 
 /// A plant chosen at run time: [`ControlAffine`] behind slices, in plain numbers.
-pub trait DynPlant: Send + Sync {
+pub trait DynPlant: Send {
     /// Number of states.
     fn state_dim(&self) -> usize;
 
@@ -271,7 +271,7 @@ pub struct Erased<P, const NX: usize, const NU: usize>(pub P);
 
 impl<P, const NX: usize, const NU: usize> DynPlant for Erased<P, NX, NU>
 where
-    P: ControlAffine<NX, NU> + Send + Sync,
+    P: ControlAffine<NX, NU> + Send,
 {
     fn state_dim(&self) -> usize {
         NX

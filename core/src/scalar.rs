@@ -2,6 +2,7 @@
 //! numbers ([`f64`]), on first derivatives ([`Dual`](crate::jet::Dual)) and on Taylor series
 //! ([`Taylor`](crate::jet::Taylor)).
 
+use std::f64::consts::FRAC_PI_2;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use num_traits::{One, Zero};
@@ -49,9 +50,45 @@ pub trait Scalar:
     /// Arc tangent, in radians.
     #[must_use]
     fn atan(self) -> Self;
+    /// Hyperbolic tangent.
+    #[must_use]
+    fn tanh(self) -> Self;
     /// `self` to a real power; smooth for `self` > 0.
     #[must_use]
     fn powf(self, exponent: f64) -> Self;
+
+    /// The angle of the point (`x`, `self`) in radians, within −π to π; singular at the origin.
+    #[must_use]
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        let angle = self.value().atan2(x.value());
+        // The quotient of the smaller by the larger is never singular elsewhere; the quadrant is a constant.
+        let smooth =
+            if x.value().abs() >= self.value().abs() { (self / x).atan() } else { -(x / self).atan() };
+        let quadrant = ((angle - smooth.value()) / FRAC_PI_2).round() * FRAC_PI_2;
+        smooth + quadrant
+    }
+
+    /// |`self`|, with the derivatives of `self` itself at the kink 0.
+    #[must_use]
+    #[inline]
+    fn abs(self) -> Self {
+        if self.value() < 0.0 { -self } else { self }
+    }
+
+    /// The smaller of two, with its derivatives: those of `self` where they are equal. Not a number if one is.
+    #[must_use]
+    #[inline]
+    fn min(self, other: Self) -> Self {
+        if other.value() < self.value() || other.value().is_nan() { other } else { self }
+    }
+
+    /// The larger of two, with its derivatives: those of `self` where they are equal. Not a number if one is.
+    #[must_use]
+    #[inline]
+    fn max(self, other: Self) -> Self {
+        if other.value() > self.value() || other.value().is_nan() { other } else { self }
+    }
 
     /// Sine of an angle in radians.
     #[must_use]
@@ -126,6 +163,10 @@ impl Scalar for f64 {
     #[inline]
     fn atan(self) -> Self {
         f64::atan(self)
+    }
+    #[inline]
+    fn tanh(self) -> Self {
+        f64::tanh(self)
     }
     #[inline]
     fn powf(self, exponent: f64) -> Self {
