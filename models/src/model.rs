@@ -16,7 +16,7 @@ use crate::affine;
 use crate::programme::{Programme, Register, Step, Value, needed, unknown};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
-use crate::{Error, MAX_STATES, is_reserved};
+use crate::{Error, MAX_STATES};
 
 /// A plant `ẋ = f(x) + g(x) u` given by an expression for each component.
 ///
@@ -144,7 +144,7 @@ fn check_name<'a>(name: &'a str, seen: &mut BTreeSet<&'a str>) -> Result<(), Str
             "is {name:?}, must be letters, digits and underscores, not starting with a digit"
         ));
     }
-    if is_reserved(name) {
+    if syntax::is_reserved(name) {
         return Err(format!("is {name:?}, which means something else in expressions"));
     }
     if !seen.insert(name) {

@@ -130,7 +130,7 @@ impl<C: Scalar> Series<C> {
             O::Square(a) => {
                 // Each pair once.
                 let sum = self.product(a, a, k, 0..k.div_ceil(2)) * 2.0;
-                if k % 2 == 0 { sum + self.get(a, k / 2).squared() } else { sum }
+                if k.is_multiple_of(2) { sum + self.get(a, k / 2).squared() } else { sum }
             }
             O::Offset(a, _) => at(a),
             O::Scale(a, number) => at(a) * f64::from_bits(number),
