@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use crate::configuration::{
     BarrierSection, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
-    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit,
+    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, over_seconds,
 };
 
 /// Log categories: name and meaning.
@@ -285,17 +285,6 @@ impl Table {
         let end = self.variables.len();
         (self, Layout { parameters, end, ..layout })
     }
-}
-
-/// The unit of a derivative: `m` over s², `m/s` over s.
-fn over_seconds(unit: &str, degree: usize) -> String {
-    let (above, mut power) = match unit.split_once("/s") {
-        Some((above, "")) => (above, 1),
-        Some((above, power)) => (above, power.parse().unwrap_or(1)),
-        None => (unit, 0),
-    };
-    power += degree;
-    if power == 1 { format!("{above}/s") } else { format!("{above}/s{power}") }
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {

@@ -22,7 +22,7 @@ pub use parameter::{Parameter, Range, updated};
 pub use plant::{IntegrationSection, PlantConfiguration};
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
-pub use unit::base_unit;
+pub use unit::{base_unit, over_seconds};
 
 use serde::{Deserialize, Serialize};
 

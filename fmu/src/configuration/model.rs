@@ -283,3 +283,6 @@ fn check_variable(path: &str, name: &str, unit: &str, range: Range) -> Result<()
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -43,6 +43,23 @@ pub fn base_unit(name: &str) -> Option<BaseUnit> {
     Some(base)
 }
 
+/// The unit of a derivative of order `degree`: `m` over s², `m/s` over s.
+pub fn over_seconds(unit: &str, degree: usize) -> String {
+    let (above, below) = unit.split_once('/').unwrap_or((unit, ""));
+    let (mut power, mut factors) = (degree, Vec::new());
+    for factor in below.split('.').filter(|factor| !factor.is_empty()) {
+        match factor
+            .strip_prefix('s')
+            .map(|digits| if digits.is_empty() { "1" } else { digits }.parse::<usize>())
+        {
+            Some(Ok(exponent)) => power += exponent,
+            _ => factors.push(factor.to_owned()),
+        }
+    }
+    factors.push(if power == 1 { "s".to_owned() } else { format!("s{power}") });
+    format!("{above}/{}", factors.join("."))
+}
+
 /// Symbols with their exponents of kg, m, s, A, K, mol, cd and rad.
 const SYMBOLS: [(&str, [i32; 8]); 15] = [
     ("kg", [1, 0, 0, 0, 0, 0, 0, 0]),
@@ -77,6 +94,20 @@ pub(super) fn check_unit(field: &str, name: &str) -> Result<(), ConfigurationErr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_of_derivatives() {
+        for (unit, degree, wanted) in [
+            ("m", 1, "m/s"),
+            ("m/s", 2, "m/s3"),
+            ("1", 2, "1/s2"),
+            ("N.m/rad", 1, "N.m/rad.s"),
+            ("V/A2.s", 3, "V/A2.s4"),
+        ] {
+            assert_eq!(over_seconds(unit, degree), wanted);
+            assert!(base_unit(wanted).is_some(), "{wanted}");
+        }
+    }
 
     #[test]
     fn units_are_read() {
