@@ -250,7 +250,7 @@ where
 }
 
 /// A plant chosen at run time: [`ControlAffine`] behind slices, in plain numbers.
-pub trait DynPlant: Send + Sync {
+pub trait DynPlant: Send {
     /// Number of states.
     fn state_dim(&self) -> usize;
 
@@ -266,13 +266,23 @@ pub trait DynPlant: Send + Sync {
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error>;
 }
 
+/// Checks the lengths of a state and an input.
+///
+/// # Errors
+///
+/// A slice of another length than the one beside it.
+pub fn check_lengths((x, states): (&[f64], usize), (u, inputs): (&[f64], usize)) -> Result<(), Error> {
+    length("x", x.len(), states)?;
+    length("u", u.len(), inputs)
+}
+
 /// A [`ControlAffine`] plant as a [`DynPlant`].
 #[derive(Clone, Debug)]
 pub struct Erased<P, const NX: usize, const NU: usize>(pub P);
 
 impl<P, const NX: usize, const NU: usize> DynPlant for Erased<P, NX, NU>
 where
-    P: ControlAffine<NX, NU> + Send + Sync,
+    P: ControlAffine<NX, NU> + Send,
 {
     fn state_dim(&self) -> usize {
         NX
@@ -283,8 +293,7 @@ where
     }
 
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error> {
-        length("x", x.len(), NX)?;
-        length("u", u.len(), NU)?;
+        check_lengths((x, NX), (u, NU))?;
         let next = rk4_step(&self.0, &SVector::from_column_slice(x), &SVector::from_column_slice(u), dt);
         x.copy_from_slice(next.as_slice());
         Ok(())

@@ -49,9 +49,33 @@ pub trait Scalar:
     /// Arc tangent, in radians.
     #[must_use]
     fn atan(self) -> Self;
+    /// Hyperbolic tangent.
+    #[must_use]
+    fn tanh(self) -> Self;
     /// `self` to a real power; smooth for `self` > 0.
     #[must_use]
     fn powf(self, exponent: f64) -> Self;
+
+    /// |`self`|, with the derivatives of `self` itself at the kink 0.
+    #[must_use]
+    #[inline]
+    fn abs(self) -> Self {
+        if self.value() < 0.0 { -self } else { self }
+    }
+
+    /// The smaller of two, with its derivatives: those of `self` where they are equal. Not a number if one is.
+    #[must_use]
+    #[inline]
+    fn min(self, other: Self) -> Self {
+        if other.value() < self.value() || other.value().is_nan() { other } else { self }
+    }
+
+    /// The larger of two, with its derivatives: those of `self` where they are equal. Not a number if one is.
+    #[must_use]
+    #[inline]
+    fn max(self, other: Self) -> Self {
+        if other.value() > self.value() || other.value().is_nan() { other } else { self }
+    }
 
     /// Sine of an angle in radians.
     #[must_use]
@@ -85,7 +109,7 @@ pub trait Scalar:
         (self.squared() + other.squared()).sqrt()
     }
 
-    /// The angle in radians of the point (`x`, `self`), from −π to π.
+    /// The angle in radians of the point (`x`, `self`), from −π to π; singular at the origin.
     #[must_use]
     #[inline]
     fn atan2(self, x: Self) -> Self {
@@ -154,6 +178,10 @@ impl Scalar for f64 {
     #[inline]
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
+    }
+    #[inline]
+    fn tanh(self) -> Self {
+        f64::tanh(self)
     }
     #[inline]
     fn powf(self, exponent: f64) -> Self {

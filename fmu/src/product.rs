@@ -4,16 +4,16 @@
 //! of the running instance are both read from it.
 
 use punctual_core::filter::{Phase, Status};
-use punctual_core::plants::Signal;
 use punctual_modeldescription::{
-    BaseUnit, Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
+    Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
     ModelDescription, NamingConvention, Unit, Variability, Variable, VariableKind,
 };
 use uuid::Uuid;
 
 use crate::configuration::{
     BarrierSection, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
-    FilterConfiguration, Parameter, PlantConfiguration, Range,
+    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, over_seconds,
+    quantity,
 };
 
 /// Log categories: name and meaning.
@@ -77,9 +77,12 @@ impl Product {
         let experiment = self.configuration.experiment();
         let description = match &self.configuration {
             Configuration::Filter(c) => {
-                format!("Fixed-time safety filter for a {}", c.plant.model.title())
+                format!("Fixed-time safety filter for a {}", c.plant.title())
             }
-            Configuration::Plant(c) => format!("Reference plant: {}", c.plant.model.title()),
+            Configuration::Plant(c) => match c.plant.reference() {
+                Some(plant) => format!("Reference plant: {}", plant.model.title()),
+                None => "Plant given by expressions".to_owned(),
+            },
             Configuration::Controller(c) => {
                 format!("Nominal controller ({}) for a {}", c.controller.name(), c.plant.model.title())
             }
@@ -148,41 +151,6 @@ fn units(variables: &[Variable]) -> Vec<Unit> {
         .into_iter()
         .filter_map(|name| Some(Unit { name: name.to_owned(), base: base_unit(name)? }))
         .collect()
-}
-
-/// The exponents of SI base units in a name such as `m`, `1/s` or `m2/s2`; kg is never needed here.
-fn base_unit(name: &str) -> Option<BaseUnit> {
-    let mut base = BaseUnit::default();
-    for (part, sign) in name.splitn(2, '/').zip([1, -1]) {
-        let symbol = part.trim_end_matches(|c: char| c.is_ascii_digit());
-        let exponent = match &part[symbol.len()..] {
-            "" => 1,
-            digits => digits.parse().ok()?,
-        };
-        match symbol {
-            "" if part == "1" => {}
-            "m" => base.m = sign * exponent,
-            "s" => base.s = sign * exponent,
-            "rad" => base.rad = sign * exponent,
-            _ => return None,
-        }
-    }
-    Some(base)
-}
-
-/// The physical quantity that a unit measures, in the words of the Modelica Standard Library.
-fn quantity(unit: &str) -> Option<String> {
-    let name = match unit {
-        "s" => "Time",
-        "m" => "Length",
-        "m/s" => "Velocity",
-        "m/s2" => "Acceleration",
-        "rad" => "Angle",
-        "rad/s" => "AngularVelocity",
-        "rad/s2" => "AngularAcceleration",
-        _ => return None,
-    };
-    Some(name.to_owned())
 }
 
 /// The enumeration type of `status`.
@@ -274,13 +242,20 @@ impl Table {
         &mut self.variables[last]
     }
 
-    fn signal(&mut self, prefix: &str, signal: &Signal, what: &str, causality: Causality) -> &mut Variable {
+    fn signal(
+        &mut self,
+        prefix: &str,
+        signal: &VariableSection,
+        what: &str,
+        causality: Causality,
+    ) -> &mut Variable {
         let start = (causality == Causality::Input).then_some(0.0);
+        let description = if signal.description.is_empty() { &signal.name } else { &signal.description };
         self.add(
             format!("{prefix}.{}", signal.name),
-            &format!("{what}{}", signal.description),
+            &format!("{what}{description}"),
             causality,
-            real(start, signal.unit),
+            real(start, &signal.unit),
         )
     }
 
@@ -290,8 +265,8 @@ impl Table {
             min: row.range.min,
             max: row.range.max,
             nominal: None,
-            quantity: quantity(row.unit),
-            unit: Some(row.unit.to_owned()),
+            quantity: quantity(&row.unit),
+            unit: Some(row.unit.clone().into_owned()),
         };
         self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
         self.ranges.push(row.range);
@@ -314,17 +289,6 @@ impl Table {
     }
 }
 
-/// The unit of a derivative: `m` over s², `m/s` over s.
-fn over_seconds(unit: &str, degree: usize) -> String {
-    let (above, mut power) = match unit.split_once("/s") {
-        Some((above, "")) => (above, 1),
-        Some((above, power)) => (above, power.parse().unwrap_or(1)),
-        None => (unit, 0),
-    };
-    power += degree;
-    if power == 1 { format!("{above}/s") } else { format!("{above}/s{power}") }
-}
-
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
     VariableKind::Real {
         start,
@@ -337,10 +301,13 @@ fn real(start: Option<f64>, unit: &str) -> VariableKind {
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
-    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let (states, inputs) = (&c.plant.states(), &c.plant.inputs());
     let mut table = Table::default();
     for state in states {
-        table.signal("x", state, "measured ", Causality::Input);
+        let measured = table.signal("x", state, "measured ", Causality::Input);
+        if let VariableKind::Real { start, min, max, .. } = &mut measured.kind {
+            (*start, *min, *max) = (Some(state.range().nearest(0.0)), state.min, state.max);
+        }
     }
     for (name, unit, start, description) in c.barrier.iter().flat_map(BarrierSection::inputs) {
         table.add(name, description, Causality::Input, real(Some(start), unit));
@@ -360,7 +327,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     let enumerated = |t: &str| VariableKind::Enumeration { declared_type: t.into(), start: None };
     table.add("status".into(), "what u means", output, enumerated(STATUS));
     for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
-        let unit = barrier.unit(c.plant.model);
+        let unit = &barrier.unit(&c.plant);
         let rate_unit = &over_seconds(unit, degree);
         let name = |field: &str| format!("{}.{field}", barrier.name);
         let flag = || VariableKind::Boolean { start: None };
@@ -394,7 +361,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
 }
 
 fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
-    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let (states, inputs) = (&c.plant.states(), &c.plant.inputs());
     let mut table = Table::default();
     for input in inputs {
         table.signal("u", input, "", Causality::Input);
@@ -418,7 +385,7 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
     let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
     let mut table = Table::default();
     for state in states {
-        table.signal("x", state, "measured ", Causality::Input);
+        table.signal("x", &state.into(), "measured ", Causality::Input);
     }
     for (name, unit, start, description) in c.goal_inputs() {
         table.add(name.to_owned(), description, Causality::Input, real(Some(start), unit));
@@ -433,7 +400,7 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
             }
             _ => (0..outputs as u32).collect(),
         };
-        table.signal("u_ref", input, "wanted ", Causality::Output).dependencies = Some(dependencies);
+        table.signal("u_ref", &input.into(), "wanted ", Causality::Output).dependencies = Some(dependencies);
     }
     if c.controller == ControllerName::Waypoints {
         let kind =

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
 use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
+    VariableSection,
 };
 use punctual_fmu::product::describe;
 use serde::Serialize;
@@ -44,7 +45,7 @@ struct FilterReport {
     step: f64,
     barriers: Vec<BarrierReport>,
     /// The start given, by state.
-    start: Option<Vec<(&'static str, f64)>>,
+    start: Option<Vec<(String, f64)>>,
     /// Status of the first sample from there.
     status: Option<&'static str>,
     warnings: Vec<String>,
@@ -58,7 +59,7 @@ struct BarrierReport {
     name: String,
     shape: &'static str,
     /// Unit of h.
-    unit: &'static str,
+    unit: String,
     relative_degree: usize,
     method: &'static str,
     /// In s.
@@ -114,17 +115,17 @@ struct ControllerReport {
 struct ParameterReport {
     name: String,
     value: f64,
-    unit: &'static str,
+    unit: String,
     description: String,
 }
 
 #[derive(Serialize)]
 struct SignalReport {
-    name: &'static str,
-    unit: &'static str,
+    name: String,
+    unit: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     start: Option<f64>,
-    description: &'static str,
+    description: String,
 }
 
 /// Checks the configuration. From a start, the code is 1 where the filter gives no guarantee.
@@ -188,7 +189,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
 /// The start that the arguments give, in the order of the filter's states.
 fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<Option<Vec<f64>>, Error> {
-    let states = configuration.plant.model.states();
+    let states = configuration.plant.states();
     if let Some(file) = &arguments.plant {
         let plant = match package::read_configuration(file)? {
             Configuration::Plant(plant) => plant,
@@ -197,13 +198,13 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 return Err(Error::configuration("kind", message).in_file(file));
             }
         };
-        let missing = states.iter().find(|s| !plant.x0.contains_key(s.name));
+        let missing = states.iter().find(|s| !plant.x0.contains_key(&s.name));
         return match missing {
             Some(state) => {
                 let message = format!("has no state {}, which the filter measures", state.name);
                 Err(Error::configuration("plant.model", message).in_file(file))
             }
-            None => Ok(Some(states.iter().map(|s| plant.x0[s.name]).collect())),
+            None => Ok(Some(states.iter().map(|s| plant.x0[&s.name]).collect())),
         };
     }
     let Some(text) = &arguments.x0 else { return Ok(None) };
@@ -213,7 +214,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
         let (name, value) =
             part.split_once('=').ok_or_else(|| refuse(format!("is {part:?}, must be like {:?}", "v=1.5")))?;
         let Some(index) = states.iter().position(|s| s.name == name.trim()) else {
-            let names: Vec<_> = states.iter().map(|s| s.name).collect();
+            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             return Err(refuse(format!(
                 "{:?} is no state, must be one of {}",
                 name.trim(),
@@ -228,7 +229,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
 
 fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterReport, Error> {
     let mut filter = c.build()?;
-    let inputs = c.plant.model.inputs().len();
+    let inputs = c.plant.inputs().len();
     let status = match start.as_deref() {
         Some(x0) => {
             // The points that barriers follow are where the configuration says.
@@ -242,7 +243,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let mut barriers = Vec::new();
     for (i, section) in c.barrier.iter().enumerate() {
-        let (name, unit) = (&section.name, section.unit(c.plant.model));
+        let (name, unit) = (&section.name, section.unit(&c.plant));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
         let default_rate = BarrierSettings::default_rate(settings.deadline, step);
         let begun = start.is_some();
@@ -313,14 +314,14 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             start,
         });
     }
-    let states = c.plant.model.states();
+    let states = c.plant.states();
     Ok(FilterReport {
         kind: "filter",
         name: c.name.clone(),
-        model: c.plant.model.name(),
+        model: c.plant.name(),
         step,
         barriers,
-        start: start.map(|x0| states.iter().map(|s| s.name).zip(x0).collect()),
+        start: start.map(|x0| states.into_iter().map(|s| s.name).zip(x0).collect()),
         status,
         warnings,
         effort: None,
@@ -337,8 +338,7 @@ fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) ->
 }
 
 fn plant(c: &PlantConfiguration) -> PlantReport {
-    let model = c.plant.model;
-    let signal = |s: &punctual_core::plants::Signal, start| SignalReport {
+    let signal = |s: VariableSection, start| SignalReport {
         name: s.name,
         unit: s.unit,
         start,
@@ -349,9 +349,15 @@ fn plant(c: &PlantConfiguration) -> PlantReport {
     PlantReport {
         kind: "plant",
         name: c.name.clone(),
-        model: model.name(),
-        states: model.states().iter().map(|s| signal(s, c.x0.get(s.name).copied())).collect(),
-        inputs: model.inputs().iter().map(|s| signal(s, None)).collect(),
+        model: c.plant.name(),
+        states: c
+            .plant
+            .states()
+            .into_iter()
+            .map(|s| (c.x0.get(&s.name).copied(), s))
+            .map(|(x0, s)| signal(s, x0))
+            .collect(),
+        inputs: c.plant.inputs().into_iter().map(|s| signal(s, None)).collect(),
         step,
         substeps: substeps as u64,
         inner_step: step / substeps,
@@ -362,7 +368,7 @@ fn controller(c: &ControllerConfiguration) -> ControllerReport {
     let parameter = |row: punctual_fmu::configuration::Parameter<ControllerConfiguration>| ParameterReport {
         value: row.get(&mut c.clone()),
         name: row.name,
-        unit: row.unit,
+        unit: row.unit.into_owned(),
         description: row.description,
     };
     ControllerReport {
@@ -425,7 +431,7 @@ fn plant_text(report: &PlantReport) -> String {
     for (prefix, signals) in [("x", &report.states), ("u", &report.inputs)] {
         rows.extend(signals.iter().map(|s| {
             let start = s.start.map(number).unwrap_or_default();
-            vec![format!("{prefix}.{}", s.name), start, s.unit.to_owned(), s.description.to_owned()]
+            vec![format!("{prefix}.{}", s.name), start, s.unit.clone(), s.description.clone()]
         }));
     }
     format!(
@@ -445,7 +451,7 @@ fn controller_text(report: &ControllerReport) -> String {
         report
             .parameters
             .iter()
-            .map(|p| vec![p.name.clone(), number(p.value), p.unit.to_owned(), p.description.clone()]),
+            .map(|p| vec![p.name.clone(), number(p.value), p.unit.clone(), p.description.clone()]),
     );
     format!(
         "{}: controller, {} of {}\n\n{}\n\nsteps of {} s; it promises nothing",

@@ -1,5 +1,5 @@
 //! What `check` finds by running the filter it checks in a closed loop: the soonest deadline, the smallest
-//! bounds. With damping as u_ref, on the filter's own model.
+//! bounds. With damping as u_ref on a reference plant, u_ref = 0 on another, on the filter's own model.
 
 use punctual_core::effort::{self, CANDIDATES, Candidate};
 use punctual_core::filter::{ProfileKind, SafetyFilter};
@@ -88,12 +88,13 @@ fn run(
     let schedule = Schedule { step, steps: (2.0 * longest / step).ceil() as usize, substeps };
     let start: Vec<f64> = x0.iter().copied().chain(c.points()).collect();
     let states = x0.len();
-    let point_mass = c.plant.model == ModelName::PointMass;
+    let point_mass = c.plant.model == Some(ModelName::PointMass);
+    let vehicle = c.plant.model.is_some() && states > 3;
     effort::run(filter, &*plant, (c.experiment.start_time, &start), schedule, deadlines, |x, u_ref| {
         u_ref.fill(0.0);
         if point_mass {
             u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
-        } else if states > 3 {
+        } else if vehicle {
             u_ref[0] = damping(x[3], DAMPING);
         }
     })
@@ -156,7 +157,7 @@ fn name(profile: ProfileKind) -> &'static str {
 /// keep theirs.
 pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingReport>, Error> {
     let driven: Vec<usize> =
-        c.plant.model.inputs().iter().enumerate().filter(|(_, s)| s.unit == "m/s2").map(|(i, _)| i).collect();
+        c.plant.inputs().iter().enumerate().filter(|(_, s)| s.unit == "m/s2").map(|(i, _)| i).collect();
     let configured = |candidate: &Candidate, bound: f64| {
         let mut tried = c.clone();
         for section in &mut tried.barrier {
@@ -169,7 +170,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
         }
         for &i in &driven {
             let limit = bound.min(UNBOUNDED);
-            tried.bounds.insert(c.plant.model.inputs()[i].name.to_owned(), [-limit, limit]);
+            tried.bounds.insert(c.plant.inputs()[i].name.clone(), [-limit, limit]);
         }
         tried
     };
@@ -192,7 +193,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
             // Rounded up: the bound found is one that works.
             let bound = (bound * 1e3).ceil() / 1e3;
             lines.push("[bounds]".to_owned());
-            let inputs = c.plant.model.inputs();
+            let inputs = c.plant.inputs();
             lines.extend(driven.iter().map(|&i| format!("{} = [{:?}, {bound:?}]", inputs[i].name, -bound)));
         }
         lines.join("\n")

@@ -259,7 +259,7 @@ impl<'a> Slave<'a> {
     /// Asserts that every output shows the last sample of `filter` and the input `u`, bit for bit.
     pub(crate) fn shows(&self, filter: &SafetyFilter, u: &[f64], when: &str) {
         let report = filter.report();
-        for (signal, wanted) in self.fmu.filter().plant.model.inputs().iter().zip(u) {
+        for (signal, wanted) in self.fmu.filter().plant.inputs().iter().zip(u) {
             let found = self.real(&format!("u.{}", signal.name));
             assert_eq!(found.to_bits(), wanted.to_bits(), "u.{} {when}: {found} {wanted}", signal.name);
         }

@@ -30,8 +30,10 @@ fn crates_depend_on_crates_below_them_only() {
     let edges = [
         ("core/Cargo.toml", &[][..]),
         ("modeldescription/Cargo.toml", &[]),
-        ("fmu/Cargo.toml", &["punctual-core", "punctual-modeldescription"]),
-        ("Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription"]),
+        ("models/Cargo.toml", &["punctual-core"]),
+        ("fmu/Cargo.toml", &["punctual-core", "punctual-modeldescription", "punctual-models"]),
+        // The models for a benchmark only.
+        ("Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription", "punctual-models"]),
     ];
     for (path, allowed) in edges {
         let manifest = manifest(path);
@@ -51,12 +53,19 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         // The one writes archives, the other reads those of others.
         ("zip", &["modeldescription/Cargo.toml", "Cargo.toml"]),
         ("toml", &["fmu/Cargo.toml"]),
+        ("winnow", &["models/Cargo.toml"]),
         ("clap", &["Cargo.toml"]),
         ("fmi-rs", &["Cargo.toml"]),
         ("object", &["Cargo.toml"]),
         ("roxmltree", &["Cargo.toml"]),
     ];
-    for path in ["Cargo.toml", "core/Cargo.toml", "modeldescription/Cargo.toml", "fmu/Cargo.toml"] {
+    for path in [
+        "Cargo.toml",
+        "core/Cargo.toml",
+        "modeldescription/Cargo.toml",
+        "models/Cargo.toml",
+        "fmu/Cargo.toml",
+    ] {
         let dependencies = manifest(path).dependencies;
         for (name, owners) in owners {
             assert_eq!(dependencies.contains_key(name), owners.contains(&path), "{name} in {path}");
@@ -188,6 +197,15 @@ fn modules_of_the_fmu_use_modules_above_them() {
     Order { folder: "fmu/src/", lines: documented, excepted: &[] }.check();
 }
 
+/// The order of the table in models/src/lib.rs.
+#[test]
+fn modules_of_the_models_use_modules_above_them() {
+    let documented = documented("models/src/lib.rs", |line| {
+        Some(line.strip_prefix("//! | `")?.split('`').next()?.to_owned())
+    });
+    Order { folder: "models/src/", lines: documented, excepted: &[] }.check();
+}
+
 /// The order of the list in src/lib.rs.
 #[test]
 fn modules_of_the_command_line_use_modules_above_them() {
@@ -225,6 +243,7 @@ fn each_dependency_is_named_in_one_place() {
         (&["quick_xml", ":", ":"], &["modeldescription/src/"]),
         (&["zip", ":", ":"], &["modeldescription/src/", "src/host/archive.rs"]),
         (&["toml", ":", ":"], &["fmu/src/configuration/"]),
+        (&["winnow", ":", ":"], &["models/src/syntax.rs"]),
         (&["clap", ":", ":"], &["src/"]),
         (&["fmi_rs", ":", ":"], &["src/host/"]),
         (&["libloading", ":", ":"], &["src/host/"]),

@@ -57,9 +57,9 @@ pub(crate) static SOURCES: LazyLock<Vec<Source>> = LazyLock::new(|| {
     rust.map(|text| Source { path: text.path.clone(), lexed: lex(&text.text) }).collect()
 });
 
-/// The Rust files of the four crates themselves.
+/// The Rust files of the five crates themselves.
 pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
-    let folders = ["src/", "core/src/", "modeldescription/src/", "fmu/src/"];
+    let folders = ["src/", "core/src/", "modeldescription/src/", "models/src/", "fmu/src/"];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))
 }
 

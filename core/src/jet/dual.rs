@@ -149,6 +149,11 @@ impl<const M: usize> Scalar for Dual<M> {
         self.chain(self.value.atan(), 1.0 / (1.0 + self.value * self.value))
     }
     #[inline]
+    fn tanh(self) -> Self {
+        let value = self.value.tanh();
+        self.chain(value, 1.0 - value * value)
+    }
+    #[inline]
     fn powf(self, exponent: f64) -> Self {
         self.chain(self.value.powf(exponent), exponent * self.value.powf(exponent - 1.0))
     }

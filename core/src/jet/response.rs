@@ -216,6 +216,11 @@ impl<const M: usize, const K: usize> Scalar for Response<M, K> {
         self.chain(self.series.atan(), Taylor::from(1.0) / (self.series.squared() + 1.0))
     }
     #[inline(always)]
+    fn tanh(self) -> Self {
+        let value = self.series.tanh();
+        self.chain(value, -value.squared() + 1.0)
+    }
+    #[inline(always)]
     fn powf(self, exponent: f64) -> Self {
         self.chain(self.series.powf(exponent), self.series.powf(exponent - 1.0) * exponent)
     }
@@ -247,7 +252,7 @@ mod tests {
     }
 
     /// What a model would do with a scalar: every operation.
-    fn operations<S: Scalar>(a: S, b: S, t: S) -> [S; 12] {
+    fn operations<S: Scalar>(a: S, b: S, t: S) -> [S; 18] {
         let (sin, cos) = a.sin_cos();
         [
             a + b * t,
@@ -262,6 +267,12 @@ mod tests {
             cos.atan(),
             a.powf(1.7),
             b.powi(-3),
+            (a - b).tanh(),
+            a.atan2(b),
+            (-b).atan2(-a),
+            (a - b).abs(),
+            a.min(b * t),
+            a.max(b * t),
         ]
     }
 

@@ -134,6 +134,11 @@ impl<C: Scalar> Scalar for Tangent<C> {
         self.chain(self.value.atan(), C::one() / (self.value.squared() + 1.0))
     }
     #[inline]
+    fn tanh(self) -> Self {
+        let value = self.value.tanh();
+        self.chain(value, C::one() - value.squared())
+    }
+    #[inline]
     fn powf(self, exponent: f64) -> Self {
         self.chain(self.value.powf(exponent), self.value.powf(exponent - 1.0) * exponent)
     }
@@ -145,7 +150,7 @@ mod tests {
     use crate::jet::Dual;
 
     /// Every operation, at arguments where all are smooth.
-    fn operations<S: Scalar>(a: S, b: S) -> [S; 10] {
+    fn operations<S: Scalar>(a: S, b: S) -> [S; 12] {
         let (sin, cos) = a.sin_cos();
         [
             a * b - a / b,
@@ -158,6 +163,8 @@ mod tests {
             cos.atan(),
             a.powf(1.7),
             b.powi(-3),
+            a.tanh(),
+            (a - b).atan2(b),
         ]
     }
 

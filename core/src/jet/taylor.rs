@@ -266,6 +266,22 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         Self { coefficients: y }
     }
 
+    /// From `y' = a' (1 − y²)`.
+    #[inline]
+    fn tanh(self) -> Self {
+        let a = &self.coefficients;
+        let (mut y, mut d) = ([C::zero(); K], [C::zero(); K]);
+        y[0] = a[0].tanh();
+        d[0] = -y[0].squared() + 1.0;
+        for k in 1..K {
+            y[k] = Self::derivative_product(a, &d, k, 1) * (1.0 / k as f64);
+            for i in 0..=k {
+                d[k] -= y[i] * y[k - i];
+            }
+        }
+        Self { coefficients: y }
+    }
+
     /// From `a y' = p a' y`.
     #[inline]
     fn powf(self, exponent: f64) -> Self {
@@ -330,6 +346,39 @@ mod tests {
         assert_close(a.powf(0.5), a.sqrt());
         assert_close(a.powi(5), a.powf(5.0));
         assert_close((a + a).exp(), a.exp().squared());
+        let e = (a + a).exp();
+        assert_close(a.tanh(), (e - 1.0) / (e + 1.0));
+    }
+
+    /// In each octant: tangent, and the value that plain numbers have.
+    #[test]
+    fn angles_of_points() {
+        let a = sample();
+        for (y, x) in [(a, a + 1.0), (a + 1.0, a), (a + 1.0, -a), (a, -a - 1.0)] {
+            for (y, x) in [(y, x), (-y, x)] {
+                let angle = y.atan2(x);
+                assert_close(angle.tan(), y / x);
+                // Two roundings of numbers up to π.
+                assert!((angle.value() - y.value().atan2(x.value())).abs() < 1e-15);
+            }
+        }
+        assert!(!Jet::from(0.0).atan2(Jet::from(0.0)).coefficients[1].gradient[0].is_finite());
+    }
+
+    #[test]
+    fn kinks_take_the_first() {
+        let a = sample();
+        assert_eq!((-a).abs(), a);
+        assert_eq!((a.abs(), a.min(a + 1.0), a.max(a - 1.0)), (a, a, a));
+        assert_eq!(((a + 1.0).min(a), (a - 1.0).max(a)), (a, a));
+        // A tie: `self`.
+        let steeper = Jet::constant(a.coefficients[0]);
+        assert_eq!((a.min(steeper), a.max(steeper), steeper.min(a)), (a, a, steeper));
+        let t = Taylor::<f64, 3>::time(0.0);
+        assert_eq!(t.abs(), t);
+        let nan = Jet::from(f64::NAN);
+        assert!(a.min(nan).value().is_nan() && nan.min(a).value().is_nan());
+        assert!(a.max(nan).value().is_nan() && nan.max(a).value().is_nan());
     }
 
     #[test]

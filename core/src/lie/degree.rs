@@ -14,11 +14,11 @@ use std::array::from_fn;
 use nalgebra::SVector;
 
 use super::barrier_series;
-use crate::MAX_RELATIVE_DEGREE;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, RelativeDegree};
 use crate::jet::Response;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// Number of Taylor coefficients taken: every order that is supported.
 const K: usize = MAX_RELATIVE_DEGREE + 1;
@@ -87,69 +87,101 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let mut findings = Findings::<NU>::default();
-    for x in samples {
-        findings.add(plant, barrier, t, x);
-    }
-    findings.verdict()
+    let samples = samples.iter().map(|x| (t, x.as_slice().to_vec()));
+    relative_degree_of(NU, samples, |t, x| coefficients(plant, barrier, t, x))
 }
 
-/// The relative degree found on built-in samples: states whose components have either sign and sizes
-/// from 0.01 to 100, at times from 0 to 10 s. The same ones on every call.
+/// The relative degree found on built-in samples: [`samples`] of states without a range.
 pub fn detected<P, B, const NX: usize, const NU: usize>(plant: &P, barrier: &B) -> RelativeDegree
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let mut findings = Findings::<NU>::default();
+    let samples = samples(&[[f64::NEG_INFINITY, f64::INFINITY]; NX]);
+    relative_degree_of(NU, samples, |t, x| coefficients(plant, barrier, t, x))
+}
+
+/// Samples to find a relative degree on: times from 0 to 10 s and states within `ranges` (`[min, max]` of each
+/// component, or infinite). A component without a range has either sign and a size from 0.01 to 100; with one
+/// end, it is that far away from it. The same samples on every call.
+pub fn samples(ranges: &[[f64; 2]]) -> Vec<(f64, Vec<f64>)> {
     let mut numbers = Numbers(0);
-    for _ in 0..SAMPLES {
-        let t = 10.0 * numbers.unit();
-        let x = SVector::<f64, NX>::from_fn(|_, _| {
+    let mut state = |range: &[f64; 2]| match range.map(f64::is_finite) {
+        [true, true] => range[0] + (range[1] - range[0]) * numbers.unit(),
+        [true, false] => range[0] + numbers.size(),
+        [false, true] => range[1] - numbers.size(),
+        [false, false] => {
             let sign = if numbers.unit() < 0.5 { -1.0 } else { 1.0 };
-            sign * 10_f64.powf(4.0 * numbers.unit() - 2.0)
-        });
-        findings.add(plant, barrier, t, &x);
+            sign * numbers.size()
+        }
+    };
+    (0..SAMPLES).map(|_| (10.0 * state(&[0.0, 1.0]), ranges.iter().map(&mut state).collect())).collect()
+}
+
+/// The first Taylor coefficients of h(t, x(t)) at u = 0, each with its derivatives along the inputs.
+pub type Coefficients = [(f64, [f64; MAX_INPUTS]); MAX_RELATIVE_DEGREE + 1];
+
+/// The relative degree of a model with `inputs` ≤ [`MAX_INPUTS`] inputs that is not one of the traits', found at
+/// times (s) and states `samples` from its `series(t, x)`. Samples at which that is not finite are passed over.
+pub fn relative_degree_of(
+    inputs: usize,
+    samples: impl IntoIterator<Item = (f64, Vec<f64>)>,
+    mut series: impl FnMut(f64, &[f64]) -> Coefficients,
+) -> RelativeDegree {
+    let mut findings = Findings { inputs, lowest: [None; MAX_INPUTS], first: [0; K], finite: 0 };
+    for (t, x) in samples {
+        findings.add(t, &x, &mut series);
     }
     findings.verdict()
 }
 
+fn coefficients<P, B, const NX: usize, const NU: usize>(
+    plant: &P,
+    barrier: &B,
+    t: f64,
+    x: &[f64],
+) -> Coefficients
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    let series: Response<NU, K> = barrier_series(plant, barrier, t, &SVector::from_column_slice(x));
+    from_fn(|k| {
+        let (value, gradient) = series.coefficient(k);
+        (value, from_fn(|i| gradient.get(i).copied().unwrap_or_default()))
+    })
+}
+
 /// For each input the first order at which it enters.
-type Orders<const NU: usize> = [Option<usize>; NU];
+type Orders = [Option<usize>; MAX_INPUTS];
 
 /// What the samples showed.
-struct Findings<const NU: usize> {
+struct Findings {
+    /// Number of inputs; what follows is `None` for those above.
+    inputs: usize,
     /// Per input the lowest order over all samples.
-    lowest: Orders<NU>,
+    lowest: Orders,
     /// `first[k]`: number of samples at which the input that comes first enters at order k.
     first: [usize; K],
     /// Samples at which everything was finite.
     finite: usize,
 }
 
-impl<const NU: usize> Default for Findings<NU> {
-    fn default() -> Self {
-        Self { lowest: [None; NU], first: [0; K], finite: 0 }
-    }
-}
-
-impl<const NU: usize> Findings<NU> {
-    fn add<P, B, const NX: usize>(&mut self, plant: &P, barrier: &B, t: f64, x: &SVector<f64, NX>)
-    where
-        P: ControlAffine<NX, NU>,
-        B: Barrier<NX>,
-    {
+impl Findings {
+    fn add(&mut self, t: f64, x: &[f64], series: &mut impl FnMut(f64, &[f64]) -> Coefficients) {
         /// How far a neighbour is, as a part of the component and absolutely: far enough that a
         /// gradient that vanishes at the sample only is seen there.
         const AWAY: f64 = 1e-3;
-        let Some(mut orders) = orders(plant, barrier, t, x) else { return };
+        let Some(mut orders) = orders(&series(t, x)) else { return };
         let mut numbers = Numbers(1);
         for _ in 0..2 {
-            if first(&orders).is_some() && (0..NU).all(|i| orders[i] == first(&orders)) {
+            if first(&orders).is_some() && orders[..self.inputs].iter().all(|&order| order == first(&orders))
+            {
                 break;
             }
-            let beside = x.map(|v| v + AWAY * (1.0 + v.abs()) * (2.0 * numbers.unit() - 1.0));
-            if let Some(neighbour) = self::orders(plant, barrier, t, &beside) {
+            let mut away = |v: &f64| v + AWAY * (1.0 + v.abs()) * (2.0 * numbers.unit() - 1.0);
+            let beside: Vec<f64> = x.iter().map(&mut away).collect();
+            if let Some(neighbour) = self::orders(&series(t, &beside)) {
                 orders = lower(orders, neighbour);
             }
         }
@@ -166,7 +198,7 @@ impl<const NU: usize> Findings<NU> {
         }
         let Some(n) = first(&self.lowest) else { return RelativeDegree::Unreached };
         if self.lowest.iter().flatten().any(|&order| order != n) {
-            return RelativeDegree::Mixed(self.lowest.to_vec());
+            return RelativeDegree::Mixed(self.lowest[..self.inputs].to_vec());
         }
         let reached: usize = self.first.iter().sum();
         if (reached - self.first[n]) * PASSED_OVER > reached {
@@ -176,11 +208,11 @@ impl<const NU: usize> Findings<NU> {
     }
 }
 
-fn first<const NU: usize>(orders: &Orders<NU>) -> Option<usize> {
+fn first(orders: &Orders) -> Option<usize> {
     orders.iter().flatten().copied().min()
 }
 
-fn lower<const NU: usize>(mut a: Orders<NU>, b: Orders<NU>) -> Orders<NU> {
+fn lower(mut a: Orders, b: Orders) -> Orders {
     for (a, b) in a.iter_mut().zip(b) {
         *a = [*a, b].into_iter().flatten().min();
     }
@@ -188,18 +220,7 @@ fn lower<const NU: usize>(mut a: Orders<NU>, b: Orders<NU>) -> Orders<NU> {
 }
 
 /// The orders at one sample, `None` where the model is not finite.
-fn orders<P, B, const NX: usize, const NU: usize>(
-    plant: &P,
-    barrier: &B,
-    t: f64,
-    x: &SVector<f64, NX>,
-) -> Option<Orders<NU>>
-where
-    P: ControlAffine<NX, NU>,
-    B: Barrier<NX>,
-{
-    let series: Response<NU, K> = barrier_series(plant, barrier, t, x);
-    let c: [_; K] = from_fn(|k| series.coefficient(k));
+fn orders(c: &Coefficients) -> Option<Orders> {
     if !c.iter().all(|(value, gradient)| value.is_finite() && gradient.iter().all(|d| d.is_finite())) {
         return None;
     }
@@ -210,7 +231,7 @@ where
     let time = changes().next().and_then(|j| changes().skip(1).map(|k| ratio(j, k)).reduce(f64::min));
     let time = time.map_or(1.0, |time| time.clamp(1e-6, 1e6));
     let scaled = |k: usize, i: usize| c[k].1[i].abs() * time.powi(k as i32);
-    let mut found = [None; NU];
+    let mut found = [None; MAX_INPUTS];
     for (i, found) in found.iter_mut().enumerate() {
         let largest = (0..K).map(|k| scaled(k, i)).fold(0.0, f64::max);
         *found = (0..K).find(|&k| scaled(k, i) > SIGNIFICANT * largest);
@@ -222,6 +243,11 @@ where
 struct Numbers(u64);
 
 impl Numbers {
+    /// Between 0.01 and 100.
+    fn size(&mut self) -> f64 {
+        10_f64.powf(4.0 * self.unit() - 2.0)
+    }
+
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -197,9 +197,9 @@ impl Block for FilterBlock {
 
     fn show_refusal(&self, values: &mut Values) {
         let (outputs, inputs) = (self.layout.outputs, self.layout.inputs);
-        let names = self.configuration.plant.model.inputs();
-        for (i, input) in names.iter().enumerate() {
-            let [min, max] = self.configuration.bounds.get(input.name).copied().unwrap_or_default();
+        for i in 0..inputs {
+            let name = self.configuration.plant.input_name(i);
+            let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
             // Not `clamp`, which panics where the bounds contradict each other.
             values.reals[outputs + i] = 0.0_f64.max(min).min(max);
         }

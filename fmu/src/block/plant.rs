@@ -57,7 +57,7 @@ impl Block for PlantBlock {
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
         let u = &values.reals[..self.layout.inputs];
         if let Some(i) = u.iter().position(|v| !v.is_finite()) {
-            let name = self.configuration.plant.model.inputs()[i].name;
+            let name = self.configuration.plant.input_name(i);
             return Err(format!("u.{name} is {}, must be finite for a step from t = {t}", u[i]));
         }
         let substeps = self.configuration.integration.substeps(h);
@@ -72,8 +72,10 @@ impl Block for PlantBlock {
             self.plant.rk4_step(&mut self.next, u, h / substeps).map_err(|e| e.to_string())?;
         }
         if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
-            let name = self.configuration.plant.model.states()[i].name;
-            return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s", self.next[i]));
+            let name = self.configuration.plant.state_name(i);
+            let place = self.configuration.plant.derivatives.get(name);
+            let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
+            return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i]));
         }
         std::mem::swap(&mut self.x, &mut self.next);
         self.output(t + h, values);

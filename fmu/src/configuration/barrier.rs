@@ -8,7 +8,10 @@ use punctual_core::convergence::operator::Operator;
 use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
 use serde::{Deserialize, Serialize};
 
-use super::{ConfigurationError, FilterConfiguration, ModelName, Parameter, Range, check_identifier};
+use super::{
+    ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, ReferenceSection,
+    check_identifier, check_unit,
+};
 
 /// Default margin as a part of the radius, or of the smaller half axis or side.
 const MARGIN_OF_SIZE: f64 = 0.01;
@@ -50,8 +53,11 @@ pub enum InfeasibleName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeName {
-    /// [`DistanceDisc`]: interior of a disc, smooth and distance-shaped. The one to use.
+    /// Not said: `expression` where there is one, else `disc`. Not in a completed configuration.
     #[default]
+    #[serde(skip)]
+    Unstated,
+    /// [`DistanceDisc`]: interior of a disc, smooth and distance-shaped. The one to use.
     Disc,
     /// [`QuadraticDisc`]: interior of a disc in the paper's form R² − d².
     QuadraticDisc,
@@ -73,6 +79,8 @@ pub enum ShapeName {
     AtLeast,
     /// [`NormBound`]: the speed, in either direction.
     SpeedLimit,
+    /// Where an expression of states and time is ≥ 0.
+    Expression,
 }
 
 /// A field that some shapes have and others not.
@@ -88,10 +96,12 @@ enum Field {
     Normal,
     State,
     Bound,
+    Expression,
+    Unit,
 }
 
 impl Field {
-    const ALL: [(Self, &'static str); 10] = [
+    const ALL: [(Self, &'static str); 12] = [
         (Self::Centre, "centre"),
         (Self::Velocity, "velocity"),
         (Self::Radius, "radius"),
@@ -102,6 +112,8 @@ impl Field {
         (Self::Normal, "normal"),
         (Self::State, "state"),
         (Self::Bound, "bound"),
+        (Self::Expression, "expression"),
+        (Self::Unit, "unit"),
     ];
 }
 
@@ -116,7 +128,7 @@ impl ShapeName {
         use Field::{Angle, Bound, Centre, HalfAxes, HalfSides, Normal, Radius, Smoothing, State, Velocity};
         const DISC: &[Field] = &[Centre, Velocity, Radius, Smoothing];
         match self {
-            Self::Disc => ("disc", DISC),
+            Self::Disc | Self::Unstated => ("disc", DISC),
             Self::QuadraticDisc => ("quadratic_disc", &[Centre, Velocity, Radius]),
             Self::Obstacle => ("obstacle", DISC),
             Self::Ellipse => ("ellipse", &[Centre, HalfAxes, Angle]),
@@ -127,6 +139,7 @@ impl ShapeName {
             Self::AtMost => ("at_most", &[State, Bound]),
             Self::AtLeast => ("at_least", &[State, Bound]),
             Self::SpeedLimit => ("speed_limit", &[Bound]),
+            Self::Expression => ("expression", &[Field::Expression, Field::Unit]),
         }
     }
 
@@ -145,7 +158,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 pub struct BarrierSection {
     /// Its name, a C identifier, unique; prefix of its variables.
     pub name: String,
-    /// The shape. Default `disc`.
+    /// The shape. Default `expression` where there is one, else `disc`.
     #[serde(default)]
     pub shape: ShapeName,
     /// Discs, ellipses, rectangles: centre in m; of a moving disc where it is at time 0 of the simulation,
@@ -183,6 +196,12 @@ pub struct BarrierSection {
     /// `at_most`, `at_least`: bound in the unit of the state; `speed_limit`: in m/s, > 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bound: Option<f64>,
+    /// `expression`: h, of states, parameters of the plant, and the time `t` in s of the simulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expression: Option<String>,
+    /// `expression`: the unit of h. Default `1`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// Deadline T in s after the first step, > 0.
     pub deadline: f64,
     /// How it is met. Default `reference_profile`.
@@ -243,11 +262,21 @@ pub(super) trait Visitor {
 }
 
 impl BarrierSection {
-    pub(super) fn complete(&mut self, path: &str, model: ModelName) -> Result<(), ConfigurationError> {
+    pub(super) fn complete(&mut self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
+        if self.shape == ShapeName::Unstated {
+            let own = self.expression.is_some();
+            self.shape = if own { ShapeName::Expression } else { ShapeName::Disc };
+        }
         check_identifier(&format!("{path}.name"), &self.name)?;
         let refuse =
             |field: &str, message: String| Err(ConfigurationError::new(format!("{path}.{field}"), message));
         let (shape, fields) = self.shape.row();
+        if plant.reference().is_none() && self.shape != ShapeName::Expression {
+            return refuse(
+                "shape",
+                format!("is {shape:?}, which is for the plants that have a name; give an `expression`"),
+            );
+        }
         for (field, name) in Field::ALL {
             let given = match field {
                 Field::Centre => self.centre.is_some(),
@@ -260,8 +289,10 @@ impl BarrierSection {
                 Field::Normal => self.normal.is_some(),
                 Field::State => self.state.is_some(),
                 Field::Bound => self.bound.is_some(),
+                Field::Expression => self.expression.is_some(),
+                Field::Unit => self.unit.is_some(),
             };
-            let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle);
+            let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle | Field::Unit);
             if given && !fields.contains(&field) {
                 let name = if name == "velocity" && self.centre_input { "centre_input" } else { name };
                 return refuse(name, format!("{shape} has none"));
@@ -279,10 +310,14 @@ impl BarrierSection {
         if self.shape.has(Field::Angle) {
             self.angle.get_or_insert(0.0);
         }
+        if self.shape.has(Field::Unit) {
+            check_unit(&format!("{path}.unit"), self.unit.get_or_insert("1".to_owned()))?;
+        }
+        let states = plant.states();
         if let Some(state) = &self.state
-            && model.states().iter().all(|s| s.name != *state)
+            && states.iter().all(|s| s.name != *state)
         {
-            let names: Vec<_> = model.states().iter().map(|s| s.name).collect();
+            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             return refuse("state", format!("is {state:?}, must be one of {}", names.join(", ")));
         }
         let sides = self.half_axes.or(self.half_sides).map(|[a, b]| a.min(b));
@@ -296,29 +331,40 @@ impl BarrierSection {
     }
 
     /// The unit of h.
-    pub fn unit(&self, model: ModelName) -> &'static str {
-        match self.shape {
+    pub fn unit(&self, plant: &PlantSection) -> String {
+        let unit = match self.shape {
             ShapeName::QuadraticDisc => "m2",
             ShapeName::SpeedLimit => "m/s",
             ShapeName::AtMost | ShapeName::AtLeast => {
-                let state = model.states().iter().find(|s| Some(s.name) == self.state.as_deref());
-                state.map_or("1", |s| s.unit)
+                let state = plant.states().into_iter().find(|s| Some(&s.name) == self.state.as_ref());
+                return state.map_or_else(|| "1".to_owned(), |s| s.unit);
             }
+            ShapeName::Expression => self.unit.as_deref().unwrap_or("1"),
             _ => "m",
-        }
+        };
+        unit.to_owned()
     }
 
-    pub(super) fn parameters(&self, index: usize, model: ModelName) -> Vec<Parameter<FilterConfiguration>> {
-        let unit = self.unit(model);
+    pub(super) fn parameters(
+        &self,
+        index: usize,
+        plant: &PlantSection,
+    ) -> Vec<Parameter<FilterConfiguration>> {
+        let unit = &self.unit(plant)[..];
         let mut rows = Vec::new();
-        let mut row = |field: &str, unit, range, description: &str, access: fn(&mut Self) -> &mut f64| {
-            // Configuration files count barriers from 0, as the error messages of serde do; the
-            // components of a vector are counted from 1, as in FMI.
-            let names = (format!("{}.{field}", self.name), format!("barrier[{index}].{field}"));
-            rows.push(Parameter::new(names, unit, range, description, move |c: &mut FilterConfiguration| {
-                access(&mut c.barrier[index])
-            }));
-        };
+        let mut row =
+            |field: &str, unit: &str, range, description: &str, access: fn(&mut Self) -> &mut f64| {
+                // Configuration files count barriers from 0, as the error messages of serde do; the
+                // components of a vector are counted from 1, as in FMI.
+                let names = (format!("{}.{field}", self.name), format!("barrier[{index}].{field}"));
+                rows.push(Parameter::new(
+                    names,
+                    unit.to_owned(),
+                    range,
+                    description,
+                    move |c: &mut FilterConfiguration| access(&mut c.barrier[index]),
+                ));
+            };
         let (positive, non_negative, finite) = (Range::POSITIVE, Range::NON_NEGATIVE, Range::FINITE);
         row("deadline", "s", positive, "time from the first step to be inside", |b| &mut b.deadline);
         row(
@@ -441,17 +487,18 @@ impl BarrierSection {
         ]
     }
 
-    /// Hands the shape to `visitor`, along a plant of `states` states; a centre that is an input is at the
-    /// states behind them.
+    /// Hands the shape to `visitor`, along a reference plant; a centre that is an input is at the states behind
+    /// the plant's. A barrier that is an expression is no shape, and taken for a disc here.
     pub(super) fn visit<V: Visitor>(
         &self,
-        model: &ModelName,
-        states: usize,
+        plant: ReferenceSection,
         visitor: V,
     ) -> Result<V::Output, punctual_core::Error> {
         let (centre, velocity) = (self.centre.unwrap_or_default(), self.velocity.unwrap_or_default());
         let (radius, bound) = (self.radius.unwrap_or_default(), self.bound.unwrap_or_default());
         let angle = self.angle.unwrap_or_default();
+        let signals = plant.model.states();
+        let states = signals.len();
         let disc = || {
             let smoothing = self.smoothing.filter(|s| *s != 0.0).unwrap_or(radius);
             let disc = DistanceDisc::new(centre, radius, smoothing)?.moving(velocity)?;
@@ -459,10 +506,10 @@ impl BarrierSection {
         };
         let ellipse = || Ellipse::new(centre, self.half_axes.unwrap_or_default(), angle);
         let rectangle = || Rectangle::new(centre, self.half_sides.unwrap_or_default(), angle);
-        let index = |name: &str| model.states().iter().position(|s| s.name == name);
+        let index = |name: &str| signals.iter().position(|s| s.name == name);
         let state = self.state.as_deref().and_then(index).unwrap_or(usize::MAX);
         Ok(match self.shape {
-            ShapeName::Disc => visitor.shape(disc()?),
+            ShapeName::Disc | ShapeName::Unstated | ShapeName::Expression => visitor.shape(disc()?),
             ShapeName::Obstacle => visitor.shape(Outside(disc()?)),
             ShapeName::QuadraticDisc => {
                 let disc = QuadraticDisc::new(centre, radius)?.moving(velocity)?;

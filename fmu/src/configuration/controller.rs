@@ -4,7 +4,7 @@ use punctual_core::nominal::Heading;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, check_identifier,
+    ConfigurationError, ExperimentSection, ModelName, Parameter, Range, ReferenceSection, check_identifier,
 };
 
 /// Which nominal controller.
@@ -191,7 +191,7 @@ pub struct ControllerConfiguration {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slip_limit: Option<f64>,
     /// The plant that it controls.
-    pub plant: PlantSection,
+    pub plant: ReferenceSection,
     /// The run it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
@@ -284,7 +284,9 @@ impl ControllerConfiguration {
             }));
         }
         if slips(self.controller, self.plant.model) {
-            rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
+            rows.extend(
+                self.plant.parameters(|c: &mut Self| &mut c.plant.l_r, |c: &mut Self| &mut c.plant.l_f),
+            );
         }
         rows
     }

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
-use punctual_core::lie;
+use punctual_core::lie::{self, RelativeDegree};
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, check_identifier,
+    ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, ReferenceSection,
+    ShapeName, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -34,6 +35,7 @@ pub enum SamplingName {
 /// A barrier of a configuration on its way into a filter.
 struct Adding<'a> {
     configuration: &'a FilterConfiguration,
+    plant: ReferenceSection,
     builder: FilterBuilder,
     index: usize,
     point: Option<usize>,
@@ -46,8 +48,8 @@ impl Visitor for Adding<'_> {
     where
         B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
     {
-        let Self { configuration: c, builder, index, point } = self;
-        let (model, at) = (&c.plant, Place { index, point });
+        let Self { configuration: c, plant: model, builder, index, point } = self;
+        let at = Place { index, point };
         match model.model {
             ModelName::PointMass => c.add_along::<_, _, 4, 8>(builder, at, PointMass, barrier),
             ModelName::Unicycle => c.add_along::<_, _, 4, 8>(builder, at, Unicycle, barrier),
@@ -132,24 +134,26 @@ impl FilterConfiguration {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
         }
         for i in 0..self.barrier.len() {
-            self.barrier[i].complete(&format!("barrier[{i}]"), self.plant.model)?;
+            self.barrier[i].complete(&format!("barrier[{i}]"), &self.plant)?;
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
             let reserved =
                 ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f"].contains(&&*name);
+            let reserved = reserved || self.plant.parameters.iter().any(|p| p.name == name);
             if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
                 let message = format!("is {name:?}, which is already the name of something else");
                 return Err(ConfigurationError::new(format!("barrier[{i}].name"), message));
             }
         }
-        let inputs = self.plant.model.inputs();
+        let inputs = self.plant.inputs();
         if let Some(unknown) = self.bounds.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = inputs.iter().map(|s| s.name).collect();
+            let names: Vec<_> = inputs.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown input, must be one of {}", names.join(", "));
             return Err(ConfigurationError::new(format!("bounds.{unknown}"), message));
         }
         for input in inputs {
-            let [min, max] = self.bounds.entry(input.name.to_owned()).or_insert([-UNBOUNDED, UNBOUNDED]);
+            let own = [input.min.unwrap_or(-UNBOUNDED), input.max.unwrap_or(UNBOUNDED)];
+            let [min, max] = self.bounds.entry(input.name).or_insert(own);
             // Not `f64::max`: not-a-number has to reach the check below.
             if *min < -UNBOUNDED {
                 *min = -UNBOUNDED;
@@ -172,16 +176,16 @@ impl FilterConfiguration {
         let range = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
         let mut rows = Vec::new();
         for (side, prefix, word) in [(0, "u_min", "smallest"), (1, "u_max", "largest")] {
-            for input in self.plant.model.inputs() {
+            for input in self.plant.inputs() {
                 let names = (format!("{prefix}.{}", input.name), format!("bounds.{}", input.name));
                 let description = format!("{word} {} (no bound: {UNBOUNDED:e} in size)", input.description);
                 rows.push(Parameter::new(names, input.unit, range, description, move |c: &mut Self| {
-                    &mut c.bounds.entry(input.name.to_owned()).or_default()[side]
+                    &mut c.bounds.entry(input.name.clone()).or_default()[side]
                 }));
             }
         }
         for (i, barrier) in self.barrier.iter().enumerate() {
-            rows.extend(barrier.parameters(i, self.plant.model));
+            rows.extend(barrier.parameters(i, &self.plant));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         rows
@@ -201,16 +205,21 @@ impl FilterConfiguration {
     ///
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
-        let inputs = self.plant.model.inputs();
-        let states = self.plant.model.states().len();
+        let inputs = self.plant.inputs();
+        let states = self.plant.states().len();
         let mut next_point = states;
         let mut builder = SafetyFilter::builder(states + self.points().len(), inputs.len());
         for (i, section) in self.barrier.iter().enumerate() {
             let point = section.centre_input.then_some(next_point);
             next_point += section.inputs().len();
             let core = |e| self.refused(i, &punctual_core::Error::within(e, &section.name));
-            let adding = Adding { configuration: self, builder, index: i, point };
-            builder = section.visit(&self.plant.model, states, adding).map_err(core)??;
+            builder = match self.plant.reference() {
+                Some(plant) if section.shape != ShapeName::Expression => {
+                    let adding = Adding { configuration: self, plant, builder, index: i, point };
+                    section.visit(plant, adding).map_err(core)??
+                }
+                _ => self.add_expression(builder, i)?,
+            };
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
                 (penalty, Some(_)) if penalty != 0.0 => {
@@ -228,7 +237,7 @@ impl FilterConfiguration {
         }
         let (mut min, mut max) = (Vec::new(), Vec::new());
         for input in inputs {
-            let [low, high] = self.bounds.get(input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
+            let [low, high] = self.bounds.get(&input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
             if low > high {
                 let message = format!(
                     "is [{low}, {high}], must be [min, max] with min <= max (in an FMU: u_min.{name}, u_max.{name})",
@@ -327,19 +336,47 @@ impl FilterConfiguration {
             .map_err(|e| self.refused(at.index, &e))
     }
 
+    /// Adds barrier `index`, an expression.
+    fn add_expression(
+        &self,
+        builder: FilterBuilder,
+        index: usize,
+    ) -> Result<FilterBuilder, ConfigurationError> {
+        let section = &self.barrier[index];
+        let refused = |e: punctual_models::Error| {
+            ConfigurationError::new(format!("barrier[{index}].{}", e.field()), e.message())
+        };
+        let named = |e: punctual_core::Error| self.refused(index, &e.within(&section.name));
+        let barrier = self.plant.expressions()?.barrier(section.expression.as_deref().unwrap_or_default());
+        let barrier = barrier.map_err(refused)?;
+        let states = self.plant.states();
+        let end = |value: Option<f64>, none: f64| value.unwrap_or(none);
+        let ranges: Vec<_> =
+            states.iter().map(|s| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)]).collect();
+        let n = barrier.relative_degree(&ranges).require(None).map_err(named)?;
+        let own: Vec<usize> = (0..states.len()).collect();
+        let source =
+            lie::embedded(barrier.source(n).map_err(refused)?, states.len() + self.points().len(), &own);
+        let settings = section.settings().map_err(named)?;
+        builder.source(&section.name, source.map_err(named)?, settings).map_err(|e| self.refused(index, &e))
+    }
+
     /// The core's refusal of barrier `index` in the words of the configuration.
     fn refused(&self, index: usize, error: &punctual_core::Error) -> ConfigurationError {
         if let Some(found) = error.relative_degree() {
-            let inputs = self.plant.model.inputs();
-            let found = found.describe(|i| inputs.get(i).map_or("u", |s| s.name).to_owned());
-            let advice = match self.plant.model {
-                ModelName::BicycleSmallSlip => {
+            let inputs = self.plant.inputs();
+            let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
+            let advice = match (self.plant.model, found) {
+                (Some(ModelName::BicycleSmallSlip), _) => {
                     "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic"
                 }
+                (None, RelativeDegree::Mixed(_)) => {
+                    "; one constraint cannot use both, so make the input that enters first a state whose derivative is the new input"
+                }
+                (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)",
                 _ => "",
             };
-            let model = self.plant.model.name();
-            let message = format!("its relative degree along {model} {found}{advice}");
+            let message = format!("its relative degree along {} {found_in_words}{advice}", self.plant.name());
             return ConfigurationError::new(format!("barrier[{index}]"), message);
         }
         let field = error.field().split_once('.').map_or(error.field(), |(_, field)| field);

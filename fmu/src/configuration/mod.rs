@@ -7,18 +7,26 @@
 mod barrier;
 mod controller;
 mod filter;
+mod model;
 mod parameter;
 mod plant;
 mod read;
+mod reference;
+mod unit;
 
 pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, ShapeName};
 pub use controller::{ControllerConfiguration, ControllerName};
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
+pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
-pub use plant::{IntegrationSection, ModelName, PlantConfiguration, PlantSection};
+pub use plant::{IntegrationSection, PlantConfiguration};
 pub use read::{ConfigurationError, read_toml};
+pub use reference::{ModelName, ReferenceSection};
+pub use unit::{base_unit, over_seconds, quantity};
 
 use serde::{Deserialize, Serialize};
+
+use unit::check_unit;
 
 /// The name of the canonical configuration inside an FMU's `resources/`.
 pub const RESOURCE: &str = "configuration.toml";

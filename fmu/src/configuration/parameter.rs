@@ -1,5 +1,7 @@
 //! Numbers of a configuration that are also parameters of the FMU: one row each.
 
+use std::borrow::Cow;
+
 use super::ConfigurationError;
 
 /// The values a number may take.
@@ -24,6 +26,12 @@ impl Range {
         value.is_finite()
             && self.min.is_none_or(|min| value >= min)
             && self.max.is_none_or(|max| value <= max)
+    }
+
+    /// The value within it that is nearest to `value`.
+    pub fn nearest(&self, value: f64) -> f64 {
+        let raised = self.min.map_or(value, |min| value.max(min));
+        self.max.map_or(raised, |max| raised.min(max))
     }
 
     /// The range in words, e.g. "finite and >= 0".
@@ -67,7 +75,7 @@ pub struct Parameter<C> {
     /// The path in the configuration file, e.g. `barrier[0].deadline`.
     pub path: String,
     /// The unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// The allowed range.
     pub range: Range,
     /// Meaning, for a human.
@@ -78,12 +86,19 @@ pub struct Parameter<C> {
 impl<C> Parameter<C> {
     pub(super) fn new(
         (name, path): (String, String),
-        unit: &'static str,
+        unit: impl Into<Cow<'static, str>>,
         range: Range,
         description: impl Into<String>,
         access: impl Fn(&mut C) -> &mut f64 + Send + 'static,
     ) -> Self {
-        Self { name, path, unit, range, description: description.into(), access: Box::new(access) }
+        Self {
+            name,
+            path,
+            unit: unit.into(),
+            range,
+            description: description.into(),
+            access: Box::new(access),
+        }
     }
 
     /// The value in `configuration`.

@@ -272,14 +272,14 @@ fn models_and_shapes_are_named_as_in_the_file() {
         let canonical = Configuration::parse(&text).and_then(|c| c.canonical()).unwrap();
         match Configuration::parse(&text).unwrap() {
             Configuration::Filter(c) => {
-                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.model.name())), "{canonical}");
+                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.name())), "{canonical}");
                 assert!(
                     canonical.contains(&format!("shape = \"{}\"", c.barrier[0].shape.name())),
                     "{canonical}"
                 );
             }
             Configuration::Plant(c) => {
-                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.model.name())), "{canonical}");
+                assert!(canonical.contains(&format!("model = \"{}\"", c.plant.name())), "{canonical}");
             }
             Configuration::Controller(c) => {
                 assert!(

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use punctual_modeldescription::BaseUnit;
+
 use super::*;
 
 const BARRIER: &str = "[[barrier]]\nname = \"goal\"\ncentre = [45.0, 44.0]\nradius = 2.0\ndeadline = 10.0\n";
@@ -102,7 +104,7 @@ fn every_unit_has_its_exponents() {
     for (name, wanted) in table {
         assert_eq!(base_unit(name), wanted, "{name}");
     }
-    for unknown in ["", "km", "2", "m/", "m2x", "kg", "m/s/s", "m99999999999"] {
+    for unknown in ["", "km", "2", "m/", "m2x", "lb", "m/s/s", "m99999999999"] {
         assert_eq!(base_unit(unknown), None, "{unknown}");
     }
 }

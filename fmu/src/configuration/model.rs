@@ -1,0 +1,288 @@
+//! `[plant]` of a filter or plant: a reference plant by name, or the user's own by expressions.
+
+use std::collections::BTreeMap;
+
+use punctual_core::dynamics::DynPlant;
+use punctual_core::plants::Signal;
+use punctual_models::Model;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_identifier, check_unit,
+};
+
+/// Names that parameters of a model must leave to the FMU.
+const RESERVED: [&str; 9] = ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "x0", "inner_step"];
+
+/// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct VariableSection {
+    /// Its name, a C identifier, unique in the model.
+    pub name: String,
+    /// Its unit, such as `m/s2` or `kg.m2/s`. Default `1`.
+    #[serde(default = "one")]
+    pub unit: String,
+    /// Meaning, for a human. Default: none.
+    #[serde(default)]
+    pub description: String,
+    /// Smallest value for which the model is meant; of an input the smallest one allowed, where `[bounds]` says
+    /// nothing. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// The largest one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+}
+
+/// A constant of a model: an entry of `plant.parameters`, and a parameter of the FMU.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterSection {
+    /// Its name, a C identifier, unique in the model.
+    pub name: String,
+    /// Its value, until an importer sets another one; finite, within the range.
+    pub start: f64,
+    /// Its unit, such as `kg`. Default `1`.
+    #[serde(default = "one")]
+    pub unit: String,
+    /// Meaning, for a human. Default: none.
+    #[serde(default)]
+    pub description: String,
+    /// Smallest value. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// Largest value. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+}
+
+fn one() -> String {
+    "1".to_owned()
+}
+
+impl VariableSection {
+    /// Its range.
+    pub fn range(&self) -> Range {
+        Range { min: self.min, max: self.max }
+    }
+}
+
+impl From<&Signal> for VariableSection {
+    fn from(signal: &Signal) -> Self {
+        Self {
+            name: signal.name.to_owned(),
+            unit: signal.unit.to_owned(),
+            description: signal.description.to_owned(),
+            min: None,
+            max: None,
+        }
+    }
+}
+
+/// `[plant]`: a reference plant (`model`, with its constants), or a model of expressions (`states`, `inputs`,
+/// `parameters`, `derivatives`).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlantSection {
+    /// Which reference plant. Default: none, the model is given by expressions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelName>,
+    /// As [`ReferenceSection::l_r`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub l_r: Option<f64>,
+    /// As [`ReferenceSection::l_f`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub l_f: Option<f64>,
+    /// The states, in order: at most 32.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<VariableSection>,
+    /// The inputs, in order: at most 12.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<VariableSection>,
+    /// The constants. Default: none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<ParameterSection>,
+    /// For each state the expression for its derivative, affine in the inputs.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub derivatives: BTreeMap<String, String>,
+}
+
+impl PlantSection {
+    /// The reference plant, if it is one.
+    pub fn reference(&self) -> Option<ReferenceSection> {
+        let model = self.model?;
+        Some(ReferenceSection { model, l_r: self.l_r, l_f: self.l_f })
+    }
+
+    /// Its name in messages: that of the reference plant, or `expressions`.
+    pub fn name(&self) -> &'static str {
+        self.model.map_or("expressions", ModelName::name)
+    }
+
+    /// What it is, for a human.
+    pub fn title(&self) -> &'static str {
+        self.model.map_or("plant given by expressions", ModelName::title)
+    }
+
+    /// The states, in order.
+    pub fn states(&self) -> Vec<VariableSection> {
+        match self.model {
+            Some(model) => model.states().iter().map(VariableSection::from).collect(),
+            None => self.states.clone(),
+        }
+    }
+
+    /// The inputs, in order.
+    pub fn inputs(&self) -> Vec<VariableSection> {
+        match self.model {
+            Some(model) => model.inputs().iter().map(VariableSection::from).collect(),
+            None => self.inputs.clone(),
+        }
+    }
+
+    /// The name of state `i`, or nothing.
+    pub(crate) fn state_name(&self, i: usize) -> &str {
+        match self.model {
+            Some(model) => model.states().get(i).map_or("", |s| s.name),
+            None => self.states.get(i).map_or("", |s| &s.name),
+        }
+    }
+
+    /// The name of input `i`, or nothing.
+    pub(crate) fn input_name(&self, i: usize) -> &str {
+        match self.model {
+            Some(model) => model.inputs().get(i).map_or("", |s| s.name),
+            None => self.inputs.get(i).map_or("", |s| &s.name),
+        }
+    }
+
+    pub(super) fn complete(&mut self) -> Result<(), ConfigurationError> {
+        let refuse =
+            |field: &str, message: String| Err(ConfigurationError::new(format!("plant.{field}"), message));
+        let given = [
+            ("states", !self.states.is_empty()),
+            ("inputs", !self.inputs.is_empty()),
+            ("parameters", !self.parameters.is_empty()),
+            ("derivatives", !self.derivatives.is_empty()),
+        ];
+        if let Some(mut reference) = self.reference() {
+            if let Some((field, _)) = given.iter().find(|(_, given)| *given) {
+                let message = format!("given beside `model`; {} has its own", reference.model.name());
+                return refuse(field, message);
+            }
+            reference.complete()?;
+            (self.l_r, self.l_f) = (reference.l_r, reference.l_f);
+            return Ok(());
+        }
+        for (field, value) in [("l_r", self.l_r), ("l_f", self.l_f)] {
+            if value.is_some() {
+                return refuse(
+                    field,
+                    "is a constant of the bicycle; a model of expressions has `parameters`".into(),
+                );
+            }
+        }
+        if given.iter().all(|(_, given)| !given) {
+            return refuse(
+                "model",
+                "missing; either name a model or give `states`, `inputs` and `derivatives`".into(),
+            );
+        }
+        for (group, variables) in [("states", &self.states), ("inputs", &self.inputs)] {
+            for (i, variable) in variables.iter().enumerate() {
+                let path = format!("plant.{group}[{i}]");
+                check_variable(&path, &variable.name, &variable.unit, variable.range())?;
+            }
+        }
+        for (i, p) in self.parameters.iter().enumerate() {
+            let path = format!("plant.parameters[{i}]");
+            check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
+            if RESERVED.contains(&p.name.as_str()) {
+                let message = format!("is {:?}, which is already the name of something else", p.name);
+                return Err(ConfigurationError::new(format!("{path}.name"), message));
+            }
+        }
+        if let Some(unknown) = self.derivatives.keys().find(|k| self.states.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = self.states.iter().map(|s| s.name.as_str()).collect();
+            let message = format!("unknown state, must be one of {}", names.join(", "));
+            return refuse(&format!("derivatives.{unknown}"), message);
+        }
+        if let Some(state) = self.states.iter().find(|s| !self.derivatives.contains_key(&s.name)) {
+            return refuse(&format!("derivatives.{}", state.name), "missing, every state needs one".into());
+        }
+        self.expressions()?;
+        Ok(())
+    }
+
+    /// The plant as a model of expressions.
+    ///
+    /// # Errors
+    ///
+    /// An expression that cannot be used, by its path.
+    pub fn expressions(&self) -> Result<Model, ConfigurationError> {
+        let (states, inputs) = (self.states(), self.inputs());
+        let names =
+            |variables: &[VariableSection]| variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+        let (states, inputs) = (names(&states), names(&inputs));
+        let lengths = [("l_r", self.l_r), ("l_f", self.l_f)];
+        let lengths = lengths.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        let own = self.parameters.iter().map(|p| (p.name.as_str(), p.start));
+        let derivatives: Vec<&str> = match self.reference() {
+            Some(reference) => reference.derivatives().to_vec(),
+            None => states.iter().map(|s| self.derivatives.get(s).map_or("", String::as_str)).collect(),
+        };
+        let parameters: Vec<_> = lengths.chain(own).collect();
+        Model::new(&texts(&states), &texts(&inputs), &parameters, &derivatives)
+            .map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
+    }
+
+    /// The parameters of the model, reached through `section` in a configuration of type `C`.
+    pub(super) fn parameters<C: 'static>(&self, section: fn(&mut C) -> &mut Self) -> Vec<Parameter<C>> {
+        if let Some(reference) = self.reference() {
+            return reference.parameters(move |c| &mut section(c).l_r, move |c| &mut section(c).l_f);
+        }
+        let row = |(i, p): (usize, &ParameterSection)| {
+            let names = (p.name.clone(), format!("plant.parameters[{i}].start"));
+            let range = Range { min: p.min, max: p.max };
+            Parameter::new(names, p.unit.clone(), range, p.description.clone(), move |c| {
+                &mut section(c).parameters[i].start
+            })
+        };
+        self.parameters.iter().enumerate().map(row).collect()
+    }
+
+    /// The plant, to simulate.
+    ///
+    /// # Errors
+    ///
+    /// A constant outside its range, an expression that cannot be used.
+    pub fn build(&self) -> Result<Box<dyn DynPlant>, ConfigurationError> {
+        match self.reference() {
+            Some(reference) => reference.build(),
+            None => Ok(self.expressions()?.plant()),
+        }
+    }
+}
+
+fn texts(names: &[String]) -> Vec<&str> {
+    names.iter().map(String::as_str).collect()
+}
+
+fn check_variable(path: &str, name: &str, unit: &str, range: Range) -> Result<(), ConfigurationError> {
+    check_identifier(&format!("{path}.name"), name)?;
+    check_unit(&format!("{path}.unit"), unit)?;
+    for (side, value) in [("min", range.min), ("max", range.max)] {
+        value.map_or(Ok(()), |value| Range::FINITE.check(&format!("{path}.{side}"), value))?;
+    }
+    match (range.min, range.max) {
+        (Some(min), Some(max)) if min > max => {
+            let message = format!("is {max}, must be >= min = {min}");
+            Err(ConfigurationError::new(format!("{path}.max"), message))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

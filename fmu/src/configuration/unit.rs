@@ -1,0 +1,144 @@
+//! Units by name: products of powers of base units, as `m/s2` or `kg.m2/s`.
+
+use punctual_modeldescription::BaseUnit;
+
+use super::ConfigurationError;
+
+/// The exponents of SI base units in a name; `None` where it cannot be read.
+///
+/// Factors are joined by a dot, those after the one `/` divide, a number behind a symbol is its exponent; `1` is
+/// no unit.
+pub fn base_unit(name: &str) -> Option<BaseUnit> {
+    /// More would be a mistake, and overflow.
+    const LARGEST: i32 = 99;
+    let mut base = BaseUnit::default();
+    for (part, sign) in name.splitn(2, '/').zip([1, -1]) {
+        for factor in part.split('.') {
+            let symbol = factor.trim_end_matches(|c: char| c.is_ascii_digit());
+            let exponent = match &factor[symbol.len()..] {
+                "" => 1,
+                digits => digits.parse().ok().filter(|n| (1..=LARGEST).contains(n))?,
+            };
+            let mut times = |exponents: [i32; 8]| {
+                let own = [
+                    &mut base.kg,
+                    &mut base.m,
+                    &mut base.s,
+                    &mut base.a,
+                    &mut base.k,
+                    &mut base.mol,
+                    &mut base.cd,
+                    &mut base.rad,
+                ];
+                for (own, power) in own.into_iter().zip(exponents) {
+                    *own += sign * exponent * power;
+                }
+            };
+            match symbol {
+                "" if factor == "1" => {}
+                _ => times(SYMBOLS.iter().find(|s| s.0 == symbol)?.1),
+            }
+        }
+    }
+    Some(base)
+}
+
+/// The unit of a derivative of order `degree`: `m` over s², `m/s` over s.
+pub fn over_seconds(unit: &str, degree: usize) -> String {
+    let (above, below) = unit.split_once('/').unwrap_or((unit, ""));
+    let (mut power, mut factors) = (degree, Vec::new());
+    for factor in below.split('.').filter(|factor| !factor.is_empty()) {
+        match factor
+            .strip_prefix('s')
+            .map(|digits| if digits.is_empty() { "1" } else { digits }.parse::<usize>())
+        {
+            Some(Ok(exponent)) => power += exponent,
+            _ => factors.push(factor.to_owned()),
+        }
+    }
+    factors.push(if power == 1 { "s".to_owned() } else { format!("s{power}") });
+    format!("{above}/{}", factors.join("."))
+}
+
+/// The physical quantity that a unit measures, in the words of the Modelica Standard Library.
+pub fn quantity(unit: &str) -> Option<String> {
+    let name = match unit {
+        "s" => "Time",
+        "m" => "Length",
+        "m/s" => "Velocity",
+        "m/s2" => "Acceleration",
+        "rad" => "Angle",
+        "rad/s" => "AngularVelocity",
+        "rad/s2" => "AngularAcceleration",
+        _ => return None,
+    };
+    Some(name.to_owned())
+}
+
+/// Symbols with their exponents of kg, m, s, A, K, mol, cd and rad.
+const SYMBOLS: [(&str, [i32; 8]); 15] = [
+    ("kg", [1, 0, 0, 0, 0, 0, 0, 0]),
+    ("m", [0, 1, 0, 0, 0, 0, 0, 0]),
+    ("s", [0, 0, 1, 0, 0, 0, 0, 0]),
+    ("A", [0, 0, 0, 1, 0, 0, 0, 0]),
+    ("K", [0, 0, 0, 0, 1, 0, 0, 0]),
+    ("mol", [0, 0, 0, 0, 0, 1, 0, 0]),
+    ("cd", [0, 0, 0, 0, 0, 0, 1, 0]),
+    ("rad", [0, 0, 0, 0, 0, 0, 0, 1]),
+    ("Hz", [0, 0, -1, 0, 0, 0, 0, 0]),
+    ("N", [1, 1, -2, 0, 0, 0, 0, 0]),
+    ("Pa", [1, -1, -2, 0, 0, 0, 0, 0]),
+    ("J", [1, 2, -2, 0, 0, 0, 0, 0]),
+    ("W", [1, 2, -3, 0, 0, 0, 0, 0]),
+    ("C", [0, 0, 1, 1, 0, 0, 0, 0]),
+    ("V", [1, 2, -3, -1, 0, 0, 0, 0]),
+];
+
+/// Refuses a unit that cannot be read, by the path of its field.
+pub(super) fn check_unit(field: &str, name: &str) -> Result<(), ConfigurationError> {
+    /// Longest name.
+    const LENGTH: usize = 64;
+    if name.len() <= LENGTH && base_unit(name).is_some() {
+        return Ok(());
+    }
+    let symbols = SYMBOLS.map(|s| s.0).join(", ");
+    let message = format!("is {name:?}, must be like \"kg.m2/s\", made of {symbols}, or \"1\"");
+    Err(ConfigurationError::new(field, message))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_of_derivatives() {
+        for (unit, degree, wanted) in [
+            ("m", 1, "m/s"),
+            ("m/s", 2, "m/s3"),
+            ("1", 2, "1/s2"),
+            ("N.m/rad", 1, "N.m/rad.s"),
+            ("V/A2.s", 3, "V/A2.s4"),
+        ] {
+            assert_eq!(over_seconds(unit, degree), wanted);
+            assert!(base_unit(wanted).is_some(), "{wanted}");
+        }
+    }
+
+    #[test]
+    fn units_are_read() {
+        let found = |name| base_unit(name).map(|b| [b.kg, b.m, b.s, b.a, b.k, b.mol, b.cd, b.rad]);
+        for (name, wanted) in [
+            ("1", [0; 8]),
+            ("m/s2", [0, 1, -2, 0, 0, 0, 0, 0]),
+            ("1/s", [0, 0, -1, 0, 0, 0, 0, 0]),
+            ("kg.m2/s", [1, 2, -1, 0, 0, 0, 0, 0]),
+            ("N.m/rad", [1, 2, -2, 0, 0, 0, 0, -1]),
+            ("V/A2.s", [1, 2, -4, -3, 0, 0, 0, 0]),
+        ] {
+            assert_eq!(found(name), Some(wanted), "{name}");
+        }
+        for name in ["", "mph", "m/", "m/s/s", "m..s", "2", "m0", "m100", "m^2", " m"] {
+            assert_eq!(found(name), None, "{name}");
+        }
+    }
+}

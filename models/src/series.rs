@@ -1,0 +1,191 @@
+//! Taylor coefficients of a list of operations, one order after the other.
+//!
+//! Coefficient k of a result needs the coefficients up to k of what it is made from, so that a solution of
+//! ẋ = f(x) + g(x) u can be continued order by order: each operation is done once for each order, where running a
+//! function on whole series does it anew for every order of the solution. The recurrences are those of
+//! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module; the coefficients are
+//! numbers, or dual numbers along the inputs.
+//!
+//! # References
+//!
+//! A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, section 13.2
+//! (doi:10.1137/1.9780898717761).
+
+use std::ops::Range;
+
+use punctual_core::scalar::Scalar;
+
+use crate::programme::{Operation, Register, Step};
+
+/// The coefficients of every register.
+#[derive(Clone, Debug)]
+pub(crate) struct Series<C> {
+    /// Of register r from `r * orders` on.
+    coefficients: Vec<C>,
+    orders: usize,
+}
+
+impl<C: Scalar> Series<C> {
+    /// Zeros, of orders 0 to `orders` − 1.
+    pub(crate) fn new(registers: usize, orders: usize) -> Self {
+        Self { coefficients: vec![C::zero(); registers * orders], orders }
+    }
+
+    #[inline]
+    pub(crate) fn get(&self, register: Register, k: usize) -> C {
+        self.coefficients[register * self.orders + k]
+    }
+
+    #[inline]
+    pub(crate) fn set(&mut self, register: Register, k: usize, value: C) {
+        self.coefficients[register * self.orders + k] = value;
+    }
+
+    #[inline]
+    fn of(&self, register: Register) -> &[C] {
+        &self.coefficients[register * self.orders..][..self.orders]
+    }
+
+    /// Σ a_i b_{k−i} over `range`.
+    #[inline]
+    fn product(&self, a: Register, b: Register, k: usize, range: Range<usize>) -> C {
+        let (a, b) = (self.of(a), self.of(b));
+        let mut sum = C::zero();
+        for i in range {
+            sum += a[i] * b[k - i];
+        }
+        sum
+    }
+
+    /// Σ i a_i b_{k−i} / k over i from 1 to `last`, the sum in the recurrences of y' = a' b.
+    #[inline]
+    fn integral(&self, a: Register, b: Register, k: usize, last: usize) -> C {
+        let (a, b) = (self.of(a), self.of(b));
+        let mut sum = C::zero();
+        for i in 1..=last {
+            sum += a[i] * b[k - i] * i as f64;
+        }
+        sum * (1.0 / k as f64)
+    }
+
+    /// Does `steps` for the coefficients of order `k`, after those below it.
+    pub(crate) fn advance(&mut self, steps: &[Step], k: usize) {
+        for &Step { operation, to } in steps {
+            let value = if k == 0 { self.first(operation, to) } else { self.next(operation, to, k) };
+            self.set(to, k, value);
+        }
+    }
+
+    /// The coefficient of order 0.
+    #[inline]
+    fn first(&mut self, operation: Operation, to: Register) -> C {
+        use Operation as O;
+        let at = |register| self.get(register, 0);
+        match operation {
+            O::Constant(number) => C::from(f64::from_bits(number)),
+            O::Add(a, b) => at(a) + at(b),
+            O::Subtract(a, b) => at(a) - at(b),
+            O::Multiply(a, b) => at(a) * at(b),
+            O::Divide(a, b) => at(a) / at(b),
+            O::Negate(a) => -at(a),
+            O::Square(a) => at(a).squared(),
+            O::Offset(a, number) => at(a) + f64::from_bits(number),
+            O::Scale(a, number) => at(a) * f64::from_bits(number),
+            O::Over(a, number) => at(a) / f64::from_bits(number),
+            O::Sqrt(a) => at(a).sqrt(),
+            O::Exp(a) => at(a).exp(),
+            O::Ln(a) => at(a).ln(),
+            O::SinCos(a) => {
+                let (sin, cos) = at(a).sin_cos();
+                self.set(to + 1, 0, cos);
+                sin
+            }
+            O::Tanh(a) => {
+                let value = at(a).tanh();
+                self.set(to + 1, 0, -value.squared() + 1.0);
+                value
+            }
+            O::Atan(a, _) => at(a).atan(),
+            O::Atan2(y, x, _) => at(y).atan2(at(x)),
+            O::Power(a, number) => at(a).powf(f64::from_bits(number)),
+            O::Abs(a) => at(a).abs(),
+            O::Minimum(a, b) => at(a).min(at(b)),
+            O::Maximum(a, b) => at(a).max(at(b)),
+        }
+    }
+
+    /// The coefficient of order `k` ≥ 1.
+    #[inline]
+    fn next(&mut self, operation: Operation, to: Register, k: usize) -> C {
+        use Operation as O;
+        let at = |register| self.get(register, k);
+        let start = |register| self.get(register, 0);
+        match operation {
+            O::Constant(_) => C::zero(),
+            O::Add(a, b) => at(a) + at(b),
+            O::Subtract(a, b) => at(a) - at(b),
+            O::Multiply(a, b) => self.product(a, b, k, 0..k + 1),
+            O::Divide(a, b) => (at(a) - self.product(to, b, k, 0..k)) / start(b),
+            O::Negate(a) => -at(a),
+            O::Square(a) => {
+                // Each pair once.
+                let sum = self.product(a, a, k, 0..k.div_ceil(2)) * 2.0;
+                if k.is_multiple_of(2) { sum + self.get(a, k / 2).squared() } else { sum }
+            }
+            O::Offset(a, _) => at(a),
+            O::Scale(a, number) => at(a) * f64::from_bits(number),
+            O::Over(a, number) => at(a) / f64::from_bits(number),
+            O::Sqrt(a) => (at(a) - self.product(to, to, k, 1..k)) / (start(to) * 2.0),
+            O::Exp(a) => self.integral(a, to, k, k),
+            O::Ln(a) => (at(a) - self.integral(to, a, k, k - 1)) / start(a),
+            O::SinCos(a) => {
+                let (sin, cos) = (self.integral(a, to + 1, k, k), -self.integral(a, to, k, k));
+                self.set(to + 1, k, cos);
+                sin
+            }
+            O::Tanh(a) => {
+                let value = self.integral(a, to + 1, k, k);
+                self.set(to, k, value);
+                self.set(to + 1, k, -self.product(to, to, k, 0..k + 1));
+                value
+            }
+            O::Atan(a, slope) => (at(a) - self.integral(to, slope, k, k - 1)) / start(slope),
+            // (x² + y²) y' = x y' − y x'.
+            O::Atan2(y, x, radius) => {
+                let turned = self.integral(y, x, k, k) - self.integral(x, y, k, k);
+                (turned - self.integral(to, radius, k, k - 1)) / start(radius)
+            }
+            // a y' = p a' y.
+            O::Power(a, number) => {
+                let (exponent, (base, own)) = (f64::from_bits(number), (self.of(a), self.of(to)));
+                let mut sum = C::zero();
+                for i in 1..=k {
+                    sum += base[i] * own[k - i] * (i as f64 * (exponent + 1.0) - k as f64);
+                }
+                sum * (1.0 / k as f64) / base[0]
+            }
+            // The branch is that of order 0.
+            O::Abs(a) => {
+                if start(a).value() < 0.0 {
+                    -at(a)
+                } else {
+                    at(a)
+                }
+            }
+            O::Minimum(a, b) => {
+                if start(b).value() < start(a).value() {
+                    at(b)
+                } else {
+                    at(a)
+                }
+            }
+            O::Maximum(a, b) => {
+                if start(b).value() > start(a).value() {
+                    at(b)
+                } else {
+                    at(a)
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Models of expressions against the same models in Rust, on the jets of the core.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::DistanceDisc;
+use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
+use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, RelativeDegree};
+use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
+use punctual_core::scalar::Scalar;
+use punctual_models::Model;
+
+/// A random expression: text for the one side, a tree for the other.
+#[derive(Clone, Debug)]
+enum Tree {
+    State(usize),
+    Time,
+    Number(f64),
+    Unary(&'static str, Arc<Tree>),
+    Binary(&'static str, Arc<Tree>, Arc<Tree>),
+    Power(Arc<Tree>, f64),
+}
+
+impl Tree {
+    fn text(&self) -> String {
+        match self {
+            Self::State(i) => ["x", "y"][*i].to_owned(),
+            Self::Time => "t".to_owned(),
+            Self::Number(value) => format!("({value:?})"),
+            Self::Unary("-", a) => format!("(-{})", a.text()),
+            Self::Unary(function, a) => format!("{function}({})", a.text()),
+            Self::Binary(function, a, b) if function.len() > 1 => {
+                format!("{function}({}, {})", a.text(), b.text())
+            }
+            Self::Binary(sign, a, b) => format!("({} {sign} {})", a.text(), b.text()),
+            Self::Power(a, exponent) => format!("({})^({exponent:?})", a.text()),
+        }
+    }
+
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+        match self {
+            Self::State(i) => x[*i],
+            Self::Time => t,
+            Self::Number(value) => S::from(*value),
+            Self::Unary(function, a) => {
+                let a = a.value(t, x);
+                match *function {
+                    "-" => -a,
+                    "sqrt" => a.sqrt(),
+                    "exp" => a.exp(),
+                    "ln" => a.ln(),
+                    "sin" => a.sin(),
+                    "cos" => a.cos(),
+                    "tan" => a.tan(),
+                    "atan" => a.atan(),
+                    "tanh" => a.tanh(),
+                    "abs" => a.abs(),
+                    _ => panic!("{function}"),
+                }
+            }
+            Self::Binary(function, a, b) => {
+                let (a, b) = (a.value(t, x), b.value(t, x));
+                match *function {
+                    "+" => a + b,
+                    "-" => a - b,
+                    "*" => a * b,
+                    "/" => a / b,
+                    "atan2" => a.atan2(b),
+                    "min" => a.min(b),
+                    "max" => a.max(b),
+                    _ => panic!("{function}"),
+                }
+            }
+            Self::Power(a, exponent) if exponent.fract() == 0.0 => a.value(t, x).powi(*exponent as i32),
+            Self::Power(a, exponent) => a.value(t, x).powf(*exponent),
+        }
+    }
+}
+
+fn tree(time: bool) -> impl Strategy<Value = Tree> {
+    let leaf = prop_oneof![
+        (0_usize..2).prop_map(Tree::State),
+        (-4_i32..=8).prop_map(|n| Tree::Number(f64::from(n) / 2.0)),
+        Just(if time { Tree::Time } else { Tree::State(0) }),
+    ];
+    leaf.prop_recursive(5, 24, 2, |inner| {
+        let inner = inner.prop_map(Arc::new);
+        let unary =
+            prop::sample::select(vec!["-", "sqrt", "exp", "ln", "sin", "cos", "tan", "atan", "tanh", "abs"]);
+        let binary = prop::sample::select(vec!["+", "-", "*", "/", "atan2", "min", "max"]);
+        prop_oneof![
+            (unary, inner.clone()).prop_map(|(f, a)| Tree::Unary(f, a)),
+            (binary, inner.clone(), inner.clone()).prop_map(|(f, a, b)| Tree::Binary(f, a, b)),
+            (inner, prop::sample::select(vec![-2.0, 0.5, 1.7, 2.0, 3.0]))
+                .prop_map(|(a, p)| Tree::Power(a, p)),
+        ]
+    })
+}
+
+/// ẋ = a + u, ẏ = b + c u + w.
+struct Random([Tree; 3]);
+
+impl ControlAffine<2, 2> for Random {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([self.0[0].value(S::zero(), x), self.0[1].value(S::zero(), x)])
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
+        SMatrix::from([[S::one(), self.0[2].value(S::zero(), x)], [S::zero(), S::one()]])
+    }
+}
+
+impl Barrier<2> for Tree {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+        Self::value(self, t, x)
+    }
+}
+
+/// All that two sources give at one sample, as pairs of numbers.
+fn both(found: &dyn DerivativeSource, wanted: &dyn DerivativeSource, x: &[f64], u: &[f64]) -> Vec<[f64; 2]> {
+    const T: f64 = 0.3;
+    const AHEAD: f64 = 0.01;
+    let each = |source: &dyn DerivativeSource| {
+        let (mut here, mut ahead) = (Derivatives::ZERO, Ahead::ZERO);
+        source.evaluate(T, x, &mut here);
+        assert!(source.ahead(T, x, u, AHEAD, &mut ahead));
+        let mut moved = x.to_vec();
+        assert!(source.predict(&mut moved, u, AHEAD));
+        let mut all = moved;
+        all.extend(here.drift.iter().chain(&here.row).chain([&here.lower_sensitivity]));
+        all.extend(ahead.value.iter().chain(ahead.gradient.as_flattened()));
+        all
+    };
+    each(found).into_iter().zip(each(wanted)).map(|(a, b)| [a, b]).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 400, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_models_have_the_derivatives_of_the_jets(
+        plant in [tree(false), tree(false), tree(false)],
+        barrier in tree(true),
+        x in prop::array::uniform2(0.2_f64..3.0),
+        n in 1_usize..=4,
+    ) {
+        let derivatives = [
+            format!("{} + u", plant[0].text()),
+            format!("{} + {}*u + w", plant[1].text(), plant[2].text()),
+        ];
+        let model = Model::new(&["x", "y"], &["u", "w"], &[], &[&derivatives[0], &derivatives[1]]);
+        let found = model.and_then(|m| m.barrier(&barrier.text())).and_then(|b| b.source(n));
+        let found = found.unwrap_or_else(|e| panic!("{e}"));
+        let wanted = lie::along(Random(plant), barrier, n).expect("in range");
+        let pairs = both(&*found, &*wanted, &x, &[0.3, -0.4]);
+        // Round-off grows with what is added up; beyond this size the sample says little.
+        let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
+        prop_assume!(pairs.iter().all(|p| p[1].is_finite()) && size < 1e6);
+        for (i, [found, wanted]) in pairs.into_iter().enumerate() {
+            prop_assert!((found - wanted).abs() <= 1e-9 * size, "{i}: {found} {wanted}");
+        }
+    }
+}
+
+const DISC: &str = "sqrt(R^2 + R^2) - sqrt((x_p - c_x)^2 + (y_p - c_y)^2 + R^2)";
+
+fn disc() -> DistanceDisc {
+    DistanceDisc::new([45.0, 44.0], 2.0, 2.0).expect("valid disc")
+}
+
+/// Compares at 50 states the model of these expressions with `plant`.
+fn agrees<P, const NX: usize>(plant: P, names: ([&str; NX], [&str; 2]), derivatives: [&str; NX])
+where
+    P: ControlAffine<NX, 2> + Copy + Send + 'static,
+    DistanceDisc: Barrier<NX>,
+{
+    let parameters = [("R", 2.0), ("c_x", 45.0), ("c_y", 44.0), ("l_r", 3.0), ("l_f", 2.0)];
+    let model = Model::new(&names.0, &names.1, &parameters, &derivatives).expect("a model");
+    let barrier = model.barrier(DISC).expect("a barrier");
+    assert_eq!(
+        barrier.relative_degree(&[[f64::NEG_INFINITY, f64::INFINITY]; NX]),
+        lie::detected(&plant, &disc())
+    );
+    let found = barrier.source(2).expect("in range");
+    let wanted = lie::along(plant, disc(), 2).expect("in range");
+    let simulated: Box<dyn DynPlant> = Box::new(Erased(plant));
+    for (_, x) in lie::samples(&[[-3.0, 3.0]; NX]).into_iter().cycle().take(50) {
+        let pairs = both(&*found, &*wanted, &x, &[0.7, -0.2]);
+        let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
+        for (i, [found, wanted]) in pairs.into_iter().enumerate() {
+            // A few dozen roundings.
+            assert!((found - wanted).abs() <= 1e-14 * size, "{i}: {found} {wanted}");
+        }
+        let mut both = [x.clone(), x];
+        model.plant().rk4_step(&mut both[0], &[0.7, -0.2], 0.1).expect("the lengths");
+        simulated.rk4_step(&mut both[1], &[0.7, -0.2], 0.1).expect("the lengths");
+        for (found, wanted) in both[0].iter().zip(&both[1]) {
+            assert!((found - wanted).abs() <= 1e-15 * (1.0 + wanted.abs()) * 4.0, "{found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn the_reference_plants_as_expressions() {
+    let four = (["x_p", "y_p", "theta", "v"], ["a", "omega"]);
+    let five = (["x_p", "y_p", "theta", "v", "s"], ["a", "rate"]);
+    agrees(PointMass, (["x_p", "y_p", "v_x", "v_y"], ["u_x", "u_y"]), ["v_x", "v_y", "u_x", "u_y"]);
+    agrees(Unicycle, four, ["v*cos(theta)", "v*sin(theta)", "omega", "a"]);
+    let bicycle = Bicycle::new(3.0).expect("valid");
+    agrees(bicycle, four, ["v*cos(theta)", "v*sin(theta)", "v*omega/l_r", "a"]);
+    let small_slip = SmallSlipBicycle::new(3.0).expect("valid").with_rate();
+    let derivatives =
+        ["v*cos(theta) - v*s*sin(theta)", "v*sin(theta) + v*s*cos(theta)", "v*s/l_r", "a", "rate"];
+    agrees(small_slip, five, derivatives);
+    let kinematic = KinematicBicycle::new(2.0, 3.0).expect("valid");
+    let beta = "atan(tan(s)*(l_r/(l_f + l_r)))";
+    let derivatives = [
+        &format!("v*cos(theta + {beta})"),
+        &format!("v*sin(theta + {beta})"),
+        &format!("v*sin({beta})/l_r"),
+        "a",
+        "rate",
+    ];
+    agrees(kinematic, five, derivatives.map(|d| d as &str));
+}
+
+#[test]
+fn chains_of_integrators_have_their_order_as_relative_degree() {
+    let states = ["x1", "x2", "x3", "x4", "x5", "x6", "x7", "x8"];
+    for n in 1..=8 {
+        let derivatives: Vec<_> = states[1..n].iter().copied().chain(["u"]).collect();
+        let model = Model::new(&states[..n], &["u"], &[], &derivatives).expect("a chain");
+        let barrier = model.barrier("10 + sin(t) - x1").expect("a barrier");
+        let ranges = vec![[-1.0, 1.0]; n];
+        assert_eq!(barrier.relative_degree(&ranges), RelativeDegree::Uniform(n));
+        let source = barrier.source(n).expect("in range");
+        let mut out = Derivatives::ZERO;
+        source.evaluate(0.0, &vec![0.5; n], &mut out);
+        // The derivatives of sin t at 0, and those of the chain.
+        let sine = [0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0];
+        for k in 0..=n {
+            let wanted = sine[k] - if k < n { 0.5 } else { 0.0 } + if k == 0 { 10.0 } else { 0.0 };
+            assert!((out.drift[k] - wanted).abs() < 1e-13, "n = {n}, k = {k}: {}", out.drift[k]);
+        }
+        assert!((out.row[0] + 1.0).abs() < 1e-15 && out.lower_sensitivity == 0.0, "n = {n}: {out:?}");
+    }
+}
+
+#[test]
+fn twelve_inputs() {
+    let names: Vec<_> = (0..12).map(|i| (format!("x{i}"), format!("u{i}"))).collect();
+    let states: Vec<_> = names.iter().map(|n| n.0.as_str()).collect();
+    let inputs: Vec<_> = names.iter().map(|n| n.1.as_str()).collect();
+    for m in 1..=12 {
+        let model = Model::new(&states[..m], &inputs[..m], &[], &inputs[..m]).expect("a model");
+        let sum = states[..m]
+            .iter()
+            .enumerate()
+            .map(|(i, x)| format!("{}*{x}", i + 1))
+            .collect::<Vec<_>>()
+            .join("+");
+        let barrier = model.barrier(&sum).expect("a barrier");
+        assert_eq!(barrier.relative_degree(&vec![[-1.0, 1.0]; m]), RelativeDegree::Uniform(1));
+        let mut out = Derivatives::ZERO;
+        barrier.source(1).expect("in range").evaluate(0.0, &vec![0.0; m], &mut out);
+        let wanted: Vec<_> = (0..12).map(|i| if i < m { (i + 1) as f64 } else { 0.0 }).collect();
+        assert_eq!(out.row.to_vec(), wanted);
+    }
+}
