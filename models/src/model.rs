@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::jet::Dual;
+use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
     self, Ahead, Coefficients, DerivativeSource, Derivatives, RelativeDegree, SUBSTEPS,
 };
@@ -180,7 +180,7 @@ impl Barrier {
     /// The relative degree, found on [`samples`](lie::samples) of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         fn coefficients<const M: usize>(barrier: &Barrier, samples: Vec<(f64, Vec<f64>)>) -> RelativeDegree {
-            let mut along = Along::<M>::new(barrier, MAX_RELATIVE_DEGREE);
+            let mut along = Along::<Dual<M>>::new(barrier, MAX_RELATIVE_DEGREE);
             let inputs = barrier.model.inputs.len();
             lie::relative_degree_of(inputs, samples, |t, x| along.coefficients(t, x))
         }
@@ -194,9 +194,15 @@ impl Barrier {
     /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`].
     pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
         fn source<const M: usize>(barrier: &Barrier, n: usize) -> Box<dyn DerivativeSource> {
-            let work = RefCell::new((Along::<M>::new(barrier, n), Flow::new(&barrier.model)));
-            let (states, inputs) = (barrier.model.states.len(), barrier.model.inputs.len());
-            Box::new(Source { work, states, inputs, n })
+            let model = &barrier.model;
+            let work = Work::<M> {
+                along: Along::new(barrier, n),
+                flow: Flow::new(model),
+                along_tangent: Along::new(barrier, n),
+                flow_tangent: Flow::new(model),
+            };
+            let (states, inputs) = (model.states.len(), model.inputs.len());
+            Box::new(Source { work: RefCell::new(work), states, inputs, n })
         }
         if n == 0 || n > MAX_RELATIVE_DEGREE {
             let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
@@ -230,9 +236,9 @@ impl<C: Scalar> Flow<C> {
         }
     }
 
-    fn set_state(&mut self, x: &[f64]) {
-        for (i, &value) in x.iter().enumerate() {
-            self.series.set(i, 0, C::from(value));
+    fn set_state(&mut self, x: impl Iterator<Item = C>) {
+        for (i, value) in x.enumerate() {
+            self.series.set(i, 0, value);
         }
     }
 
@@ -297,7 +303,7 @@ impl DynPlant for Simulated {
 }
 
 fn moved(flow: &mut Flow<f64>, x: &mut [f64], u: &[f64], duration: f64, steps: usize) {
-    flow.set_state(x);
+    flow.set_state(x.iter().copied());
     flow.hold(u.iter().copied());
     flow.run(duration, steps);
     for (i, x) in x.iter_mut().enumerate() {
@@ -305,10 +311,10 @@ fn moved(flow: &mut Flow<f64>, x: &mut [f64], u: &[f64], duration: f64, steps: u
     }
 }
 
-/// Series of h along the plant, with their derivatives along `M` ≥ the number of inputs.
-struct Along<const M: usize> {
-    flow: Flow<Dual<M>>,
-    series: Series<Dual<M>>,
+/// Series of h along the plant.
+struct Along<C> {
+    flow: Flow<C>,
+    series: Series<C>,
     /// What plant and barrier need.
     steps: Vec<Step>,
     /// What the barrier needs: at the last order nothing else is asked.
@@ -317,14 +323,14 @@ struct Along<const M: usize> {
     n: usize,
 }
 
-impl<const M: usize> Along<M> {
+impl<C: Scalar> Along<C> {
     fn new(barrier: &Barrier, n: usize) -> Self {
         let Barrier { model, h } = barrier;
         let Programme { steps, registers, .. } = &model.programme;
         let wanted: Vec<_> = model.derivatives.iter().copied().chain([*h]).collect();
         let mut series = Series::new(*registers, n + 1);
         // Time goes on by itself; inputs are held.
-        series.set(model.states.len() + model.inputs.len(), 1, Dual::from(1.0));
+        series.set(model.states.len() + model.inputs.len(), 1, C::from(1.0));
         Self {
             flow: Flow::new(model),
             series,
@@ -341,7 +347,7 @@ impl<const M: usize> Along<M> {
         for register in 0..flow.inputs.end {
             series.set(register, 0, flow.series.get(register, 0));
         }
-        series.set(flow.inputs.end, 0, Dual::from(t));
+        series.set(flow.inputs.end, 0, C::from(t));
         for k in 0..self.n {
             series.advance(&self.steps, k);
             for (i, &register) in flow.derivatives.iter().enumerate() {
@@ -352,13 +358,27 @@ impl<const M: usize> Along<M> {
         series.advance(&self.last, self.n);
     }
 
+    /// h⁽ᵏ⁾.
+    fn derivative(&self, k: usize) -> C {
+        self.series.get(self.h, k) * (1..=k).map(|i| i as f64).product::<f64>()
+    }
+
+    /// Its coefficients a moment ahead, from the state and the inputs that `flow` has.
+    fn ahead(&mut self, t: f64, duration: f64) {
+        self.flow.run(duration, SUBSTEPS);
+        self.continue_from_flow(t + duration);
+    }
+}
+
+/// With derivatives along `M` ≥ the number of inputs.
+impl<const M: usize> Along<Dual<M>> {
     fn hold(&mut self, u: impl Fn(usize) -> f64) {
         self.flow.hold((0..M).map(|i| Dual::variable(u(i), i)));
     }
 
     /// From the state `x` at time `t`, along the free motion.
     fn evaluate(&mut self, t: f64, x: &[f64]) {
-        self.flow.set_state(x);
+        self.flow.set_state(x.iter().map(|&v| Dual::from(v)));
         self.hold(|_| 0.0);
         self.continue_from_flow(t);
     }
@@ -370,19 +390,33 @@ impl<const M: usize> Along<M> {
             (h.value, std::array::from_fn(|i| h.gradient.get(i).copied().unwrap_or_default()))
         })
     }
-
-    /// h⁽ᵏ⁾.
-    fn derivative(&self, k: usize) -> Dual<M> {
-        self.series.get(self.h, k) * (1..=k).map(|i| i as f64).product::<f64>()
-    }
 }
 
 /// A barrier along a plant, as the filter takes it.
 struct Source<const M: usize> {
-    work: RefCell<(Along<M>, Flow<f64>)>,
+    work: RefCell<Work<M>>,
     states: usize,
     inputs: usize,
     n: usize,
+}
+
+/// Memory of the evaluations.
+struct Work<const M: usize> {
+    along: Along<Dual<M>>,
+    flow: Flow<f64>,
+    along_tangent: Along<Tangent<Dual<M>>>,
+    flow_tangent: Flow<Tangent<f64>>,
+}
+
+impl<const M: usize> Source<M> {
+    fn write(&self, out: &mut Ahead, derivative: impl Fn(usize) -> Dual<M>) {
+        *out = Ahead::ZERO;
+        for k in 0..=self.n {
+            let Dual { value, gradient } = derivative(k);
+            out.value[k] = value;
+            out.gradient[k][..self.inputs].copy_from_slice(&gradient[..self.inputs]);
+        }
+    }
 }
 
 impl<const M: usize> DerivativeSource for Source<M> {
@@ -399,7 +433,7 @@ impl<const M: usize> DerivativeSource for Source<M> {
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        let along = &mut self.work.borrow_mut().0;
+        let along = &mut self.work.borrow_mut().along;
         along.evaluate(t, x);
         *out = Derivatives::ZERO;
         for k in 0..=self.n {
@@ -415,21 +449,47 @@ impl<const M: usize> DerivativeSource for Source<M> {
     }
 
     fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
-        moved(&mut self.work.borrow_mut().1, x, u, duration, SUBSTEPS);
+        moved(&mut self.work.borrow_mut().flow, x, u, duration, SUBSTEPS);
         true
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
-        let along = &mut self.work.borrow_mut().0;
-        along.flow.set_state(x);
+        let along = &mut self.work.borrow_mut().along;
+        along.flow.set_state(x.iter().map(|&v| Dual::from(v)));
         along.hold(|i| u.get(i).copied().unwrap_or_default());
-        along.flow.run(duration, SUBSTEPS);
-        along.continue_from_flow(t + duration);
-        *out = Ahead::ZERO;
-        for k in 0..=self.n {
-            let Dual { value, gradient } = along.derivative(k);
-            out.value[k] = value;
-            out.gradient[k][..self.inputs].copy_from_slice(&gradient[..self.inputs]);
+        along.ahead(t, duration);
+        self.write(out, |k| along.derivative(k));
+        true
+    }
+
+    fn ahead_along(
+        &self,
+        t: f64,
+        [x, dx]: [&[f64]; 2],
+        [u, du]: [&[f64]; 2],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> bool {
+        let along = &mut self.work.borrow_mut().along_tangent;
+        let state = x.iter().zip(dx).map(|(&v, &d)| Tangent { value: Dual::from(v), along: Dual::from(d) });
+        along.flow.set_state(state);
+        let input = u.iter().zip(du).enumerate();
+        along
+            .flow
+            .hold(input.map(|(i, (&v, &d))| Tangent { value: Dual::variable(v, i), along: Dual::from(d) }));
+        along.ahead(t, duration);
+        self.write(out, |k| along.derivative(k).along);
+        true
+    }
+
+    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
+        let flow = &mut self.work.borrow_mut().flow_tangent;
+        flow.set_state(x.iter().zip(&*dx).map(|(&value, &along)| Tangent { value, along }));
+        flow.hold(u.iter().map(|&value| Tangent { value, along: 0.0 }));
+        flow.run(duration, SUBSTEPS);
+        for (i, (x, dx)) in x.iter_mut().zip(dx).enumerate() {
+            let Tangent { value, along } = flow.state(i);
+            (*x, *dx) = (value, along);
         }
         true
     }

@@ -128,7 +128,17 @@ fn both(found: &dyn DerivativeSource, wanted: &dyn DerivativeSource, x: &[f64], 
         assert!(source.ahead(T, x, u, AHEAD, &mut ahead));
         let mut moved = x.to_vec();
         assert!(source.predict(&mut moved, u, AHEAD));
+        let (dx, du): (Vec<f64>, Vec<f64>) = (
+            (1..=x.len()).map(|i| 0.1 * i as f64).collect(),
+            (1..=u.len()).map(|i| -0.2 * i as f64).collect(),
+        );
+        let mut along = Ahead::ZERO;
+        assert!(source.ahead_along(T, [x, &dx], [u, &du], AHEAD, &mut along));
+        let (mut from, mut turned) = (x.to_vec(), dx);
+        assert!(source.predict_along(&mut from, &mut turned, u, AHEAD));
         let mut all = moved;
+        all.extend(turned.iter().chain(&from));
+        all.extend(along.value.iter().chain(along.gradient.as_flattened()));
         all.extend(here.drift.iter().chain(&here.row).chain([&here.lower_sensitivity]));
         all.extend(ahead.value.iter().chain(ahead.gradient.as_flattened()));
         all
