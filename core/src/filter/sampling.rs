@@ -5,16 +5,22 @@
 //! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
 //! through the plant. It is solved by Newton's method on the rows: linearise them at the present
 //! guess, solve the quadratic programme, and go towards its answer as far as the violation decreases
-//! (halving the way), that of the rows which the programme does not give up. The guesses start from the
-//! answer of the pointwise rows and from the input of the step before; the better result is taken, by the
-//! number of rows given up, then by violation, then by distance from u_ref. The second guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries
-//! the turn that was begun on through the instants at which the linearisation cannot see it.
+//! (halving the way), that of the rows which the programme does not give up. On the way only rows that are
+//! active or violated are linearised anew; the others keep their last linearisation, at first the pointwise
+//! row, and all are evaluated where the search ends.
+//!
+//! The guesses start from the answer of the pointwise rows and from the input of the step before; the better
+//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
+//! guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries the turn that
+//! was begun on through the instants at which the linearisation cannot see it. It is left out where the first
+//! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
+//! answer is the only one near), no further from u_ref than the step before went, or a half more.
 
 use super::{Channel, FilterState};
 use crate::convergence::sampled::SampledDemand;
 use crate::error::{Error, positive};
 use crate::lie::Ahead;
-use crate::qp::{Bounds, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
+use crate::qp::{Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// How the filter accounts for inputs that are held between samples.
@@ -86,6 +92,10 @@ const ITERATIONS: u32 = 12;
 const HALVINGS: u32 = 8;
 /// The part of the decrease that the linearisation foretells which must come true.
 const SUFFICIENT: f64 = 0.3;
+/// How much shorter each step of a search must be than the one before, for its answer to be the only one near.
+const CONTRACTION: f64 = 0.1;
+/// How much further from u_ref than the last input an answer may be that is taken without a second guess.
+const FURTHER: f64 = 1.5;
 
 /// One sampled problem: where it starts and what it asks for.
 pub(super) struct Held<'a> {
@@ -101,7 +111,7 @@ pub(super) struct Held<'a> {
     pub(super) correction_limit: f64,
 }
 
-/// The rows linearised at some u, and how far each is from being met there, in units of its terms.
+/// Models of the sampled rows, and how far each is from being met at the present u, in units of its terms.
 struct Linearised<'a> {
     rows: &'a mut [Row],
     violations: [f64; MAX_ROWS],
@@ -113,7 +123,23 @@ impl Linearised<'_> {
         let kept = |i: &usize| given_up >> i & 1 == 0;
         (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
     }
+
+    /// The rows that are violated, one bit each.
+    fn violated(&self) -> u64 {
+        (0..self.rows.len()).fold(0, |bits, i| bits | u64::from(self.violations[i] > 0.0) << i)
+    }
 }
+
+/// The rows that are active in the last answer of `programme`, one bit each.
+fn active(programme: &Workspace) -> u64 {
+    programme.active().iter().fold(0, |bits, active| match active.constraint {
+        Constraint::Row(i) => bits | 1 << i,
+        Constraint::Lower(_) | Constraint::Upper(_) => bits,
+    })
+}
+
+/// Every row.
+const ALL: u64 = u64::MAX;
 
 impl Held<'_> {
     /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
@@ -134,24 +160,43 @@ impl Held<'_> {
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
         }
-        // Nothing to do where u_ref meets the sampled rows.
-        self.linearise(u, &mut at)?;
-        if at.worst(0) <= 0.0 {
-            return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
+        // Nothing to do where u_ref meets the sampled rows, those first of which it is doubtful.
+        let doubtful = active(programme);
+        self.linearise(u, doubtful, &mut at)?;
+        if at.violated() & doubtful == 0 {
+            self.linearise(u, ALL, &mut at)?;
+            if at.worst(0) <= 0.0 {
+                return Some(Solution {
+                    outcome: Outcome::Optimal,
+                    solver: Solver::Unchanged,
+                    iterations: 0,
+                });
+            }
         }
+        let watched = doubtful | at.violated();
         let mut best: Option<Guess> = None;
         let mut guess = [0.0; MAX_INPUTS];
+        // Whether the rows are linearised at the best guess.
+        let mut at_best = false;
         for start in [Some(&*pointwise), last].into_iter().flatten() {
             guess[..m].copy_from_slice(start);
-            if let Some(found) = self.newton(&mut guess[..m], &mut at, programme)
+            at_best = false;
+            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme)
                 && best.as_ref().is_none_or(|b| found.better_than(b))
             {
                 u.copy_from_slice(&guess[..m]);
-                best = Some(found);
+                let near = last.is_none_or(|last| found.distance <= FURTHER * self.distance(last));
+                let sure = found.sure && near;
+                (best, at_best) = (Some(found), true);
+                if sure {
+                    break;
+                }
             }
         }
         let best = best?;
-        self.linearise(u, &mut at)?;
+        if !at_best {
+            self.linearise(u, ALL, &mut at)?;
+        }
         let outcome = match best.outcome {
             Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
             // The linearised rows can be met, the rows themselves could not.
@@ -175,17 +220,29 @@ impl Held<'_> {
         self.enforcement.iter().enumerate().filter(|(_, e)| soft(e)).fold(0, |bits, (i, _)| bits | 1 << i)
     }
 
-    /// Linearises the sampled rows at `u`. `None` where there is no finite prediction.
-    fn linearise(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
+    fn distance(&self, u: &[f64]) -> f64 {
+        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r))
+    }
+
+    /// Linearises the sampled rows of the bits `anew` at `u`, and evaluates the models of the others there.
+    /// `None` where there is no finite prediction.
+    fn linearise(&self, u: &[f64], anew: u64, at: &mut Linearised) -> Option<()> {
         let mut ahead = Ahead::ZERO;
         let states = self.x.chunks_exact(self.x.len() / self.channels.len());
         let rows = at.rows.iter_mut().zip(&mut at.violations);
-        for (((channel, demand), x), (row, violation)) in
-            self.channels.iter().zip(self.demands).zip(states).zip(rows)
+        for (i, (((channel, demand), x), (row, violation))) in
+            self.channels.iter().zip(self.demands).zip(states).zip(rows).enumerate()
         {
             *violation = 0.0;
             if demand.is_zero() {
                 *row = Row::ZERO;
+                continue;
+            }
+            if anew >> i & 1 == 0 {
+                let (slack, terms) = (row.slack(u), row.size(u));
+                if slack < -MET * terms {
+                    *violation = -slack / terms;
+                }
                 continue;
             }
             let known = channel.source.ahead(self.t, x, u, self.period, &mut ahead);
@@ -199,7 +256,7 @@ impl Held<'_> {
                 let weight = demand.weights[k];
                 value += weight * ahead.value[k];
                 terms += (weight * ahead.value[k]).abs();
-                for (a, d) in normal.iter_mut().zip(&ahead.gradient[k]) {
+                for (a, d) in normal[..u.len()].iter_mut().zip(&ahead.gradient[k]) {
                     *a += weight * d / self.period;
                 }
             }
@@ -223,10 +280,17 @@ impl Held<'_> {
         Some(())
     }
 
-    /// Newton's method from `u`, on the rows that the linearised programme does not give up.
-    fn newton(&self, u: &mut [f64], at: &mut Linearised, programme: &mut Workspace) -> Option<Guess> {
+    /// Newton's method from `u`, on the rows that the linearised programme does not give up; those of the bits
+    /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
+    fn newton(
+        &self,
+        u: &mut [f64],
+        mut watched: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) -> Option<Guess> {
         let m = u.len();
-        self.linearise(u, at)?;
+        self.linearise(u, watched, at)?;
         let soft = self.soft();
         let mut found = Guess {
             given_up: 0,
@@ -235,8 +299,11 @@ impl Held<'_> {
             outcome: Outcome::Optimal,
             solver: Solver::Unchanged,
             iterations: 0,
+            sure: true,
         };
         let mut target = [0.0; MAX_INPUTS];
+        let mut last_way = f64::INFINITY;
+        let mut ended = false;
         for _ in 0..ITERATIONS {
             let target = &mut target[..m];
             let solution = programme.solve(&self.problem(at.rows), target);
@@ -251,8 +318,22 @@ impl Held<'_> {
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
             found.violation = violation;
             if violation <= 0.0 && way <= MET * size {
-                break;
+                if watched == ALL {
+                    ended = true;
+                    break;
+                }
+                self.linearise(u, ALL, at)?;
+                watched = ALL;
+                found.violation = at.worst(found.given_up);
+                if found.violation <= 0.0 {
+                    ended = true;
+                    break;
+                }
+                continue;
             }
+            found.sure &= way <= CONTRACTION * last_way;
+            last_way = way;
+            watched |= active(programme) | at.violated();
             let mut part = 1.0;
             let mut moved = false;
             for _ in 0..=HALVINGS {
@@ -260,7 +341,7 @@ impl Held<'_> {
                     // Between two points within the bounds, but for round-off.
                     u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
                 }
-                if self.linearise(u, at).is_some() {
+                if self.linearise(u, watched, at).is_some() {
                     let there = at.worst(found.given_up);
                     if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
                         found.violation = there;
@@ -269,14 +350,19 @@ impl Held<'_> {
                     }
                 }
                 part /= 2.0;
+                found.sure = false;
             }
             if !moved {
                 u.copy_from_slice(&from[..m]);
-                self.linearise(u, at)?;
                 break;
             }
         }
-        found.distance = u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+        if !ended {
+            self.linearise(u, ALL, at)?;
+            found.violation = at.worst(found.given_up);
+        }
+        found.sure &= ended && found.given_up == soft;
+        found.distance = self.distance(u);
         Some(found)
     }
 }
@@ -290,6 +376,8 @@ struct Guess {
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
+    /// Whether it met every row by steps that contracted: there is no other answer near.
+    sure: bool,
 }
 
 impl Guess {
