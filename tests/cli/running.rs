@@ -50,10 +50,13 @@ fn the_example_keeps_its_promise() {
 fn header_and_rows() {
     let table = recorded(&[("stop_time = 20.0", "stop_time = 0.01")], "");
     let outputs = ["u.a", "u.omega", "status", "goal.h", "goal.profile", "goal.time_left", "goal.slack"];
-    let flags = ["goal.margin_used", "goal.sampling_loss", "goal.arrived", "goal.guaranteed", "goal.phase"];
+    let rest = ["margin_used", "sampling_loss", "unmet_steps", "postponed"];
+    let flags = ["arrived", "guaranteed", "late_certain", "deadlocked", "phase"];
+    let rest: Vec<_> = rest.iter().chain(&flags).map(|field| format!("goal.{field}")).collect();
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];
     let mut names = vec!["time".to_owned()];
-    let filter = outputs.iter().chain(&flags).chain(&states).chain(&["u_ref.a"]);
+    let outputs = outputs.into_iter().chain(rest.iter().map(String::as_str));
+    let filter = outputs.chain(states).chain(["u_ref.a"]);
     names.extend(filter.map(|n| format!("filter.{n}")));
     names.extend(states.iter().chain(&["u.a", "u.omega"]).map(|n| format!("plant.{n}")));
     assert_eq!(table.header(), names);
