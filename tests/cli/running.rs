@@ -139,3 +139,32 @@ fn pictures_are_written_beside_the_table() {
         assert!(workshop.text(picture).trim_end().ends_with("</svg>"), "{picture}");
     }
 }
+
+/// What became of the promise is told and, where it is required, the exit code.
+#[test]
+fn promises_that_are_required() {
+    let promise = |bound: &str, require: bool, isolate: bool| {
+        let workshop = Workshop::with_fmus();
+        let start =
+            format!("fmu = \"filter.fmu\"\nstart = {{ \"u_min.a\" = -{bound}, \"u_max.a\" = {bound} }}");
+        let edits = [("fmu = \"filter.fmu\"", start.as_str()), ("step = 0.001", "step = 0.01")];
+        workshop.write("system.toml", system(&edits));
+        let mut words = vec!["run", "system.toml", "--json"];
+        words.extend(require.then_some(["--require", "kept"]).into_iter().flatten());
+        words.extend(isolate.then_some("--isolate"));
+        let done = workshop.punctual(&words);
+        let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+        (done.code, report["promises"][0].clone())
+    };
+    let (code, kept) = promise("20.0", true, false);
+    assert_eq!((code, &kept["barrier"], &kept["unmet"]), (0, &"filter.goal".into(), &0.into()), "{kept}");
+    assert!(kept["arrival"].as_f64().is_some_and(|t| t <= DEADLINE) && kept["late"].is_null(), "{kept}");
+    // 60.8 m with 1 m/s2: at least 11 s from rest, so it is certain before the deadline.
+    let (code, late) = promise("1.0", false, false);
+    assert_eq!(code, 0, "{late}");
+    assert!(late["late"].as_f64().is_some_and(|t| t < DEADLINE), "{late}");
+    let above = |field: &str| late[field].as_f64().is_some_and(|value| value > 0.0);
+    assert!(above("unmet") && above("longest") && above("violation"), "{late}");
+    assert_eq!(promise("1.0", true, false), (1, late.clone()));
+    assert_eq!(promise("1.0", true, true), (1, late));
+}
