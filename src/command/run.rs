@@ -41,7 +41,6 @@ pub struct Arguments {
 /// What a run must come to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Requirement {
-    /// Every promise was kept
     Kept,
 }
 

@@ -117,8 +117,12 @@ fn the_json_of_a_run() {
     assert_eq!(report["order"], "gauss-seidel");
     assert_eq!((&report["files"], &report["notes"]), (&Value::Array(vec![]), &Value::Array(vec![])));
     assert_eq!(report["components"][1]["model"], "unicycle");
+    assert_eq!(
+        (&report["promises"][0]["barrier"], &report["promises"][0]["unmet"]),
+        (&"filter.goal".into(), &0.into())
+    );
     let signals = report["signals"].as_array().expect("a list");
-    assert_eq!(signals.len(), 23);
+    assert_eq!(signals.len(), 27);
     let left = signals.iter().find(|s| s["name"] == "filter.goal.time_left").expect("the time left");
     assert_eq!((&left["unit"], &left["max"], &left["final"]), (&"s".into(), &10.0.into(), &9.5.into()));
     assert_eq!(
