@@ -171,7 +171,8 @@ fn table(count: usize) {
     }
     for (name, runs) in &rows {
         let collision = runs.iter().find(|r| r.clearance < 0.0);
-        assert!(collision.is_none(), "{name}: {collision:?}");
+        let from = collision.map(|r| r.start);
+        assert!(collision.is_none(), "{name}, from {from:?}: {collision:?}");
         let silent = runs.iter().find(|r| !r.kept && r.infeasible[0] + r.degenerate == 0);
         assert!(silent.is_none(), "{name}, late without a word: {silent:?}");
         let late = runs.iter().find(|r| !r.kept);
