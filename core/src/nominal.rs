@@ -81,33 +81,20 @@ impl Heading {
         Ok(self)
     }
 
-    /// The same controller towards a point from which the way to the goal is free: where the straight way
+    /// The same controller towards a point from which the way to the goal is freer: where the straight way
     /// from `position` passes within `clearance` (m) of one of the discs (centre and radius in m), a point
-    /// beside the first of them, on the side where the way is shorter. The goal itself where it does not.
+    /// that is seen past the first of them, on the side where the way is shorter. The goal itself where it
+    /// does not. Within the clearance of that disc the way is along its edge.
     ///
-    /// Not a plan: it looks at one disc at a time and can go back and forth between discs that overlap.
+    /// Not a plan: it looks at one disc after the other and can go back and forth between discs that overlap.
     pub fn around(self, position: [f64; 2], discs: &[([f64; 2], f64)], clearance: f64) -> Self {
-        let way = [self.goal[0] - position[0], self.goal[1] - position[1]];
-        let length = way[0].hypot(way[1]);
-        if length == 0.0 {
-            return self;
-        }
-        let along = [way[0] / length, way[1] / length];
-        let (mut first, mut goal) = (f64::INFINITY, self.goal);
-        for &(centre, radius) in discs {
-            let to = [centre[0] - position[0], centre[1] - position[1]];
-            // Where the disc is along the way, and beside it: > 0 to the left.
-            let ahead = to[0] * along[0] + to[1] * along[1];
-            let beside = along[0] * to[1] - along[1] * to[0];
-            let wide = radius + clearance;
-            if ahead <= 0.0 || ahead - wide >= length || beside.abs() >= wide || ahead >= first {
-                continue;
+        let mut goal = self.goal;
+        // The way past one disc can lead to another; at worst each of them is passed once.
+        for _ in discs {
+            match first_in_the_way(position, goal, discs, clearance) {
+                Some((to, wide)) => goal = past(position, goal, to, wide),
+                None => break,
             }
-            first = ahead;
-            // Pass a disc on the left on its right side, with as much room again as the way misses.
-            let side = if beside > 0.0 { -1.0 } else { 1.0 };
-            let out = 1.2 * wide;
-            goal = [centre[0] - along[1] * side * out, centre[1] + along[0] * side * out];
         }
         Self { goal, ..self }
     }
@@ -169,6 +156,53 @@ impl Heading {
     fn speed<S: Scalar>(&self, distance: S) -> S {
         within(self.speed_limit, distance * self.speed_gain)
     }
+}
+
+/// Of the discs within `clearance` of the straight way from `position` to `goal` the first: the vector to its
+/// centre, and its radius with the clearance.
+fn first_in_the_way(
+    position: [f64; 2],
+    goal: [f64; 2],
+    discs: &[([f64; 2], f64)],
+    clearance: f64,
+) -> Option<([f64; 2], f64)> {
+    let way = [goal[0] - position[0], goal[1] - position[1]];
+    let length = way[0].hypot(way[1]);
+    let (mut first, mut found) = (f64::INFINITY, None);
+    for &(centre, radius) in discs {
+        let to = [centre[0] - position[0], centre[1] - position[1]];
+        // Where the disc is along the way, and beside it: > 0 to the left.
+        let ahead = (way[0] * to[0] + way[1] * to[1]) / length;
+        let beside = (way[0] * to[1] - way[1] * to[0]) / length;
+        let wide = radius + clearance;
+        if ahead > 0.0 && ahead - wide < length && beside.abs() < wide && ahead < first {
+            (first, found) = (ahead, Some((to, wide)));
+        }
+    }
+    found
+}
+
+/// A point from which a disc with its centre at `to` from `position` is passed, on the side where the way to
+/// `goal` is shorter: where a tangent from `position` touches the disc of radius `wide`, a little enlarged;
+/// from within that, as far again along its edge and a little outwards.
+fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2] {
+    /// So that the disc is not in the way of what passes it.
+    const ENLARGED: f64 = 1.1;
+    /// Sine of the angle away from the disc within it.
+    const OUTWARDS: f64 = 0.3;
+    let way = [goal[0] - position[0], goal[1] - position[1]];
+    // A disc on the left is passed on its right side.
+    let side = if way[0] * to[1] - way[1] * to[0] > 0.0 { -1.0 } else { 1.0 };
+    let (distance, out) = (to[0].hypot(to[1]), ENLARGED * wide);
+    // The point, along the line to the centre and to the left of it.
+    let [along, across] = if distance > out {
+        let [sin, cos] = [out / distance, (1.0 - (out / distance).powi(2)).sqrt()];
+        [distance * cos * cos, distance * cos * sin * side]
+    } else {
+        [-out * OUTWARDS, out * side]
+    };
+    let unit = if distance > 0.0 { to.map(|v| v / distance) } else { [1.0, 0.0] };
+    [position[0] + along * unit[0] - across * unit[1], position[1] + along * unit[1] + across * unit[0]]
 }
 
 /// `value` moved into ±`limit`.
@@ -245,6 +279,27 @@ mod tests {
                     assert!(error < 1e-6 * (1.0 + wanted.abs()), "state {i}, law {law}: {found:?} {wanted}");
                 }
             }
+        }
+    }
+
+    /// From all around a disc, from within its clearance too: the way to the point is free of it.
+    #[test]
+    fn the_way_around_a_disc_is_free() {
+        let (disc, clearance) = (([10.0, 1.0], 2.0), 1.0);
+        let heading = Heading::towards([20.0, 0.0]);
+        assert_eq!(heading.around([0.0, 9.0], &[([10.0, -9.0], 2.0)], clearance), heading);
+        for k in 0..200 {
+            let (angle, distance) = (f64::from(k) * 0.31, 2.05 + 0.04 * f64::from(k));
+            let from = [disc.0[0] + distance * angle.cos(), disc.0[1] + distance * angle.sin()];
+            let goal = heading.around(from, &[disc], clearance).goal;
+            // The point of the way that is nearest to the centre.
+            let way = [goal[0] - from[0], goal[1] - from[1]];
+            let to = [disc.0[0] - from[0], disc.0[1] - from[1]];
+            let part = (way[0] * to[0] + way[1] * to[1]) / (way[0] * way[0] + way[1] * way[1]);
+            let part = part.clamp(0.0, 1.0);
+            let near = (to[0] - part * way[0]).hypot(to[1] - part * way[1]);
+            let free = f64::min(distance, disc.1 + clearance);
+            assert!(near >= free - 1e-9, "{near} from {from:?} to {goal:?}");
         }
     }
 

@@ -177,45 +177,6 @@ fn a_feasible_reference_is_returned_bit_for_bit() {
     assert_eq!(u.map(f64::to_bits), u_ref.map(f64::to_bits));
 }
 
-#[test]
-fn rows_that_the_bounds_forbid_are_violated_least() {
-    let mut u = [f64::NAN; 2];
-    let rows = [row(&[1.0, 0.0], 5.0), row(&[0.0, -2.0], 5.0)];
-    let solution = solve(&rows, &bounds(&[-1.0; 2], &[1.0; 2]), &[0.25, 0.5], NO_LIMIT, &mut u);
-    assert_eq!((solution.outcome, solution.solver), (Outcome::Infeasible, Solver::DualActiveSet));
-    assert_eq!(u, [1.0, -1.0]);
-}
-
-#[test]
-fn of_contradictory_rows_the_first_is_met() {
-    // u₁ ≥ 1 and u₁ ≤ −1.
-    let mut u = [f64::NAN; 2];
-    let rows = [row(&[1.0, 0.0], 1.0), row(&[-1.0, 0.0], 1.0)];
-    let p = Problem::new(&rows, &Bounds::NONE, &[0.25, 7.0], NO_LIMIT);
-    let mut workspace = Workspace::default();
-    assert_eq!((workspace.solve(&p, &mut u).outcome, u), (Outcome::Infeasible, [1.0, 7.0]));
-    assert_eq!([0, 1].map(|i| workspace.is_relaxed(i)), [false, true]);
-    // Unless the other has priority.
-    let enforcement = [1, 0].map(|priority| Enforcement::Hard { priority });
-    let p = Problem { enforcement: &enforcement, ..p };
-    assert_eq!((workspace.solve(&p, &mut u).outcome, u), (Outcome::Infeasible, [-1.0, 7.0]));
-    assert_eq!([0, 1].map(|i| workspace.is_relaxed(i)), [true, false]);
-}
-
-/// A row that is given up is still met as far as it can be, and rows after it still count.
-#[test]
-fn a_relaxed_row_stays_at_its_least_violation() {
-    let rows = [row(&[1.0, 0.0], 5.0), row(&[0.0, 1.0], 3.0), row(&[-1.0, 0.0], -0.5)];
-    let p = Problem::new(&rows, &Bounds::NONE, &[0.0; 2], NO_LIMIT);
-    let b = bounds(&[-2.0; 2], &[2.0, f64::INFINITY]);
-    let mut u = [f64::NAN; 2];
-    let mut workspace = Workspace::default();
-    let outcome = workspace.solve(&Problem { bounds: &b, ..p }, &mut u).outcome;
-    // u₁ = 2 as close to 5 as it gets; u₂ = 3; u₁ ≤ 0.5 comes last.
-    assert_eq!((outcome, u), (Outcome::Infeasible, [2.0, 3.0]));
-    assert_eq!([0, 1, 2].map(|i| workspace.is_relaxed(i)), [true, false, true]);
-}
-
 /// A soft row pulls with its penalty and no more, whatever the unit of the row.
 #[test]
 fn a_soft_row_yields_beyond_its_penalty() {

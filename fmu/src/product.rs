@@ -53,7 +53,7 @@ pub struct Layout {
 }
 
 /// Outputs of one barrier, in the order of the table.
-pub const BARRIER_OUTPUTS: usize = 9;
+pub const BARRIER_OUTPUTS: usize = 13;
 
 impl Product {
     /// Derives everything from a completed configuration.
@@ -331,6 +331,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         let rate_unit = &over_seconds(unit, degree);
         let name = |field: &str| format!("{}.{field}", barrier.name);
         let flag = || VariableKind::Boolean { start: None };
+        let count = || VariableKind::Integer { start: None, min: Some(0), max: None };
         let first = table.variables.len();
         table.add(name("h"), "barrier; the state is safe where it is >= 0", output, real(None, unit));
         table.add(name("profile"), "lower bound on h that is promised now", output, real(None, unit));
@@ -341,9 +342,17 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         table.add(name("margin_used"), margin, output, real(None, unit));
         let loss = "how far below its promise h may fall within the step because u is held";
         table.add(name("sampling_loss"), loss, output, real(None, unit));
+        let unmet = "steps in a row that did not meet the constraint, this one included";
+        table.add(name("unmet_steps"), unmet, output, count());
+        let postponed = "how often a deadline that is lost was given up for a later one";
+        table.add(name("postponed"), postponed, output, count());
         table.add(name("arrived"), "h >= 0 has been reached", output, flag());
         let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
         table.add(name("guaranteed"), guaranteed, output, flag());
+        let late = "no input within the bounds is inside at the deadline, or it passed outside";
+        table.add(name("late_certain"), late, output, flag());
+        let deadlocked = "other barriers block the way, and h does not rise: needs another u_ref";
+        table.add(name("deadlocked"), deadlocked, output, flag());
         table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
         debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
     }

@@ -153,6 +153,11 @@ fn name(profile: ProfileKind) -> &'static str {
     }
 }
 
+/// A bound in m/s² as it is written in the lines to paste, and so tried: below the peak a little more can be worse.
+fn written(bound: f64) -> f64 {
+    (bound * 1e3).ceil() / 1e3
+}
+
 /// What the candidates of [`effort`] need from `x0`: bounds on the inputs that are accelerations; the others
 /// keep theirs.
 pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingReport>, Error> {
@@ -169,7 +174,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
             };
         }
         for &i in &driven {
-            let limit = bound.min(UNBOUNDED);
+            let limit = written(bound).min(UNBOUNDED);
             tried.bounds.insert(c.plant.inputs()[i].name.clone(), [-limit, limit]);
         }
         tried
@@ -190,8 +195,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
                 .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));
         }
         if let Some(bound) = bound {
-            // Rounded up: the bound found is one that works.
-            let bound = (bound * 1e3).ceil() / 1e3;
+            let bound = written(bound);
             lines.push("[bounds]".to_owned());
             let inputs = c.plant.inputs();
             lines.extend(driven.iter().map(|&i| format!("{} = [{:?}, {bound:?}]", inputs[i].name, -bound)));
@@ -204,7 +208,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
             profile: name(r.candidate.profile),
             rate_times_deadline: r.candidate.rate_times_deadline,
             peak: r.peak,
-            smallest_bound: r.bound,
+            smallest_bound: r.bound.map(written),
             settings: lines(&r.candidate, r.bound),
         })
         .collect())
@@ -219,8 +223,9 @@ pub(super) fn ratings_text(ratings: &[RatingReport]) -> String {
         vec![r.profile.to_owned(), number(r.rate_times_deadline), shown(r.peak), shown(r.smallest_bound)]
     }));
     let table = output::table(&rows, &[false, true, true, true]);
+    let head = "effort, simulated with damping as u_ref; below the peak steps are infeasible and nothing is guaranteed";
     match ratings.first().filter(|best| best.smallest_bound.is_some()) {
-        Some(best) => format!("\neffort, simulated with damping as u_ref\n{table}\n\n{}", best.settings),
-        None => format!("\neffort, simulated with damping as u_ref\n{table}"),
+        Some(best) => format!("\n{head}\n{table}\n\n{}", best.settings),
+        None => format!("\n{head}\n{table}"),
     }
 }

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use crate::coupling::{Order, Outcome, Simulation, System};
+use crate::coupling::{Order, Outcome, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
@@ -29,9 +29,19 @@ pub struct Arguments {
     /// Run in a process of its own: a crash of an FMU is told, and the rows until then are kept
     #[arg(long)]
     isolate: bool,
+    /// Exit with code 1 unless every promise of every filter was kept: each sample met its constraint, no
+    /// deadline was missed, no set left again
+    #[arg(long, value_enum, value_name = "WHAT")]
+    require: Option<Requirement>,
     /// The folder of a run that another process watches
     #[arg(long, hide = true, value_name = "DIR", conflicts_with = "isolate")]
     watched: Option<PathBuf>,
+}
+
+/// What a run must come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Requirement {
+    Kept,
 }
 
 /// What `run` tells, as JSON.
@@ -45,6 +55,7 @@ struct Report {
     final_time: f64,
     wall_time: f64,
     steps_per_second: f64,
+    promises: Vec<Promise>,
     signals: Vec<SignalReport>,
     files: Vec<String>,
     notes: Vec<String>,
@@ -99,6 +110,9 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
         words.extend(["--out".into(), folder.into()]);
     }
     words.extend(arguments.json.then(|| "--json".into()));
+    if arguments.require == Some(Requirement::Kept) {
+        words.extend(["--require".into(), "kept".into()]);
+    }
     words.extend(["--watched".into(), child.folder().into(), "--".into(), arguments.system.clone().into()]);
     let (how, last) = match child.run(words, Voice::Loud, None)? {
         End::Finished(code) => return Ok(ExitCode::from(u8::try_from(code).unwrap_or(1))),
@@ -169,7 +183,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     } else {
         output::result(&text(&report));
     }
-    Ok(ExitCode::SUCCESS)
+    let broken = arguments.require == Some(Requirement::Kept) && !report.promises.iter().all(Promise::kept);
+    Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
 /// The name of a system file without its ending: the head of all names of files written.
@@ -228,6 +243,7 @@ fn report(
         final_time: outcome.statistics.final_time,
         wall_time: outcome.statistics.wall_time.as_secs_f64(),
         steps_per_second: outcome.statistics.steps_per_second(),
+        promises: outcome.promises,
         signals: (0..recording.columns().len()).map(signal).collect(),
         files,
         notes: outcome.notes,
@@ -244,13 +260,14 @@ fn text(report: &Report) -> String {
         row([&s.name, s.unit.as_deref().unwrap_or(""), &number(s.min), &number(s.max), &number(s.last)])
     }));
     let mut text = format!(
-        "{}\n\n{} steps of {} s to t = {} s in {:.3} s ({} steps/s)\n\n{}",
+        "{}\n\n{} steps of {} s to t = {} s in {:.3} s ({} steps/s)\n\n{}{}",
         output::table(&components, &[]),
         report.steps,
         report.step,
         report.final_time,
         report.wall_time,
         output::number(report.steps_per_second.round()),
+        promises_text(&report.promises),
         output::table(&signals, &[false, false, true, true, true]),
     );
     if !report.files.is_empty() {
@@ -258,4 +275,28 @@ fn text(report: &Report) -> String {
         text.push_str(&report.files.join("\n         "));
     }
     text
+}
+
+/// A row for each promise and an empty line; nothing without one.
+fn promises_text(promises: &[Promise]) -> String {
+    if promises.is_empty() {
+        return String::new();
+    }
+    let head = ["promise", "arrival s", "late s", "left s", "samples not met", "in a row", "violation", ""];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let time = |t: Option<f64>| t.map_or_else(|| "-".to_owned(), output::number);
+    rows.extend(promises.iter().map(|p| {
+        vec![
+            p.barrier.clone(),
+            time(p.arrival),
+            time(p.late),
+            time(p.left),
+            p.unmet.to_string(),
+            p.longest.to_string(),
+            output::number(p.violation),
+            if p.kept() { "kept" } else { "not kept" }.to_owned(),
+        ]
+    }));
+    let right = [false, true, true, true, true, true, true, false];
+    format!("{}\n\n", output::table(&rows, &right))
 }

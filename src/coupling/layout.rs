@@ -23,7 +23,7 @@ impl Layout {
         self.ports.iter().position(|other| *other == port)
     }
 
-    /// Gives slots to the outputs of a component that are connected or recorded and to its
+    /// Gives slots to the outputs of a component that are connected or `read` and to its
     /// connected inputs: outputs without feedthrough, outputs with feedthrough, inputs.
     pub(super) fn add(
         &mut self,
@@ -31,7 +31,7 @@ impl Layout {
         fmus: &[Rc<Fmu>],
         component: usize,
         links: &[Link],
-        recorded: &[Port],
+        read: &[Port],
     ) -> [Group; 3] {
         let description = fmus[component].description();
         let mut parts: [Vec<(usize, u32, Kind)>; 3] = Default::default();
@@ -39,7 +39,7 @@ impl Layout {
             let port = Port { component, variable: position };
             let entry = (position, variable.value_reference, variable.kind);
             if variable.causality == Causality::Output {
-                if recorded.contains(&port) || links.iter().any(|link| link.from == port) {
+                if read.contains(&port) || links.iter().any(|link| link.from == port) {
                     parts[usize::from(network::has_feedthrough(
                         &system.components()[component],
                         description,

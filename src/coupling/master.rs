@@ -19,6 +19,7 @@ use super::grid::Grid;
 use super::layout::{Layout, Recorder};
 use super::network::{self, Network, Start};
 use super::ports::{Group, Source};
+use super::promises::{self, Promise, Watched};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
 use crate::host::{Fmu, Slave};
@@ -56,6 +57,7 @@ pub struct Simulation {
     values: Vec<f64>,
     /// The name of each slot.
     names: Vec<String>,
+    promises: Vec<Watched>,
     /// Whether each slot has been reported as not finite.
     reported: Vec<bool>,
     notes: Vec<String>,
@@ -71,6 +73,8 @@ pub struct Outcome {
     pub recording: Recording,
     /// How long it took.
     pub statistics: Statistics,
+    /// What became of the promises of the filters, in the order of the components.
+    pub promises: Vec<Promise>,
     /// What the user should know: signals read late, values that are not finite, warnings.
     pub notes: Vec<String>,
     /// The FMI call that ended the run before its stop time, if one did; what was recorded until then
@@ -147,10 +151,13 @@ impl Simulation {
         let Network { links, mut starts, recorded, direct, delayed, notes } =
             network::resolve(system, &descriptions)?;
 
+        let watched = promises::ports(system, &descriptions);
+        let mut read = recorded.clone();
+        read.extend(watched.iter().flat_map(|(_, status, fields)| fields.iter().chain([status])));
         let mut layout = Layout::default();
         let mut groups = Vec::new();
         for component in 0..fmus.len() {
-            groups.push(layout.add(system, &fmus, component, &links, &recorded));
+            groups.push(layout.add(system, &fmus, component, &links, &read));
         }
         let slots = recorded.iter().filter_map(|port| layout.slot(*port)).collect();
         let columns = recorded
@@ -186,6 +193,7 @@ impl Simulation {
             slots,
             values: vec![0.0; layout.ports.len()],
             reported: vec![false; layout.ports.len()],
+            promises: watched.iter().filter_map(|ports| Watched::new(&layout, ports)).collect(),
             names: layout.names,
             notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
             standing_notes: 0,
@@ -241,7 +249,8 @@ impl Simulation {
             }
         }
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
-        Ok(Outcome { recording, statistics, notes: self.notes.clone(), failure: ran.err() })
+        let promises = self.promises.iter().map(|watched| watched.promise().clone()).collect();
+        Ok(Outcome { recording, statistics, promises, notes: self.notes.clone(), failure: ran.err() })
     }
 
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
@@ -256,7 +265,7 @@ impl Simulation {
             for i in 0..self.delayed.len() {
                 self.set_inputs(self.delayed[i])?;
             }
-            recorder.row(k, time, &self.values);
+            self.take(recorder, k, time);
             for i in 0..self.delayed.len() {
                 self.members[self.delayed[i]].slave.do_step(time, step)?;
             }
@@ -274,7 +283,7 @@ impl Simulation {
         for i in 0..self.delayed.len() {
             self.set_inputs(self.delayed[i])?;
         }
-        recorder.row(k, time, &self.values);
+        self.take(recorder, k, time);
         Ok(())
     }
 
@@ -287,7 +296,7 @@ impl Simulation {
             for c in 0..self.members.len() {
                 self.set_inputs(c)?;
             }
-            recorder.row(k, time, &self.values);
+            self.take(recorder, k, time);
             for member in &mut self.members {
                 member.slave.do_step(time, step)?;
             }
@@ -299,7 +308,7 @@ impl Simulation {
         for c in 0..self.members.len() {
             self.set_inputs(c)?;
         }
-        recorder.row(self.grid.steps(), self.stop_time, &self.values);
+        self.take(recorder, self.grid.steps(), self.stop_time);
         Ok(())
     }
 
@@ -308,6 +317,7 @@ impl Simulation {
     fn initialise(&mut self) -> Result<(), Error> {
         self.notes.truncate(self.standing_notes);
         self.reported.fill(false);
+        self.promises.iter_mut().for_each(Watched::reset);
         for member in &mut self.members {
             if self.used {
                 member.slave.reset()?;
@@ -351,6 +361,12 @@ impl Simulation {
             self.read_states(c, self.start_time)?;
         }
         Ok(())
+    }
+
+    /// Records point `k` at `time` and looks at the promises there.
+    fn take(&mut self, recorder: &mut Recorder<'_>, k: u64, time: f64) {
+        recorder.row(k, time, &self.values);
+        self.promises.iter_mut().for_each(|watched| watched.see(time, &self.values));
     }
 
     fn set_inputs(&mut self, c: usize) -> Result<(), Error> {

@@ -7,11 +7,13 @@ mod layout;
 mod master;
 mod network;
 mod ports;
+mod promises;
 mod system;
 
 pub use grid::Grid;
 pub use master::{Outcome, Simulation, Statistics};
 pub use network::{Link, Port, links};
+pub use promises::Promise;
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,

@@ -265,14 +265,29 @@ impl<'a> Slave<'a> {
         }
         assert_eq!(self.integer("status"), report.status as c_int, "status {when}");
         for (name, b) in filter.barrier_names().zip(&report.barriers) {
-            for (field, wanted) in
-                [("h", b.h), ("profile", b.profile), ("time_left", b.time_left), ("slack", b.slack)]
-            {
+            for (field, wanted) in [
+                ("h", b.h),
+                ("profile", b.profile),
+                ("time_left", b.time_left),
+                ("slack", b.slack),
+                ("margin_used", b.margin),
+                ("sampling_loss", b.sampling_loss),
+            ] {
                 let found = self.real(&format!("{name}.{field}"));
                 assert_eq!(found.to_bits(), wanted.to_bits(), "{name}.{field} {when}: {found} {wanted}");
             }
-            assert_eq!(self.flag(&format!("{name}.arrived")), b.arrived, "{name}.arrived {when}");
-            assert_eq!(self.flag(&format!("{name}.guaranteed")), b.guaranteed, "{name}.guaranteed {when}");
+            for (field, wanted) in [("unmet_steps", b.unmet_steps), ("postponed", b.postponed)] {
+                let found = self.integer(&format!("{name}.{field}"));
+                assert_eq!(i64::from(found), i64::from(wanted), "{name}.{field} {when}");
+            }
+            for (field, wanted) in [
+                ("arrived", b.arrived),
+                ("guaranteed", b.guaranteed),
+                ("late_certain", b.late_certain),
+                ("deadlocked", b.deadlocked),
+            ] {
+                assert_eq!(self.flag(&format!("{name}.{field}")), wanted, "{name}.{field} {when}");
+            }
             assert_eq!(self.integer(&format!("{name}.phase")), b.phase as c_int, "{name}.phase {when}");
         }
     }

@@ -15,9 +15,9 @@ fn workshop() -> Workshop {
 fn every_example_configuration_is_built() {
     let workshop = Workshop::with_library();
     for (stem, says) in [
-        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 34 variables"),
+        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 38 variables"),
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
-        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 54 variables"),
+        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 62 variables"),
         ("escort-plant", "Reference plant: point mass in the plane with 11 variables"),
         ("tour-controller", "Nominal controller (waypoints) for a unicycle with 20 variables"),
     ] {

@@ -167,3 +167,28 @@ fn bounds_decide_what_deadline_can_be_met() {
     let most = met["soonest_at_most"].as_f64();
     assert!(most.is_some_and(|t| t < 10.0) && most >= met["soonest_at_least"].as_f64(), "{met}");
 }
+
+/// The table and the lines to paste; with these the deadline is kept, with less it was not.
+#[test]
+fn the_least_effort_from_a_start() {
+    let edits = [("step_size = 0.001", "step_size = 0.05")];
+    let workshop = workshop(&edits);
+    workshop
+        .punctual(["check", "filter.toml", "--effort"])
+        .fails(2, "--effort: needs a start: give --plant or --x0");
+    let words = ["check", "filter.toml", "--plant", "plant.toml", "--effort"];
+    let text = workshop.punctual(words).success();
+    assert_golden("check-effort.txt", &text);
+    let value = |key: &str| {
+        let line = text.lines().rev().find(|line| line.starts_with(key)).expect("a line to paste");
+        line.split_once(" = ").expect("an assignment").1.to_owned()
+    };
+    let filter = workshop.text("filter.toml");
+    let pasted = format!("profile = {}\nrate = {}\n", value("profile"), value("rate"));
+    let with = filter
+        .replace("[experiment]", &format!("[bounds]\na = {}\n[experiment]", value("a")))
+        .replace("deadline = 10.0", &format!("{pasted}deadline = 10.0"));
+    workshop.write("least.toml", with);
+    let checked = workshop.punctual(["check", "least.toml", "--plant", "plant.toml"]);
+    assert!(checked.stdout.contains("can be met (this filter does it, simulated)"), "{checked:#?}");
+}

@@ -50,10 +50,13 @@ fn the_example_keeps_its_promise() {
 fn header_and_rows() {
     let table = recorded(&[("stop_time = 20.0", "stop_time = 0.01")], "");
     let outputs = ["u.a", "u.omega", "status", "goal.h", "goal.profile", "goal.time_left", "goal.slack"];
-    let flags = ["goal.margin_used", "goal.sampling_loss", "goal.arrived", "goal.guaranteed", "goal.phase"];
+    let rest = ["margin_used", "sampling_loss", "unmet_steps", "postponed"];
+    let flags = ["arrived", "guaranteed", "late_certain", "deadlocked", "phase"];
+    let rest: Vec<_> = rest.iter().chain(&flags).map(|field| format!("goal.{field}")).collect();
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];
     let mut names = vec!["time".to_owned()];
-    let filter = outputs.iter().chain(&flags).chain(&states).chain(&["u_ref.a"]);
+    let outputs = outputs.into_iter().chain(rest.iter().map(String::as_str));
+    let filter = outputs.chain(states).chain(["u_ref.a"]);
     names.extend(filter.map(|n| format!("filter.{n}")));
     names.extend(states.iter().chain(&["u.a", "u.omega"]).map(|n| format!("plant.{n}")));
     assert_eq!(table.header(), names);
@@ -114,8 +117,12 @@ fn the_json_of_a_run() {
     assert_eq!(report["order"], "gauss-seidel");
     assert_eq!((&report["files"], &report["notes"]), (&Value::Array(vec![]), &Value::Array(vec![])));
     assert_eq!(report["components"][1]["model"], "unicycle");
+    assert_eq!(
+        (&report["promises"][0]["barrier"], &report["promises"][0]["unmet"]),
+        (&"filter.goal".into(), &0.into())
+    );
     let signals = report["signals"].as_array().expect("a list");
-    assert_eq!(signals.len(), 23);
+    assert_eq!(signals.len(), 27);
     let left = signals.iter().find(|s| s["name"] == "filter.goal.time_left").expect("the time left");
     assert_eq!((&left["unit"], &left["max"], &left["final"]), (&"s".into(), &10.0.into(), &9.5.into()));
     assert_eq!(
@@ -135,4 +142,33 @@ fn pictures_are_written_beside_the_table() {
     for picture in ["out/system-h.svg", "out/system-2.svg"] {
         assert!(workshop.text(picture).trim_end().ends_with("</svg>"), "{picture}");
     }
+}
+
+/// What became of the promise is told and, where it is required, the exit code.
+#[test]
+fn promises_that_are_required() {
+    let promise = |bound: &str, require: bool, isolate: bool| {
+        let workshop = Workshop::with_fmus();
+        let start =
+            format!("fmu = \"filter.fmu\"\nstart = {{ \"u_min.a\" = -{bound}, \"u_max.a\" = {bound} }}");
+        let edits = [("fmu = \"filter.fmu\"", start.as_str()), ("step = 0.001", "step = 0.01")];
+        workshop.write("system.toml", system(&edits));
+        let mut words = vec!["run", "system.toml", "--json"];
+        words.extend(require.then_some(["--require", "kept"]).into_iter().flatten());
+        words.extend(isolate.then_some("--isolate"));
+        let done = workshop.punctual(&words);
+        let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+        (done.code, report["promises"][0].clone())
+    };
+    let (code, kept) = promise("20.0", true, false);
+    assert_eq!((code, &kept["barrier"], &kept["unmet"]), (0, &"filter.goal".into(), &0.into()), "{kept}");
+    assert!(kept["arrival"].as_f64().is_some_and(|t| t <= DEADLINE) && kept["late"].is_null(), "{kept}");
+    // 60.8 m with 1 m/s2: at least 11 s from rest, so it is certain before the deadline.
+    let (code, late) = promise("1.0", false, false);
+    assert_eq!(code, 0, "{late}");
+    assert!(late["late"].as_f64().is_some_and(|t| t < DEADLINE), "{late}");
+    let above = |field: &str| late[field].as_f64().is_some_and(|value| value > 0.0);
+    assert!(above("unmet") && above("longest") && above("violation"), "{late}");
+    assert_eq!(promise("1.0", true, false), (1, late.clone()));
+    assert_eq!(promise("1.0", true, true), (1, late));
 }

@@ -4,12 +4,11 @@
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Status};
 use punctual_core::nalgebra::SVector;
 use punctual_core::nominal::Heading;
-use punctual_core::plants::Unicycle;
+use punctual_core::plants::{Bicycle, Unicycle};
 
-use super::bicycle;
 use super::starts::drawn;
 
 const GOAL: ([f64; 2], f64) = ([45.0, 45.0], 2.0);
@@ -37,10 +36,12 @@ struct Run {
     /// Smallest distance from the edge of an obstacle, m; < 0 in collision.
     clearance: f64,
     arrival: Option<f64>,
-    /// Whether it was inside from the deadline until 1.5 times it.
+    /// Whether it was inside from the deadline until twice that.
     kept: bool,
-    /// Steps whose constraints could not all be met, and among them those that an obstacle's was.
-    unmet: [usize; 2],
+    /// Steps that were infeasible, and among them those in which an obstacle's constraint was not met.
+    infeasible: [usize; 2],
+    /// Steps in which no input moves a barrier that should, as at the centre of the goal.
+    degenerate: usize,
     /// Whether a deadlock was reported.
     deadlocked: bool,
 }
@@ -71,9 +72,16 @@ where
     let mut filter = FilterBuilder::build(builder).expect("valid filter");
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };
     let mut x = SVector::from(start);
-    let mut run =
-        Run { start, clearance: f64::INFINITY, arrival: None, kept: true, unmet: [0; 2], deadlocked: false };
-    for k in 0..=(1.5 * DEADLINE / STEP).round() as usize {
+    let mut run = Run {
+        start,
+        clearance: f64::INFINITY,
+        arrival: None,
+        kept: true,
+        infeasible: [0; 2],
+        degenerate: 0,
+        deadlocked: false,
+    };
+    for k in 0..=(2.0 * DEADLINE / STEP).round() as usize {
         let t = k as f64 * STEP;
         let waypoint = heading.around([x[0], x[1]], &OBSTACLES, 1.0);
         let u_ref = nominal(waypoint, &x.into());
@@ -84,8 +92,10 @@ where
             let edge = (x[0] - centre[0]).hypot(x[1] - centre[1]) - radius;
             run.clearance = run.clearance.min(edge);
         }
-        run.unmet[0] += usize::from(report.unmet().next().is_some());
-        run.unmet[1] += usize::from(report.unmet().any(|i| i > 0));
+        let infeasible = report.status == Status::Infeasible;
+        run.infeasible[0] += usize::from(infeasible);
+        run.infeasible[1] += usize::from(infeasible && report.unmet().any(|i| i > 0));
+        run.degenerate += usize::from(report.status == Status::Degenerate);
         run.deadlocked |= report.barriers[0].deadlocked;
         let inside = report.barriers[0].h >= 0.0;
         if inside && run.arrival.is_none() {
@@ -110,36 +120,63 @@ fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
     starts
 }
 
-/// No collision, and the deadline kept by all but a few that the other vehicles' way round is too long for.
+/// One run from each start, on every core.
+fn runs<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, starts: &[[f64; 4]]) -> Vec<Run>
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let parts = starts.chunks(starts.len().div_ceil(cores));
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = parts
+            .map(|part| {
+                scope
+                    .spawn(move || part.iter().map(|x0| run(plant, bounds, nominal, *x0)).collect::<Vec<_>>())
+            })
+            .collect();
+        workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
+    })
+}
+
+/// No collision, and the deadline kept by all vehicles that can turn between the obstacles. The long bicycle,
+/// whose turning circle is five times as wide as an obstacle, gets stuck in front of one; that is reported.
 fn table(count: usize) {
     let starts = feasible_starts(count);
-    let unicycle: Vec<Run> =
-        starts.iter().map(|x0| run(&Unicycle, [8.0, 3.0], |h, x| h.unicycle(x), *x0)).collect();
-    let bicycle: Vec<Run> =
-        starts.iter().map(|x0| run(&bicycle(), [8.0, 1.2], |h, x| h.bicycle(x, 10.0), *x0)).collect();
-    for (name, runs) in
-        [("unicycle, |a| <= 8, |omega| <= 3", unicycle), ("bicycle, |a| <= 8, |beta| <= 1.2", bicycle)]
-    {
+    let bicycle = |l_r| Bicycle::new(l_r).expect("valid bicycle");
+    let rows = [
+        ("unicycle", runs(&Unicycle, [8.0, 3.0], |h, x| h.unicycle(x), &starts)),
+        ("bicycle, l_r = 2.5 m", runs(&bicycle(2.5), [8.0, 1.2], |h, x| h.bicycle(x, 2.5), &starts)),
+        ("bicycle, l_r = 10 m", runs(&bicycle(10.0), [8.0, 1.2], |h, x| h.bicycle(x, 10.0), &starts)),
+    ];
+    println!(
+        "| vehicle | starts | collisions | least clearance | on time | inside from T to 2T | infeasible steps \
+         (an obstacle's) | degenerate steps | deadlocks reported |"
+    );
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|");
+    for (name, runs) in &rows {
         let count = |f: fn(&Run) -> bool| runs.iter().filter(|r| f(r)).count();
-        let collisions = count(|r| r.clearance < 0.0);
-        let least = runs.iter().map(|r| r.clearance).fold(f64::INFINITY, f64::min);
+        let sum = |f: fn(&Run) -> usize| runs.iter().map(f).sum::<usize>();
         println!(
-            "{name}: {} starts, collisions {collisions} (least clearance {least:.3} m), on time and kept {}, \
-             arrived {}, steps not met {} (an obstacle's {}), runs with a deadlock reported {}",
+            "| {name} | {} | {} | {:.2} m | {} | {} | {} ({}) | {} | {} |",
             runs.len(),
+            count(|r| r.clearance < 0.0),
+            runs.iter().map(|r| r.clearance).fold(f64::INFINITY, f64::min),
+            count(|r| r.arrival.is_some_and(|t| t <= DEADLINE)),
             count(|r| r.kept),
-            count(|r| r.arrival.is_some()),
-            runs.iter().map(|r| r.unmet[0]).sum::<usize>(),
-            runs.iter().map(|r| r.unmet[1]).sum::<usize>(),
+            sum(|r| r.infeasible[0]),
+            sum(|r| r.infeasible[1]),
+            sum(|r| r.degenerate),
             count(|r| r.deadlocked),
         );
-        if let Some(lost) = runs.iter().find(|r| r.clearance < 0.0) {
-            println!("  first collision, from {:?}: {lost:?}", lost.start);
-        }
-        if let Some(lost) = runs.iter().find(|r| !r.kept) {
-            println!("  first late, from {:?}: {lost:?}", lost.start);
-        }
-        assert_eq!(collisions, 0, "{name}");
+    }
+    for (name, runs) in &rows {
+        let collision = runs.iter().find(|r| r.clearance < 0.0);
+        let from = collision.map(|r| r.start);
+        assert!(collision.is_none(), "{name}, from {from:?}: {collision:?}");
+        let silent = runs.iter().find(|r| !r.kept && r.infeasible[0] + r.degenerate == 0);
+        assert!(silent.is_none(), "{name}, late without a word: {silent:?}");
+        let late = runs.iter().find(|r| !r.kept);
+        assert!(late.is_none() || name.ends_with("10 m"), "{name}: {late:?}");
     }
 }
 

@@ -96,8 +96,10 @@ pub struct BarrierReport {
     /// against this one's, if there is one.
     pub blocked_by: Option<usize>,
     /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
-    /// been met, and h has not risen by a hundredth of its size. Another u_ref can lead
-    /// out of it, one that goes around ([`Heading::around`](crate::nominal::Heading::around)).
+    /// been met, and h has not risen by a hundredth of its size. What leads out of it is a u_ref that goes around
+    /// ([`Heading::around`](crate::nominal::Heading::around)), if this barrier lets it: a hard one that is not
+    /// met stays at its least violation, whatever u_ref is; a soft one
+    /// ([`Strictness::Soft`](super::Strictness::Soft)) yields to it.
     pub deadlocked: bool,
     /// How far h may fall below its promise within the period because the input is held, `[h]`: what
     /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not

@@ -96,9 +96,12 @@ impl FilterBlock {
         for b in &report.barriers {
             let reals = [b.h, b.profile, b.time_left, b.slack, b.margin, b.sampling_loss];
             values.reals[at..][..6].copy_from_slice(&reals);
-            values.booleans[at + 6] = b.arrived;
-            values.booleans[at + 7] = b.guaranteed;
-            values.integers[at + 8] = b.phase as i32;
+            for (i, count) in [b.unmet_steps, b.postponed].into_iter().enumerate() {
+                values.integers[at + 6 + i] = i32::try_from(count).unwrap_or(i32::MAX);
+            }
+            let flags = [b.arrived, b.guaranteed, b.late_certain, b.deadlocked];
+            values.booleans[at + 8..][..4].copy_from_slice(&flags);
+            values.integers[at + 12] = b.phase as i32;
             at += BARRIER_OUTPUTS;
         }
     }
