@@ -64,12 +64,12 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// `text` with up to seven edits, of bytes, lines and words; `words` are put in or in place of others.
+    /// `text` with up to four edits, of bytes, lines and words; `words` are put in or in place of others.
     pub(crate) fn edited(&mut self, text: &[u8], words: &[&str]) -> Vec<u8> {
         let mut text = text.to_vec();
-        for _ in 0..1 + self.below(7) {
+        for _ in 0..1 + self.below(4) {
             let at = self.position(text.len());
-            match self.below(8) {
+            match self.below(12) {
                 0 if !text.is_empty() => text[at] = self.byte(),
                 1 if !text.is_empty() => text[at] ^= 1 << self.below(8),
                 2 => text.truncate(at),

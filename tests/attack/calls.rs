@@ -97,8 +97,8 @@ fn call(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
         28..35 if !machine.held.is_empty() => state(machine, k, bytes),
         35 => logging(machine, k, bytes),
         36 => absent(machine, k, bytes),
-        37 if bytes.below(8) == 0 => machine.renew(k),
-        38 => refused_instance(bytes),
+        37 if bytes.below(16) == 0 => machine.renew(k),
+        38 if bytes.below(16) == 0 => refused_instance(bytes),
         39 => null_component(bytes),
         _ => machine.look(k),
     }
