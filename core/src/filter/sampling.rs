@@ -142,7 +142,10 @@ impl Held<'_> {
         let mut best: Option<Guess> = None;
         let mut guess = [0.0; MAX_INPUTS];
         for start in [Some(&*pointwise), last].into_iter().flatten() {
-            guess[..m].copy_from_slice(start);
+            // The last input may come from a state that was made under other bounds.
+            for i in 0..m {
+                guess[i] = self.bounds.clamp(i, start[i]);
+            }
             if let Some(found) = self.newton(&mut guess[..m], &mut at, programme)
                 && best.as_ref().is_none_or(|b| found.better_than(b))
             {
