@@ -16,7 +16,7 @@ use crate::instance::Instance;
 /// Most inner steps that a plant is asked for in one step, so that a case takes no time.
 const INNER_STEPS: f64 = 1000.0;
 
-/// Inputs whose squares overflow: what a controller wants of them may be no number, which a filter shows.
+/// Inputs and parameters whose products overflow: what a controller wants of them may be no number, which a filter shows.
 const HUGE: f64 = 1e150;
 
 /// The parameter of a bound that is none.
@@ -138,7 +138,8 @@ impl Machine {
             Configuration::Controller(_) => {
                 let u = instance.reals(Causality::Output, "u_ref.");
                 let finite = u.iter().all(|v| v.is_finite());
-                let huge = inputs.iter().any(|v| v.abs() > HUGE);
+                let parameters = instance.reals(Causality::Parameter, "");
+                let huge = inputs.iter().chain(&parameters).any(|v| v.abs() > HUGE);
                 assert!(!invalid || u.iter().all(|v| v.is_nan()), "{u:?} from {inputs:?}");
                 assert!(invalid || huge || finite, "{u:?} from {inputs:?}");
             }

@@ -24,7 +24,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[test]
 fn states_of_changed_bytes() {
     let mut pool = Pool::default();
-    campaign::run("states", 2000, "states read", |bytes| {
+    campaign::run("states", 500, "states read", |bytes| {
         let mut bytes = Bytes::new(bytes);
         let slots = vec![pool.slot(&mut bytes, false)];
         let mut machine = Machine::new(slots);
