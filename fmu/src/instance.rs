@@ -44,7 +44,7 @@ impl Mode {
     /// All of them.
     pub const ANY: Self = Self(15);
 
-    const fn or(self, other: Self) -> Self {
+    pub(crate) const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
@@ -133,6 +133,8 @@ pub struct State {
 pub struct Instance {
     product: Product,
     block: Box<dyn Block>,
+    /// What a new block remembers: nothing yet.
+    start: BlockState,
     mode: Mode,
     /// The present communication point in s.
     time: f64,
@@ -169,9 +171,12 @@ impl Instance {
         let block = block::build(&product).map_err(|e| e.to_string())?;
         let len = product.variables.len();
         let values = Values::zeros(len);
+        let mut start = BlockState::Plant { x: Vec::new() };
+        block.save(&mut start);
         let mut instance = Self {
             product,
             block,
+            start,
             mode: Mode::INSTANTIATED,
             time: 0.0,
             stepped: false,
@@ -283,6 +288,9 @@ impl Instance {
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
+        // So that a state taken now is that of a new instance, bit for bit.
+        let restored = self.block.restore(&self.start);
+        debug_assert!(restored.is_ok(), "{restored:?}");
     }
 
     /// A snapshot of the instance, in any mode.
@@ -305,8 +313,19 @@ impl Instance {
     /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
     pub fn save(&self, state: &mut State) {
         // Without `..`: whoever adds a field decides here whether it belongs to the state.
-        let Self { product, block, mode, time, values, stepped, last_step, fresh, configured, derivative: _ } =
-            self;
+        let Self {
+            product,
+            block,
+            start: _,
+            mode,
+            time,
+            values,
+            stepped,
+            last_step,
+            fresh,
+            configured,
+            derivative: _,
+        } = self;
         state.guid.clone_from(&product.guid);
         (state.mode, state.time, state.last_step) = (*mode, *time, *last_step);
         (state.stepped, state.fresh, state.configured) = (*stepped, *fresh, *configured);

@@ -139,12 +139,15 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     }
 
     let mut input = Reader { rest: &content[HEADER..] };
-    let mode = input.field("mode")?;
+    let mode: Mode = input.field("mode")?;
     let time = input.finite("time")?;
     let stepped = input.field("stepped")?;
     let last_step = input.finite("last_step")?;
     let fresh = input.field("fresh")?;
-    let configured = input.field("configured")?;
+    let configured: bool = input.field("configured")?;
+    if !configured && mode.is_in(Mode::STEP.or(Mode::TERMINATED)) {
+        return Err(format!("configured: is false, must be true in the mode {:?}", mode.name()));
+    }
     let values = read_values(product, &mut input)?;
     let block = match &product.configuration {
         Configuration::Filter(c) => {

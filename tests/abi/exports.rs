@@ -103,3 +103,13 @@ fn a_null_component_is_an_error_everywhere() {
     // SAFETY: as above.
     assert_eq!(unsafe { *int }, 7, "nothing was written");
 }
+
+/// Importers load with `RTLD_NOW`: nothing may be left to be found later.
+#[cfg(unix)]
+#[test]
+fn loads_with_every_symbol_resolved_at_once() {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    // SAFETY: the library has no initialisers of its own.
+    let library = unsafe { Library::open(Some(library_path()), RTLD_NOW | RTLD_LOCAL) };
+    library.unwrap_or_else(|e| panic!("{e}"));
+}

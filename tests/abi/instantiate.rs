@@ -243,3 +243,14 @@ fn resources_are_not_needed_after_instantiation() {
     slave.initialize();
     slave.step(0.0, 0.1);
 }
+
+/// Only `resources/` and `binaries/` are sure to be extracted, and what lies beside them is not ours.
+#[test]
+fn the_model_description_beside_the_resources_is_never_read() {
+    let fmu = Fmu::new(FILTER);
+    let beside = fmu.resources.with_file_name("modelDescription.xml");
+    assert!(!beside.exists());
+    let wanted = Slave::ready(&fmu).snapshot();
+    std::fs::write(&beside, "<fmiModelDescription guid='another'").unwrap();
+    assert_eq!(Slave::ready(&fmu).snapshot(), wanted);
+}

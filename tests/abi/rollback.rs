@@ -339,3 +339,23 @@ fn an_adaptive_master() {
     assert!(rejected > 20, "{rejected}");
     assert_eq!((all(&f), all(&p)), (all(&straight_f), all(&straight_p)));
 }
+
+/// Importers pass true while they roll back, and false while they do not.
+#[test]
+fn no_set_fmu_state_prior_to_current_point_is_ignored() {
+    for configuration in [FILTER, PLANT] {
+        let fmu = Fmu::new(configuration);
+        let slave = Slave::ready(&fmu);
+        let mut first = None;
+        for flags in [[0, 0], [1, 1], [0, 1], [1, 0]] {
+            let start = slave.state();
+            for (k, flag) in flags.into_iter().enumerate() {
+                slave.set_inputs(&[1.0, 2.0]);
+                slave.ok((API.do_step)(slave.component, 0.1 * k as f64, 0.1, flag));
+            }
+            let end = slave.now();
+            assert_eq!(first.get_or_insert_with(|| end.clone()), &end, "{flags:?}");
+            slave.restore(start);
+        }
+    }
+}

@@ -136,3 +136,26 @@ fn commands_are_found_in_help_and_table() {
     let table = "| command | does |\n|---|---|\n| `punctual run SYSTEM [--out DIR]` | couples |\n| `punctual demo` | x |\n";
     assert_eq!(listed(table), ["run", "demo"]);
 }
+
+/// The last column of its tables names files and their tests: "`file`: `test`, `test`; `file`: `test`".
+#[test]
+fn every_trap_of_fmi_has_a_test_that_exists() {
+    let mut rows = 0;
+    for row in text("docs/fmi-traps.md").lines().filter(|line| line.starts_with("| ")).skip(1) {
+        let tests = row.trim_end_matches(" |").rsplit(" | ").next().unwrap_or_default();
+        if tests == "tests" {
+            continue;
+        }
+        rows += 1;
+        for group in tests.split("; ") {
+            let names: Vec<&str> = group.split('`').skip(1).step_by(2).collect();
+            let [file, names @ ..] = &names[..] else { panic!("no file in {row}") };
+            assert!(!names.is_empty(), "no test in {row}");
+            for name in names {
+                let found = ["fn ", "def "].iter().any(|head| text(file).contains(&format!("{head}{name}(")));
+                assert!(found, "docs/fmi-traps.md: no {name} in {file}");
+            }
+        }
+    }
+    assert!(rows > 40, "{rows} traps");
+}

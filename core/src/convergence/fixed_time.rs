@@ -237,7 +237,7 @@ impl FixedTime {
             && h[0] < 0.0
         {
             self.anchor(state, t, h, recovery, state.period);
-            state.recoveries += 1;
+            state.recoveries = state.recoveries.saturating_add(1);
         }
         let FixedTimeState { stay_rate, margin, deadline, .. } = *state;
         let mut e = [0.0; N];

@@ -179,7 +179,10 @@ impl Held<'_> {
         // Whether the rows are linearised at the best guess.
         let mut at_best = false;
         for start in [Some(&*pointwise), last].into_iter().flatten() {
-            guess[..m].copy_from_slice(start);
+            // The last input may come from a state that was made under other bounds.
+            for i in 0..m {
+                guess[i] = self.bounds.clamp(i, start[i]);
+            }
             at_best = false;
             if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme)
                 && best.as_ref().is_none_or(|b| found.better_than(b))

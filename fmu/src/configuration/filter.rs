@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use punctual_core::MAX_ROWS;
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
@@ -132,6 +133,11 @@ impl FilterConfiguration {
         self.plant.complete()?;
         if self.barrier.is_empty() {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
+        }
+        // Here already, before time is spent on each.
+        if self.barrier.len() > MAX_ROWS {
+            let message = format!("has {} entries, must have at most {MAX_ROWS}", self.barrier.len());
+            return Err(ConfigurationError::new("barrier", message));
         }
         for i in 0..self.barrier.len() {
             self.barrier[i].complete(&format!("barrier[{i}]"), &self.plant)?;

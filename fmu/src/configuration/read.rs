@@ -5,6 +5,9 @@ use std::fmt;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+/// Most characters of a line of an error: no name or number that is allowed comes near.
+const LONGEST_LINE: usize = 600;
+
 /// A configuration that cannot be used: which field, what was found, what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConfigurationError {
@@ -15,7 +18,7 @@ pub struct ConfigurationError {
 impl ConfigurationError {
     /// An error about `field` (a dotted path such as `barrier[0].deadline`; empty for the whole file).
     pub fn new(field: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { field: field.into(), message: message.into() }
+        Self { field: shortened(&field.into()), message: shortened(&message.into()) }
     }
 
     /// The dotted path of the field, empty where the error concerns the file as a whole.
@@ -40,6 +43,15 @@ impl fmt::Display for ConfigurationError {
 }
 
 impl std::error::Error for ConfigurationError {}
+
+/// `text` with lines that a person can read: what is quoted from a file may be of any length.
+fn shortened(text: &str) -> String {
+    let line = |line: &str| match line.char_indices().nth(LONGEST_LINE) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line.to_owned(),
+    };
+    text.split('\n').map(line).collect::<Vec<_>>().join("\n")
+}
 
 /// Reads a value from TOML text. Types used here deny unknown fields, so that a misspelt key is
 /// an error and not a silent default.

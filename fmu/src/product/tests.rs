@@ -276,3 +276,11 @@ fn the_guid_does_not_depend_on_the_spelling() {
     let stated = product(&short.configuration.canonical().unwrap());
     assert_eq!(short.guid, stated.guid);
 }
+
+/// Some importers add one of this name themselves.
+#[test]
+fn no_variable_is_called_time() {
+    for product in every_product() {
+        assert!(product.variables.iter().all(|v| !v.name.eq_ignore_ascii_case("time")));
+    }
+}

@@ -1,0 +1,82 @@
+//! Sessions of a C program, `tests/fixtures/host.c`, with every FMU of the fleet: once under
+//! AddressSanitizer and UBSan, once under valgrind. An access to what is not there, or memory that is still
+//! there after `fmi2FreeInstance` and `dlclose`, is an error. `PUNCTUAL_ATTACK_LIBRARY` names another build
+//! of the shared library, such as one that is itself instrumented (`tests/nightly`).
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::fleet::FLEET;
+use crate::workshop::Workshop;
+
+/// Compiles the host; the compiler's answer and the program.
+fn compiled(workshop: &Workshop, name: &str, flags: &[&str]) -> (Output, PathBuf) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/host.c");
+    let program = workshop.path(name);
+    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
+    let mut command = Command::new(&compiler);
+    command.args(["-g", "-Wall", "-Wextra", "-Werror"]).args(flags).arg(source).arg("-o").arg(&program);
+    let output = command.args(["-ldl", "-lm"]).output();
+    (
+        output.unwrap_or_else(|e| panic!("this test needs a C compiler, {compiler} or what CC names: {e}")),
+        program,
+    )
+}
+
+/// The library, then GUID and resources of each FMU.
+fn arguments(workshop: &Workshop) -> Vec<String> {
+    let library = std::env::var("PUNCTUAL_ATTACK_LIBRARY");
+    let mut arguments = vec![library.unwrap_or_else(|_| workshop.path("library").display().to_string())];
+    arguments.extend(FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.location()]));
+    arguments
+}
+
+/// Says on the terminal, past the capture of test output, that something was not tested.
+fn skipped(what: &str, why: &str) {
+    let text = format!("\nNOT TESTED: the C host under {what}: {why}\n");
+    std::io::stderr().write_all(text.as_bytes()).expect("a terminal");
+}
+
+#[track_caller]
+fn clean(output: &Output) {
+    let [out, err] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(output.status.success() && err.is_empty(), "{}\n{out}\n{err:.20000}", output.status);
+    let calls = out.strip_suffix(" calls\n").and_then(|n| n.parse::<u32>().ok());
+    assert!(calls.is_some_and(|n| n > 1000), "{out}");
+    println!("{out}");
+}
+
+#[test]
+fn a_c_host_under_address_and_undefined_behaviour_sanitizers() {
+    let workshop = Workshop::with_library();
+    let flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let (compiler, host) = compiled(&workshop, "host", &flags);
+    if !compiler.status.success() {
+        let (plain, _) = compiled(&workshop, "plain", &[]);
+        assert!(plain.status.success(), "{}", String::from_utf8_lossy(&plain.stderr));
+        let why = String::from_utf8_lossy(&compiler.stderr);
+        return skipped("AddressSanitizer", why.lines().last().unwrap_or_default());
+    }
+    let mut command = Command::new(host);
+    command.args(arguments(&workshop));
+    command.env("ASAN_OPTIONS", "detect_leaks=1").env("UBSAN_OPTIONS", "print_stacktrace=1");
+    clean(&command.output().expect("the host"));
+}
+
+#[test]
+fn a_c_host_under_valgrind() {
+    if let Err(why) = Command::new("valgrind").arg("--version").output() {
+        return skipped("valgrind", &why.to_string());
+    }
+    if std::env::var_os("PUNCTUAL_ATTACK_LIBRARY").is_some() {
+        return skipped("valgrind", "the library that PUNCTUAL_ATTACK_LIBRARY names may be instrumented");
+    }
+    let workshop = Workshop::with_library();
+    let (compiler, host) = compiled(&workshop, "host", &[]);
+    assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
+    let mut command = Command::new("valgrind");
+    command.args(["-q", "--leak-check=full", "--show-leak-kinds=all", "--errors-for-leak-kinds=all"]);
+    command.args(["--error-exitcode=9"]).arg(host).args(arguments(&workshop));
+    clean(&command.output().expect("valgrind"));
+}

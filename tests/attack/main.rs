@@ -1,0 +1,41 @@
+//! Attacks: calls, states, configurations and archives made of arbitrary bytes, and a host in C under the
+//! sanitizers and valgrind.
+//!
+//! A case is a few bytes, from a generator with a fixed seed or from a line of `corpus/`, where every case
+//! that once failed is kept. `PUNCTUAL_ATTACK` multiplies the number of cases (`tests/nightly`).
+//!
+//! | module | attacks |
+//! |---|---|
+//! | `campaign`, `bytes` | nothing: cases, what they are read as, the corpus |
+//! | `instance` | nothing: an instance that watches its log |
+//! | `fleet`, `machine` | nothing: FMUs of every kind, and what must hold after each call |
+//! | `calls` | the 34 functions in any order with any arguments |
+//! | `states` | serialised states with bytes changed, checksums right or wrong |
+//! | `configurations` | configurations and system files |
+//! | `archives` | archives, model descriptions and library files |
+//! | `hosts` | sessions of a C program under AddressSanitizer, UBSan and valgrind |
+
+#![allow(clippy::print_stdout, reason = "the figures are read from the output")]
+
+#[allow(dead_code, reason = "shared with tests/abi")]
+#[path = "../abi/api.rs"]
+mod api;
+mod archives;
+mod bytes;
+mod calls;
+mod campaign;
+mod configurations;
+mod fleet;
+#[allow(dead_code, reason = "shared with tests/abi")]
+#[path = "../abi/fmu.rs"]
+mod fmu;
+mod hosts;
+mod instance;
+mod machine;
+#[allow(dead_code, reason = "shared with tests/cli")]
+#[path = "../cli/misbehaving.rs"]
+mod misbehaving;
+mod states;
+#[allow(dead_code, reason = "shared with tests/cli")]
+#[path = "../cli/workshop.rs"]
+mod workshop;
