@@ -79,7 +79,6 @@ fn jets(c: &mut Criterion) {
         ("jets/integrators, order 2", lie::along(Integrators::<4>, disc(), 2), &Integrators::<4>::state()),
         ("jets/integrators, order 4", lie::along(Integrators::<8>, disc(), 4), &Integrators::<8>::state()),
         ("jets/integrators, order 8", lie::along(Integrators::<16>, disc(), 8), &Integrators::<16>::state()),
-        ("jets/bicycle, order 8", lie::along(bicycle(), disc(), 8), &X),
     ];
     for (name, source, x) in cases {
         let source = source.expect("a relative degree in range");

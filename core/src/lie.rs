@@ -239,11 +239,12 @@ where
     }
 }
 
-/// The derivatives of `barrier` along `plant` at relative degree `n`.
+/// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the number of states:
+/// the gradients of h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
 /// # Errors
 ///
-/// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`]; `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
+/// `n` outside 1 ..= min(`NX`, [`MAX_RELATIVE_DEGREE`]); `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
 /// relative degree is for [`detected`] to say, and checked at every evaluation
 /// ([`Derivatives::lower_sensitivity`]).
 pub fn along<P, B, const NX: usize, const NU: usize>(
@@ -265,11 +266,14 @@ where
     macro_rules! by_degree {
         ($($n:literal => $k:literal),*) => {
             match n {
-                $($n => Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _),)*
+                // A constant condition: what cannot be is not compiled.
+                $($n if const { $n <= NX } => {
+                    Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
+                })*
                 _ => Err(Error::new(
                     ErrorKind::RelativeDegree,
                     "relative_degree",
-                    format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}"),
+                    format!("is {n}, must be 1 to {}", NX.min(MAX_RELATIVE_DEGREE)),
                 )),
             }
         };
