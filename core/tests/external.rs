@@ -86,7 +86,10 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
                 d.u.into_iter().chain(barriers).collect::<Vec<_>>()
             };
             for (found, wanted) in numbers(&found).into_iter().zip(numbers(&wanted)) {
-                assert!((found - wanted).abs() <= ROUND_OFF * (1.0 + wanted.abs()), "{found} for {wanted} at {t}");
+                assert!(
+                    (found - wanted).abs() <= ROUND_OFF * (1.0 + wanted.abs()),
+                    "{found} for {wanted} at {t}"
+                );
             }
         }
         let (mut u, mut u_given) = ([0.0; INPUTS], [0.0; INPUTS]);

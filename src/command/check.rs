@@ -24,8 +24,7 @@ pub struct Arguments {
     /// Also check a filter from the start of this plant configuration
     #[arg(long, value_name = "FILE", conflicts_with = "x0")]
     plant: Option<PathBuf>,
-    /// Also check a filter from this start, such as "x_p=1,v=-2"; states not named are 0; an external barrier's
-    /// derivatives too
+    /// Also check a filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start

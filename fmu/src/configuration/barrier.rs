@@ -283,7 +283,8 @@ impl BarrierSection {
             |field: &str, message: String| Err(ConfigurationError::new(format!("{path}.{field}"), message));
         let (shape, fields) = self.shape.row();
         if plant.is_external() && self.shape != ShapeName::External {
-            let message = format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"");
+            let message =
+                format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"");
             return refuse("shape", message);
         }
         if plant.reference().is_none() && !matches!(self.shape, ShapeName::Expression | ShapeName::External) {

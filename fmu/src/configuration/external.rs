@@ -3,8 +3,8 @@
 use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 use super::{
-    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, ShapeName, over_seconds,
-    unit_per,
+    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, ShapeName,
+    over_seconds, unit_per,
 };
 
 /// A real input of a filter that belongs to a barrier.
@@ -94,3 +94,6 @@ impl FilterConfiguration {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, ReferenceSection,
-    ShapeName, check_identifier,
+    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range,
+    ReferenceSection, ShapeName, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.

@@ -73,7 +73,13 @@ pub(super) fn unit_per(unit: &str, by: &str) -> String {
         factors.collect::<Vec<_>>().join(".")
     };
     match (side(1), side(-1)) {
-        (above, below) if below.is_empty() => if above.is_empty() { "1".to_owned() } else { above },
+        (above, below) if below.is_empty() => {
+            if above.is_empty() {
+                "1".to_owned()
+            } else {
+                above
+            }
+        }
         (above, below) if above.is_empty() => format!("1/{below}"),
         (above, below) => format!("{above}/{below}"),
     }
@@ -155,7 +161,10 @@ mod tests {
         ] {
             assert_eq!(unit_per(unit, by), wanted);
             let [found, above, below] = [wanted, unit, by].map(|u| base_unit(u).expect("a unit"));
-            assert_eq!((found.m, found.s, found.rad), (above.m - below.m, above.s - below.s, above.rad - below.rad));
+            assert_eq!(
+                (found.m, found.s, found.rad),
+                (above.m - below.m, above.s - below.s, above.rad - below.rad)
+            );
         }
     }
 
