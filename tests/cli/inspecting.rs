@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::workshop::{Workshop, assert_golden, examples, without_guids};
+use crate::workshop::{Workshop, assert_golden, without_guids};
 
 #[test]
 fn the_text_of_filter_and_plant() {
@@ -16,44 +16,14 @@ fn the_text_of_filter_and_plant() {
     }
 }
 
-/// The folder of the examples with their own models.
-fn external() -> Workshop {
-    let workshop = Workshop::new();
-    let example = examples().join("../models/external-filter.toml");
-    workshop.write("external.toml", std::fs::read(example).expect("the example"));
-    workshop
-}
-
 #[test]
 fn a_filter_that_is_given_the_derivatives() {
-    let workshop = external();
+    let workshop = Workshop::with_external();
     workshop.punctual(["build", "external.toml", "-o", "external.fmu"]).success();
     let text = workshop.punctual(["inspect", "external.fmu"]).success();
     let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
     let text = text.replace(punctual::host::PLATFORM, "PLATFORM");
     assert_golden("inspect-external.txt", &without_guids(&text));
-}
-
-#[test]
-fn the_check_of_a_filter_that_is_given_the_derivatives() {
-    let workshop = external();
-    let start = "goal.lf0=-10,goal.lf1=1,goal.lg.u_x=1,speed.lf0=6";
-    let text = workshop.punctual(["check", "external.toml", "--x0", start]).success();
-    assert_golden("check-external.txt", &text);
-    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"point_mass\"\n");
-    for (arguments, message) in [
-        (
-            &["--plant", "plant.toml"][..],
-            "--plant: is a start of the states, but barrier goal is external: give its derivatives, as --x0 \"goal.lf0=-1\"",
-        ),
-        (&["--x0", start, "--effort"], "--effort: simulates, but barrier goal is external: it has no model"),
-        (
-            &["--x0", "x_p=1"],
-            "--x0: \"x_p\" is no state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
-        ),
-    ] {
-        workshop.punctual(["check", "external.toml"].iter().chain(arguments)).fails(2, message);
-    }
 }
 
 #[test]
