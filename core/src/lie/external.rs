@@ -74,16 +74,16 @@ fn dot(row: &[f64], u: &[f64]) -> f64 {
 ///
 /// ```
 /// # use punctual_core::{filter::*, lie};
-/// // h = 3 - p for p'' = u, at p = 1, p' = 2: h' = -2, and h'' = 0 - u.
+/// // h = 3 - p for p'' = u, at p = 5, p' = 2: h' = -2, and h'' = 0 - u.
 /// let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(1.0) };
 /// let mut filter = SafetyFilter::builder(4, 1)
 ///     .source("wall", lie::external(2, 1)?, settings)?
 ///     .sampling(Sampling::Pointwise)?
 ///     .build()?;
 /// let mut u = [0.0];
-/// let report = filter.step(0.0, &[2.0, -2.0, 0.0, -1.0], &[9.0], &mut u)?;
+/// let report = filter.step(0.0, &[-2.0, -2.0, 0.0, -1.0], &[0.0], &mut u)?;
 /// assert_eq!(report.status, Status::Filtered);
-/// assert!(u[0] < 9.0);
+/// assert!(u[0] < 0.0);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
 pub fn external(n: usize, input_dim: usize) -> Result<Box<dyn DerivativeSource>, Error> {
