@@ -19,6 +19,7 @@
 mod ahead;
 mod degree;
 mod embedded;
+mod external;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
@@ -37,6 +38,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 pub use crate::error::RelativeDegree;
 pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
 pub use embedded::embedded;
+pub use external::external;
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
@@ -107,8 +109,8 @@ impl Derivatives {
     }
 }
 
-/// Anything that supplies the derivatives of one barrier: [`along`] makes one from the traits, a
-/// user's own code can be another.
+/// Anything that supplies the derivatives of one barrier: [`along`] makes one from the traits, [`external`] takes
+/// them from whoever computes them, a user's own code can be another.
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
@@ -256,13 +258,7 @@ where
     P: ControlAffine<NX, NU> + Send + 'static,
     B: Barrier<NX> + Send + 'static,
 {
-    if NU == 0 || NU > MAX_INPUTS {
-        return Err(Error::new(
-            ErrorKind::Dimension,
-            "u",
-            format!("has {NU} components, must have 1 to {MAX_INPUTS}"),
-        ));
-    }
+    checked_inputs(NU)?;
     macro_rules! by_degree {
         ($($n:literal => $k:literal),*) => {
             match n {
@@ -270,13 +266,28 @@ where
                 $($n if const { $n <= NX } => {
                     Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
                 })*
-                _ => Err(Error::new(
-                    ErrorKind::RelativeDegree,
-                    "relative_degree",
-                    format!("is {n}, must be 1 to {}", NX.min(MAX_RELATIVE_DEGREE)),
-                )),
+                _ => Err(no_degree(n, NX.min(MAX_RELATIVE_DEGREE))),
             }
         };
     }
     by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9)
+}
+
+/// `inputs`, a possible number of inputs.
+fn checked_inputs(inputs: usize) -> Result<usize, Error> {
+    if (1..=MAX_INPUTS).contains(&inputs) {
+        return Ok(inputs);
+    }
+    let message = format!("has {inputs} components, must have 1 to {MAX_INPUTS}");
+    Err(Error::new(ErrorKind::Dimension, "u", message))
+}
+
+/// `n`, a possible relative degree.
+fn checked_degree(n: usize) -> Result<usize, Error> {
+    if (1..=MAX_RELATIVE_DEGREE).contains(&n) { Ok(n) } else { Err(no_degree(n, MAX_RELATIVE_DEGREE)) }
+}
+
+fn no_degree(n: usize, most: usize) -> Error {
+    let message = format!("is {n}, must be 1 to {most}");
+    Error::new(ErrorKind::RelativeDegree, "relative_degree", message)
 }

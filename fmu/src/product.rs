@@ -11,7 +11,7 @@ use punctual_modeldescription::{
 use uuid::Uuid;
 
 use crate::configuration::{
-    BarrierSection, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
+    BarrierInput, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
     FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, over_seconds,
     quantity,
 };
@@ -39,7 +39,7 @@ pub struct Product {
 /// Value references of the groups of variables, in the order of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
-    /// Number of states: the first inputs of a filter (with the points that its barriers follow) or
+    /// Number of states: the first inputs of a filter (with the inputs of its barriers) or
     /// controller (with the goal where it is an input), the outputs of a plant.
     pub states: usize,
     /// Number of inputs of the plant.
@@ -309,8 +309,8 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
             (*start, *min, *max) = (Some(state.range().nearest(0.0)), state.min, state.max);
         }
     }
-    for (name, unit, start, description) in c.barrier.iter().flat_map(BarrierSection::inputs) {
-        table.add(name, description, Causality::Input, real(Some(start), unit));
+    for BarrierInput { name, unit, start, description } in c.barrier_inputs() {
+        table.add(name, &description, Causality::Input, real(Some(start), &unit));
     }
     let measured = table.variables.len();
     for input in inputs {

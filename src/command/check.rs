@@ -24,7 +24,7 @@ pub struct Arguments {
     /// Also check a filter from the start of this plant configuration
     #[arg(long, value_name = "FILE", conflicts_with = "x0")]
     plant: Option<PathBuf>,
-    /// Also check a filter from this start, such as "x_p=1,v=-2"; states not named are 0
+    /// Also check a filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
@@ -148,6 +148,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = "needs a start: give --plant or --x0";
                 return Err(Error::configuration("--effort", message));
             }
+            if let Some(barrier) = configuration.external().filter(|_| arguments.effort) {
+                let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
+                return Err(Error::configuration("--effort", message));
+            }
             let effort = match &start {
                 Some(x0) if arguments.effort => {
                     Some(closed_loop::ratings(&configuration, x0).map_err(|e| e.in_file(file))?)
@@ -187,10 +191,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
 }
 
-/// The start that the arguments give, in the order of the filter's states.
+/// The start that the arguments give, in the order of [`measured`].
 fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<Option<Vec<f64>>, Error> {
-    let states = configuration.plant.states();
+    let mut x0 = vec![0.0; configuration.plant.states().len()];
+    x0.extend(configuration.barrier_inputs().iter().map(|input| input.start));
     if let Some(file) = &arguments.plant {
+        if let Some(barrier) = configuration.external() {
+            let name = &barrier.name;
+            let message = format!(
+                "is a start of the states, but barrier {name} is external: give its derivatives, as --x0 \"{name}.lf0=-1\""
+            );
+            return Err(Error::configuration("--plant", message));
+        }
         let plant = match package::read_configuration(file)? {
             Configuration::Plant(plant) => plant,
             other => {
@@ -198,23 +210,26 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 return Err(Error::configuration("kind", message).in_file(file));
             }
         };
+        let states = configuration.plant.states();
         let missing = states.iter().find(|s| !plant.x0.contains_key(&s.name));
         return match missing {
             Some(state) => {
                 let message = format!("has no state {}, which the filter measures", state.name);
                 Err(Error::configuration("plant.model", message).in_file(file))
             }
-            None => Ok(Some(states.iter().map(|s| plant.x0[&s.name]).collect())),
+            None => {
+                x0.iter_mut().zip(states).for_each(|(x, s)| *x = plant.x0[&s.name]);
+                Ok(Some(x0))
+            }
         };
     }
     let Some(text) = &arguments.x0 else { return Ok(None) };
     let refuse = |message: String| Error::configuration("--x0", message);
-    let mut x0 = vec![0.0; states.len()];
+    let names = measured(configuration);
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         let (name, value) =
             part.split_once('=').ok_or_else(|| refuse(format!("is {part:?}, must be like {:?}", "v=1.5")))?;
-        let Some(index) = states.iter().position(|s| s.name == name.trim()) else {
-            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
+        let Some(index) = names.iter().position(|n| n == name.trim()) else {
             return Err(refuse(format!(
                 "{:?} is no state, must be one of {}",
                 name.trim(),
@@ -227,15 +242,17 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
     Ok(Some(x0))
 }
 
+/// What the filter measures: the states, then the inputs of its barriers.
+fn measured(c: &FilterConfiguration) -> Vec<String> {
+    let states = c.plant.states().into_iter().map(|s| s.name);
+    states.chain(c.barrier_inputs().into_iter().map(|input| input.name)).collect()
+}
+
 fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterReport, Error> {
     let mut filter = c.build()?;
     let inputs = c.plant.inputs().len();
     let status = match start.as_deref() {
-        Some(x0) => {
-            // The points that barriers follow are where the configuration says.
-            let x0: Vec<f64> = x0.iter().copied().chain(c.points()).collect();
-            Some(first_sample(&mut filter, inputs, c.experiment.start_time, &x0)?)
-        }
+        Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
         None => None,
     };
     let (step, experiment) = (c.experiment.step_size, c.experiment);
@@ -292,7 +309,8 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         }
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match start.as_deref() {
-            Some(x0) if c.is_bounded() => Some(closed_loop::reach(c, i, x0)?),
+            // Without a model nothing is simulated.
+            Some(x0) if c.is_bounded() && c.external().is_none() => Some(closed_loop::reach(c, i, x0)?),
             _ => None,
         };
         let start =
@@ -314,14 +332,13 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             start,
         });
     }
-    let states = c.plant.states();
     Ok(FilterReport {
         kind: "filter",
         name: c.name.clone(),
         model: c.plant.name(),
         step,
         barriers,
-        start: start.map(|x0| states.into_iter().map(|s| s.name).zip(x0).collect()),
+        start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
         warnings,
         effort: None,

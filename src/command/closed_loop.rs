@@ -86,11 +86,10 @@ fn run(
     let step = c.experiment.step_size.max(longest / SAMPLES).min(shortest);
     let substeps = (10.0 * step / shortest).ceil() as usize;
     let schedule = Schedule { step, steps: (2.0 * longest / step).ceil() as usize, substeps };
-    let start: Vec<f64> = x0.iter().copied().chain(c.points()).collect();
-    let states = x0.len();
+    let states = c.plant.states().len();
     let point_mass = c.plant.model == Some(ModelName::PointMass);
     let vehicle = c.plant.model.is_some() && states > 3;
-    effort::run(filter, &*plant, (c.experiment.start_time, &start), schedule, deadlines, |x, u_ref| {
+    effort::run(filter, &*plant, (c.experiment.start_time, x0), schedule, deadlines, |x, u_ref| {
         u_ref.fill(0.0);
         if point_mass {
             u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
@@ -114,11 +113,10 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
 /// What the bounds allow barrier `index` from `x0`.
 pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result<ReachReport, Error> {
     let filter = c.build()?;
-    let start: Vec<f64> = x0.iter().copied().chain(c.points()).collect();
     let (t, configured) = (c.experiment.start_time, deadlines(c));
     let deadline = configured[index];
     let horizon = HORIZON * deadline;
-    let soonest = filter.soonest(index, t, &start, horizon).map_err(error)?;
+    let soonest = filter.soonest(index, t, x0, horizon).map_err(error)?;
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
         tried.barrier[index].deadline = deadline;
@@ -126,7 +124,7 @@ pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, x0, &deadlines(&tried))?.kept)
     };
-    let lost = filter.is_ruled_out(index, t, &start, deadline).map_err(error)?;
+    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(error)?;
     // Growing from what is not ruled out: the longest deadlines are the longest runs.
     let mut low = soonest.unwrap_or(0.0).max(1e-3 * deadline);
     let mut most = None;

@@ -51,10 +51,14 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
         Configuration::Plant(_) => PLANT,
         Configuration::Controller(_) => CONTROLLER,
     };
+    let given = match &product.configuration {
+        Configuration::Filter(c) if c.external().is_some() => EXTERNAL,
+        _ => "",
+    };
     let step = product.configuration.experiment().step_size;
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}</title>\n<style>{STYLE}</style></head>\n\
-         <body>\n<h1>{name}</h1>\n<p>{text}. Made for a communication step of {step} s.</p>\n{use_of}\n\
+         <body>\n<h1>{name}</h1>\n<p>{text}. Made for a communication step of {step} s.</p>\n{use_of}{given}\n\
          <h2>Variables</h2>\n<table>\n<tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th>\
          <th>meaning</th></tr>\n{rows}</table>\n{enumerations}<h2>Configuration</h2>\n<pre>{canonical}</pre>\n\
          <p>{tool}</p>\n</body></html>\n",
@@ -76,6 +80,10 @@ exchanges all values before stepping (Jacobi) therefore delays <code>u.*</code> 
 <p><code>status</code> says what <code>u.*</code> means; only <code>unchanged</code> and <code>filtered</code> satisfy \
 every constraint. The promise is one of continuous time: between samples the input is held, and the margin has to \
 cover what that costs.</p>";
+
+const EXTERNAL: &str = "\n<p>An external barrier has no model: set its inputs at every communication point. <code>lf0</code> \
+is h, <code>lf1</code> and on are its time derivatives, the last of them where every input of the plant is 0, and \
+<code>lg.*</code> what one unit of each input adds to that one. Nothing is predicted from them.</p>";
 
 const PLANT: &str = "<p>Set the initial state through the parameters <code>x0.*</code>. Inputs are held over a step; the \
 step is divided into equal Runge-Kutta steps of at most <code>inner_step</code>.</p>";

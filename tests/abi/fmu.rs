@@ -18,6 +18,20 @@ radius = 2.0
 deadline = 10.0
 "#;
 
+/// The same for a plant that is not known: its derivatives are inputs.
+pub(crate) const EXTERNAL: &str = r#"
+kind = "filter"
+bounds = { u_x = [-50.0, 50.0], u_y = [-40.0, 40.0] }
+[plant]
+inputs = [{ name = "u_x", unit = "m/s2" }, { name = "u_y", unit = "m/s2" }]
+[[barrier]]
+name = "goal"
+relative_degree = 2
+unit = "m"
+deadline = 10.0
+margin = 0.02
+"#;
+
 /// A unicycle that integrates with inner steps of 2⁻¹⁰ s, so that its times are exact.
 pub(crate) const PLANT: &str = r#"
 kind = "plant"

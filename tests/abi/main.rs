@@ -14,6 +14,7 @@
 //! | `times` | odd communication points and steps |
 //! | `plant` | inner steps, initial states, refusals |
 //! | `derivatives` | directional derivatives against differences, and what is refused |
+//! | `external` | derivatives that are inputs, against the filter that computes them |
 //! | `states` | snapshots: layout, lifetime, what is refused |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
@@ -22,6 +23,7 @@ mod api;
 mod arguments;
 mod derivatives;
 mod exports;
+mod external;
 mod fmu;
 mod instantiate;
 mod legality;

@@ -44,6 +44,33 @@ fn the_repeated_root_from_a_start() {
 }
 
 #[test]
+fn a_filter_that_is_given_the_derivatives() {
+    let workshop = Workshop::with_external();
+    let start = "goal.lf0=-10,goal.lf1=1,goal.lg.u_x=1,speed.lf0=6";
+    let text = workshop.punctual(["check", "external.toml", "--x0", start]).success();
+    assert_golden("check-external.txt", &text);
+    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"point_mass\"\n");
+    for (arguments, message) in [
+        (
+            &["--plant", "plant.toml"][..],
+            "--plant: is a start of the states, but barrier goal is external: give its derivatives, as --x0 \"goal.lf0=-1\"",
+        ),
+        (&["--x0", start, "--effort"], "--effort: simulates, but barrier goal is external: it has no model"),
+        (
+            &["--x0", "x_p=1"],
+            "--x0: \"x_p\" is no state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
+        ),
+    ] {
+        workshop.punctual(["check", "external.toml"].iter().chain(arguments)).fails(2, message);
+    }
+    let text = fs::read_to_string(workshop.path("external.toml")).expect("written above");
+    workshop.write("zero.toml", text.replace("margin = 0.05", "margin = 0.0 "));
+    let told = workshop.punctual(["check", "zero.toml"]).success();
+    let wanted = "warning: goal: the margin is 0, so that an input held over 0.01 s can cost the deadline\n";
+    assert!(told.contains(wanted), "{told}");
+}
+
+#[test]
 fn the_json_tells_the_same() {
     let workshop = workshop(&[]);
     let text =

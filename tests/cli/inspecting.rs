@@ -17,6 +17,16 @@ fn the_text_of_filter_and_plant() {
 }
 
 #[test]
+fn a_filter_that_is_given_the_derivatives() {
+    let workshop = Workshop::with_external();
+    workshop.punctual(["build", "external.toml", "-o", "external.fmu"]).success();
+    let text = workshop.punctual(["inspect", "external.fmu"]).success();
+    let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
+    let text = text.replace(punctual::host::PLATFORM, "PLATFORM");
+    assert_golden("inspect-external.txt", &without_guids(&text));
+}
+
+#[test]
 fn the_json_tells_the_same() {
     let workshop = Workshop::with_fmus();
     let text = workshop.punctual(["inspect", "--json", "filter.fmu"]).success();

@@ -67,6 +67,14 @@ impl Workshop {
         workshop
     }
 
+    /// With `external.toml`, the example of a filter that is given the derivatives of its barriers.
+    pub(crate) fn with_external() -> Self {
+        let workshop = Self::new();
+        let example = examples().join("../models/external-filter.toml");
+        workshop.write("external.toml", fs::read(example).expect("the example"));
+        workshop
+    }
+
     /// The same, with an environment variable for every call.
     pub(crate) fn with_variable(mut self, name: &'static str, value: impl Into<String>) -> Self {
         self.environment.push((name, value.into()));

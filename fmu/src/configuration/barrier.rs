@@ -9,8 +9,8 @@ use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, ReferenceSection,
-    check_identifier, check_unit,
+    BarrierInput, ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, ReferenceSection,
+    check_identifier, check_unit, external,
 };
 
 /// Default margin as a part of the radius, or of the smaller half axis or side.
@@ -53,7 +53,7 @@ pub enum InfeasibleName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeName {
-    /// Not said: `expression` where there is one, else `disc`. Not in a completed configuration.
+    /// Not said: `external` where the plant is not known, `expression` where there is one, else `disc`. Not in a completed configuration.
     #[default]
     #[serde(skip)]
     Unstated,
@@ -81,6 +81,8 @@ pub enum ShapeName {
     SpeedLimit,
     /// Where an expression of states and time is ≥ 0.
     Expression,
+    /// Of which the derivatives are inputs of the FMU ([`punctual_core::lie::external`]).
+    External,
 }
 
 /// A field that some shapes have and others not.
@@ -98,10 +100,11 @@ enum Field {
     Bound,
     Expression,
     Unit,
+    RelativeDegree,
 }
 
 impl Field {
-    const ALL: [(Self, &'static str); 12] = [
+    const ALL: [(Self, &'static str); 13] = [
         (Self::Centre, "centre"),
         (Self::Velocity, "velocity"),
         (Self::Radius, "radius"),
@@ -114,6 +117,7 @@ impl Field {
         (Self::Bound, "bound"),
         (Self::Expression, "expression"),
         (Self::Unit, "unit"),
+        (Self::RelativeDegree, "relative_degree"),
     ];
 }
 
@@ -140,6 +144,7 @@ impl ShapeName {
             Self::AtLeast => ("at_least", &[State, Bound]),
             Self::SpeedLimit => ("speed_limit", &[Bound]),
             Self::Expression => ("expression", &[Field::Expression, Field::Unit]),
+            Self::External => ("external", &[Field::RelativeDegree, Field::Unit]),
         }
     }
 
@@ -158,7 +163,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 pub struct BarrierSection {
     /// Its name, a C identifier, unique; prefix of its variables.
     pub name: String,
-    /// The shape. Default `expression` where there is one, else `disc`.
+    /// The shape. Default `external` where the plant has inputs only, `expression` where there is one, else `disc`.
     #[serde(default)]
     pub shape: ShapeName,
     /// Discs, ellipses, rectangles: centre in m; of a moving disc where it is at time 0 of the simulation,
@@ -199,9 +204,12 @@ pub struct BarrierSection {
     /// `expression`: h, of states, parameters of the plant, and the time `t` in s of the simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<String>,
-    /// `expression`: the unit of h. Default `1`.
+    /// `expression` and `external`: the unit of h. Default `1`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
+    /// `external`: n, in 1 ..= 8: the order of the derivative of h that the inputs enter. Nobody checks it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_degree: Option<usize>,
     /// Deadline T in s after the first step, > 0.
     pub deadline: f64,
     /// How it is met. Default `reference_profile`.
@@ -264,14 +272,22 @@ pub(super) trait Visitor {
 impl BarrierSection {
     pub(super) fn complete(&mut self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
         if self.shape == ShapeName::Unstated {
-            let own = self.expression.is_some();
-            self.shape = if own { ShapeName::Expression } else { ShapeName::Disc };
+            self.shape = match self.expression {
+                _ if plant.is_external() => ShapeName::External,
+                Some(_) => ShapeName::Expression,
+                None => ShapeName::Disc,
+            };
         }
         check_identifier(&format!("{path}.name"), &self.name)?;
         let refuse =
             |field: &str, message: String| Err(ConfigurationError::new(format!("{path}.{field}"), message));
         let (shape, fields) = self.shape.row();
-        if plant.reference().is_none() && self.shape != ShapeName::Expression {
+        if plant.is_external() && self.shape != ShapeName::External {
+            let message =
+                format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"");
+            return refuse("shape", message);
+        }
+        if plant.reference().is_none() && !matches!(self.shape, ShapeName::Expression | ShapeName::External) {
             return refuse(
                 "shape",
                 format!("is {shape:?}, which is for the plants that have a name; give an `expression`"),
@@ -291,6 +307,7 @@ impl BarrierSection {
                 Field::Bound => self.bound.is_some(),
                 Field::Expression => self.expression.is_some(),
                 Field::Unit => self.unit.is_some(),
+                Field::RelativeDegree => self.relative_degree.is_some(),
             };
             let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle | Field::Unit);
             if given && !fields.contains(&field) {
@@ -313,6 +330,7 @@ impl BarrierSection {
         if self.shape.has(Field::Unit) {
             check_unit(&format!("{path}.unit"), self.unit.get_or_insert("1".to_owned()))?;
         }
+        external::check_degree(path, self.relative_degree)?;
         let states = plant.states();
         if let Some(state) = &self.state
             && states.iter().all(|s| s.name != *state)
@@ -339,7 +357,7 @@ impl BarrierSection {
                 let state = plant.states().into_iter().find(|s| Some(&s.name) == self.state.as_ref());
                 return state.map_or_else(|| "1".to_owned(), |s| s.unit);
             }
-            ShapeName::Expression => self.unit.as_deref().unwrap_or("1"),
+            ShapeName::Expression | ShapeName::External => self.unit.as_deref().unwrap_or("1"),
             _ => "m",
         };
         unit.to_owned()
@@ -472,23 +490,32 @@ impl BarrierSection {
         })
     }
 
-    /// Its variables that are inputs, with their units, start values and meanings.
-    pub fn inputs(&self) -> Vec<(String, &'static str, f64, &'static str)> {
+    /// Its variables that are inputs: the point that it follows, or the derivatives that it is given.
+    pub fn inputs(&self, plant: &PlantSection) -> Vec<BarrierInput> {
+        if self.shape == ShapeName::External {
+            return external::inputs(self, plant);
+        }
         if !self.centre_input {
             return Vec::new();
         }
-        let name = |field: &str| format!("{}.{field}", self.name);
         let (centre, velocity) = (self.centre.unwrap_or_default(), self.velocity.unwrap_or_default());
-        vec![
-            (name("centre[1]"), "m", centre[0], "where the centre is, along x"),
-            (name("centre[2]"), "m", centre[1], "where the centre is, along y"),
-            (name("velocity[1]"), "m/s", velocity[0], "velocity of the centre along x"),
-            (name("velocity[2]"), "m/s", velocity[1], "velocity of the centre along y"),
+        [
+            ("centre[1]", "m", centre[0], "where the centre is, along x"),
+            ("centre[2]", "m", centre[1], "where the centre is, along y"),
+            ("velocity[1]", "m/s", velocity[0], "velocity of the centre along x"),
+            ("velocity[2]", "m/s", velocity[1], "velocity of the centre along y"),
         ]
+        .map(|(field, unit, start, description)| BarrierInput {
+            name: format!("{}.{field}", self.name),
+            unit: unit.to_owned(),
+            start,
+            description: description.to_owned(),
+        })
+        .into()
     }
 
     /// Hands the shape to `visitor`, along a reference plant; a centre that is an input is at the states behind
-    /// the plant's. A barrier that is an expression is no shape, and taken for a disc here.
+    /// the plant's. A barrier that is an expression or external is no shape, and taken for a disc here.
     pub(super) fn visit<V: Visitor>(
         &self,
         plant: ReferenceSection,
@@ -509,7 +536,9 @@ impl BarrierSection {
         let index = |name: &str| signals.iter().position(|s| s.name == name);
         let state = self.state.as_deref().and_then(index).unwrap_or(usize::MAX);
         Ok(match self.shape {
-            ShapeName::Disc | ShapeName::Unstated | ShapeName::Expression => visitor.shape(disc()?),
+            ShapeName::Disc | ShapeName::Unstated | ShapeName::Expression | ShapeName::External => {
+                visitor.shape(disc()?)
+            }
             ShapeName::Obstacle => visitor.shape(Outside(disc()?)),
             ShapeName::QuadraticDisc => {
                 let disc = QuadraticDisc::new(centre, radius)?.moving(velocity)?;

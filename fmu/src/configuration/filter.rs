@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range, ReferenceSection,
-    ShapeName, check_identifier,
+    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range,
+    ReferenceSection, ShapeName, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -23,11 +23,14 @@ pub const UNBOUNDED: f64 = 1e30;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SamplingName {
+    /// Not said: `pointwise` where the plant is not known, else `measured`. Not in a completed configuration.
+    #[default]
+    #[serde(skip)]
+    Unstated,
     /// [`Sampling::Pointwise`]: the margin has to cover it.
     Pointwise,
     /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
     /// `[experiment]`.
-    #[default]
     Measured,
     /// [`Sampling::Period`] with the step size of `[experiment]`.
     StepSize,
@@ -93,7 +96,8 @@ pub struct FilterConfiguration {
     /// are computed in steps only, for the same result in every master.
     #[serde(default = "yes")]
     pub direct_feedthrough: bool,
-    /// What is done about inputs held between samples. Default `measured`.
+    /// What is done about inputs held between samples. Default `measured`; `pointwise` where the plant has
+    /// inputs only. A barrier that is external needs the latter.
     #[serde(default)]
     pub sampling: SamplingName,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
@@ -151,6 +155,7 @@ impl FilterConfiguration {
                 return Err(ConfigurationError::new(format!("barrier[{i}].name"), message));
             }
         }
+        self.complete_sampling()?;
         let inputs = self.plant.inputs();
         if let Some(unknown) = self.bounds.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = inputs.iter().map(|s| s.name.as_str()).collect();
@@ -200,7 +205,7 @@ impl FilterConfiguration {
     fn sampling(&self, step_size: f64) -> Sampling {
         match self.sampling {
             SamplingName::Pointwise => Sampling::Pointwise,
-            SamplingName::Measured => Sampling::Measured { first: Some(step_size) },
+            SamplingName::Measured | SamplingName::Unstated => Sampling::Measured { first: Some(step_size) },
             SamplingName::StepSize => Sampling::Period(step_size),
         }
     }
@@ -214,12 +219,14 @@ impl FilterConfiguration {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
-        let mut builder = SafetyFilter::builder(states + self.points().len(), inputs.len());
+        let mut builder = SafetyFilter::builder(states + self.barrier_inputs().len(), inputs.len());
         for (i, section) in self.barrier.iter().enumerate() {
-            let point = section.centre_input.then_some(next_point);
-            next_point += section.inputs().len();
+            let first = next_point;
+            let point = section.centre_input.then_some(first);
+            next_point += section.inputs(&self.plant).len();
             let core = |e| self.refused(i, &punctual_core::Error::within(e, &section.name));
             builder = match self.plant.reference() {
+                _ if section.shape == ShapeName::External => self.add_external(builder, i, first)?,
                 Some(plant) if section.shape != ShapeName::Expression => {
                     let adding = Adding { configuration: self, plant, builder, index: i, point };
                     section.visit(plant, adding).map_err(core)??
@@ -273,9 +280,9 @@ impl FilterConfiguration {
         self.bounds.values().any(|[min, max]| *min > -UNBOUNDED || *max < UNBOUNDED)
     }
 
-    /// The start values of the points that are inputs; they follow the states of the plant in the filter's.
-    pub fn points(&self) -> Vec<f64> {
-        self.barrier.iter().flat_map(BarrierSection::inputs).map(|(_, _, start, _)| start).collect()
+    /// The inputs that belong to barriers; they follow the states of the plant in the filter's.
+    pub fn barrier_inputs(&self) -> Vec<BarrierInput> {
+        self.barrier.iter().flat_map(|b| b.inputs(&self.plant)).collect()
     }
 
     /// When barrier `index` begins and ceases to be enforced.
@@ -319,7 +326,7 @@ impl FilterConfiguration {
         B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
     {
         let section = &self.barrier[at.index];
-        let dim = NX + self.points().len();
+        let dim = NX + self.barrier_inputs().len();
         let named = |e: punctual_core::Error| self.refused(at.index, &e.within(&section.name));
         let source = match at.point {
             None => lie::detected(&plant, &barrier)
@@ -342,6 +349,22 @@ impl FilterConfiguration {
             .map_err(|e| self.refused(at.index, &e))
     }
 
+    /// Adds barrier `index`, whose derivatives are the filter's states from number `first` on.
+    fn add_external(
+        &self,
+        builder: FilterBuilder,
+        index: usize,
+        first: usize,
+    ) -> Result<FilterBuilder, ConfigurationError> {
+        let section = &self.barrier[index];
+        let dim = self.plant.states().len() + self.barrier_inputs().len();
+        let own: Vec<usize> = (first..first + section.inputs(&self.plant).len()).collect();
+        lie::external(section.relative_degree.unwrap_or(1), self.plant.inputs().len())
+            .and_then(|source| lie::embedded(source, dim, &own))
+            .and_then(|source| builder.source(&section.name, source, section.settings()?))
+            .map_err(|e| self.refused(index, &e))
+    }
+
     /// Adds barrier `index`, an expression.
     fn add_expression(
         &self,
@@ -361,8 +384,8 @@ impl FilterConfiguration {
             states.iter().map(|s| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)]).collect();
         let n = barrier.relative_degree(&ranges).require(None).map_err(named)?;
         let own: Vec<usize> = (0..states.len()).collect();
-        let source =
-            lie::embedded(barrier.source(n).map_err(refused)?, states.len() + self.points().len(), &own);
+        let dim = states.len() + self.barrier_inputs().len();
+        let source = lie::embedded(barrier.source(n).map_err(refused)?, dim, &own);
         let settings = section.settings().map_err(named)?;
         builder.source(&section.name, source.map_err(named)?, settings).map_err(|e| self.refused(index, &e))
     }

@@ -6,6 +6,7 @@
 
 mod barrier;
 mod controller;
+mod external;
 mod filter;
 mod model;
 mod parameter;
@@ -16,6 +17,7 @@ mod unit;
 
 pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, ShapeName};
 pub use controller::{ControllerConfiguration, ControllerName};
+pub use external::BarrierInput;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
@@ -26,7 +28,7 @@ pub use unit::{base_unit, over_seconds, quantity};
 
 use serde::{Deserialize, Serialize};
 
-use unit::check_unit;
+use unit::{check_unit, unit_per};
 
 /// The name of the canonical configuration inside an FMU's `resources/`.
 pub const RESOURCE: &str = "configuration.toml";

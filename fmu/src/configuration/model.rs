@@ -7,6 +7,7 @@ use punctual_core::plants::Signal;
 use punctual_models::Model;
 use serde::{Deserialize, Serialize};
 
+use super::external::check_inputs as check_external_inputs;
 use super::{
     ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_identifier, check_unit,
 };
@@ -80,8 +81,8 @@ impl From<&Signal> for VariableSection {
     }
 }
 
-/// `[plant]`: a reference plant (`model`, with its constants), or a model of expressions (`states`, `inputs`,
-/// `parameters`, `derivatives`).
+/// `[plant]`: a reference plant (`model`, with its constants), a model of expressions (`states`, `inputs`,
+/// `parameters`, `derivatives`), or `inputs` alone, for a filter that is given the derivatives of its barriers.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantSection {
@@ -117,12 +118,24 @@ impl PlantSection {
 
     /// Its name in messages: that of the reference plant, or `expressions`.
     pub fn name(&self) -> &'static str {
-        self.model.map_or("expressions", ModelName::name)
+        let unnamed = if self.is_external() { "external" } else { "expressions" };
+        self.model.map_or(unnamed, ModelName::name)
     }
 
     /// What it is, for a human.
     pub fn title(&self) -> &'static str {
-        self.model.map_or("plant given by expressions", ModelName::title)
+        let unnamed = if self.is_external() {
+            "plant whose simulator computes the derivatives"
+        } else {
+            "plant given by expressions"
+        };
+        self.model.map_or(unnamed, ModelName::title)
+    }
+
+    /// Whether nothing is known of it but its inputs.
+    pub fn is_external(&self) -> bool {
+        let unknown = self.states.is_empty() && self.parameters.is_empty() && self.derivatives.is_empty();
+        self.model.is_none() && unknown && !self.inputs.is_empty()
     }
 
     /// The states, in order.
@@ -194,6 +207,9 @@ impl PlantSection {
                 let path = format!("plant.{group}[{i}]");
                 check_variable(&path, &variable.name, &variable.unit, variable.range())?;
             }
+        }
+        if self.is_external() {
+            return check_external_inputs(self);
         }
         for (i, p) in self.parameters.iter().enumerate() {
             let path = format!("plant.parameters[{i}]");

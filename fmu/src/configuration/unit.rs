@@ -43,21 +43,46 @@ pub fn base_unit(name: &str) -> Option<BaseUnit> {
     Some(base)
 }
 
-/// The unit of a derivative of order `degree`: `m` over s², `m/s` over s.
+/// The unit of a derivative of order `degree` ≥ 1: `m` over s², `m/s` over s.
 pub fn over_seconds(unit: &str, degree: usize) -> String {
-    let (above, below) = unit.split_once('/').unwrap_or((unit, ""));
-    let (mut power, mut factors) = (degree, Vec::new());
-    for factor in below.split('.').filter(|factor| !factor.is_empty()) {
-        match factor
-            .strip_prefix('s')
-            .map(|digits| if digits.is_empty() { "1" } else { digits }.parse::<usize>())
-        {
-            Some(Ok(exponent)) => power += exponent,
-            _ => factors.push(factor.to_owned()),
+    unit_per(unit, &format!("s{degree}"))
+}
+
+/// The unit of a quotient, each symbol once: `m/s2` per `rad/s` is `m/s.rad`.
+pub(super) fn unit_per(unit: &str, by: &str) -> String {
+    let mut powers: Vec<(&str, i32)> = Vec::new();
+    for (name, sign) in [(unit, 1), (by, -1)] {
+        for (part, side) in name.splitn(2, '/').zip([sign, -sign]) {
+            for factor in part.split('.') {
+                let symbol = factor.trim_end_matches(|c: char| c.is_ascii_digit());
+                // Only a symbol without a number has the exponent 1 unsaid.
+                let power = side * factor[symbol.len()..].parse().unwrap_or(1);
+                match powers.iter_mut().find(|p| p.0 == symbol) {
+                    Some(known) => known.1 += power,
+                    None if symbol.is_empty() => {}
+                    None => powers.push((symbol, power)),
+                }
+            }
         }
     }
-    factors.push(if power == 1 { "s".to_owned() } else { format!("s{power}") });
-    format!("{above}/{}", factors.join("."))
+    let side = |sign: i32| {
+        let factors = powers.iter().filter(|p| p.1 * sign > 0).map(|&(symbol, power)| match power.abs() {
+            1 => symbol.to_owned(),
+            power => format!("{symbol}{power}"),
+        });
+        factors.collect::<Vec<_>>().join(".")
+    };
+    match (side(1), side(-1)) {
+        (above, below) if below.is_empty() => {
+            if above.is_empty() {
+                "1".to_owned()
+            } else {
+                above
+            }
+        }
+        (above, below) if above.is_empty() => format!("1/{below}"),
+        (above, below) => format!("{above}/{below}"),
+    }
 }
 
 /// The physical quantity that a unit measures, in the words of the Modelica Standard Library.
@@ -121,6 +146,25 @@ mod tests {
         ] {
             assert_eq!(over_seconds(unit, degree), wanted);
             assert!(base_unit(wanted).is_some(), "{wanted}");
+        }
+    }
+
+    #[test]
+    fn units_of_quotients() {
+        for (unit, by, wanted) in [
+            ("m/s2", "m/s2", "1"),
+            ("m/s2", "rad/s", "m/s.rad"),
+            ("1/s", "1", "1/s"),
+            ("1", "N", "1/N"),
+            ("m", "1/s", "m.s"),
+            ("m.m", "m", "m"),
+        ] {
+            assert_eq!(unit_per(unit, by), wanted);
+            let [found, above, below] = [wanted, unit, by].map(|u| base_unit(u).expect("a unit"));
+            assert_eq!(
+                (found.m, found.s, found.rad),
+                (above.m - below.m, above.s - below.s, above.rad - below.rad)
+            );
         }
     }
 

@@ -17,6 +17,7 @@ fn product(text: &str) -> Product {
 fn every_product() -> Vec<Product> {
     let mut products = Vec::new();
     products.push(product("kind = \"plant\"\nplant.model = \"bicycle_small_slip\""));
+    products.push(product(include_str!("../../../examples/models/external-filter.toml")));
     for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip_rate", "bicycle_kinematic"] {
         products.push(product(&format!("kind = \"plant\"\nplant.model = \"{model}\"")));
         for shape in ["disc", "quadratic_disc", "obstacle"] {
@@ -90,6 +91,7 @@ fn every_unit_has_its_exponents() {
     }
     let si = |m, s, rad| Some(BaseUnit { m, s, rad, ..BaseUnit::default() });
     let table = [
+        ("1", si(0, 0, 0)),
         ("1/s", si(0, -1, 0)),
         ("m", si(1, 0, 0)),
         ("m/s", si(1, -1, 0)),

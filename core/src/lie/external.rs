@@ -1,0 +1,160 @@
+//! Derivatives that somebody else computes, such as a simulator: the state is the derivatives themselves.
+
+use super::{Ahead, DerivativeSource, Derivatives, checked_degree, checked_inputs};
+use crate::error::Error;
+
+/// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h, the last with one number for each input.
+struct External {
+    n: usize,
+    inputs: usize,
+}
+
+impl DerivativeSource for External {
+    fn relative_degree(&self) -> usize {
+        self.n
+    }
+
+    fn state_dim(&self) -> usize {
+        self.n + 1 + self.inputs
+    }
+
+    fn input_dim(&self) -> usize {
+        self.inputs
+    }
+
+    fn evaluate(&self, _t: f64, x: &[f64], out: &mut Derivatives) {
+        let (drift, row) = x.split_at(self.n + 1);
+        *out = Derivatives::ZERO;
+        out.drift[..=self.n].copy_from_slice(drift);
+        out.row[..self.inputs].copy_from_slice(row);
+    }
+
+    /// Knows the present only: a `duration` of 0.
+    fn ahead(&self, _t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
+        let (drift, row) = x.split_at(self.n + 1);
+        *out = Ahead::ZERO;
+        out.value[..=self.n].copy_from_slice(drift);
+        out.value[self.n] += dot(row, u);
+        out.gradient[self.n][..self.inputs].copy_from_slice(row);
+        duration == 0.0
+    }
+
+    /// As [`Self::ahead`]: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
+    fn ahead_along(
+        &self,
+        t: f64,
+        [x, dx]: [&[f64]; 2],
+        [u, du]: [&[f64]; 2],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> bool {
+        let known = self.ahead(t, dx, u, duration, out);
+        out.value[self.n] += dot(&x[self.n + 1..], du);
+        known
+    }
+}
+
+fn dot(row: &[f64], u: &[f64]) -> f64 {
+    row.iter().zip(u).map(|(a, v)| a * v).sum()
+}
+
+/// Derivatives of one barrier of relative degree `n` that are computed elsewhere and handed over at every step
+/// in place of a state: its n + 1 + `input_dim` components are h, its derivatives of the orders 1 to n − 1,
+/// L_f^n h (the derivative of order n where all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input
+/// adds to that), in `[h]`/s^k and `[h]`/(s^n · unit of u). Of a time-varying h they are total derivatives.
+///
+/// They are taken as they are: nobody checks `n`, and nothing can be predicted, so that steps are those of
+/// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise) and the margin has to cover held inputs. For several
+/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded) picks each.
+///
+/// # Errors
+///
+/// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`](crate::MAX_RELATIVE_DEGREE); `input_dim` above
+/// [`MAX_INPUTS`](crate::MAX_INPUTS) or zero.
+///
+/// ```
+/// # use punctual_core::{filter::*, lie};
+/// // h = 3 - p for p'' = u, at p = 5, p' = 2: h' = -2, and h'' = 0 - u.
+/// let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(1.0) };
+/// let mut filter = SafetyFilter::builder(4, 1)
+///     .source("wall", lie::external(2, 1)?, settings)?
+///     .sampling(Sampling::Pointwise)?
+///     .build()?;
+/// let mut u = [0.0];
+/// let report = filter.step(0.0, &[-2.0, -2.0, 0.0, -1.0], &[0.0], &mut u)?;
+/// assert_eq!(report.status, Status::Filtered);
+/// assert!(u[0] < 0.0);
+/// # Ok::<(), punctual_core::Error>(())
+/// ```
+pub fn external(n: usize, input_dim: usize) -> Result<Box<dyn DerivativeSource>, Error> {
+    let inputs = checked_inputs(input_dim)?;
+    Ok(Box::new(External { n: checked_degree(n)?, inputs }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MAX_INPUTS;
+
+    /// n = 2 and two inputs.
+    const X: [f64; 5] = [3.0, -2.0, 0.5, 4.0, -1.5];
+
+    #[test]
+    fn what_is_handed_over_comes_out() {
+        let source = external(2, 2).expect("in range");
+        let mut out = Derivatives { lower_sensitivity: 1.0, ..Derivatives::ZERO };
+        source.evaluate(7.0, &X, &mut out);
+        assert_eq!((&out.drift[..4], &out.row[..3]), (&[3.0, -2.0, 0.5, 0.0][..], &[4.0, -1.5, 0.0][..]));
+        assert_eq!(out.lower_sensitivity, 0.0);
+        let mut ahead = Ahead::ZERO;
+        assert!(source.ahead(7.0, &X, &[1.0, 2.0], 0.0, &mut ahead));
+        assert_eq!(&ahead.value[..3], &[3.0, -2.0, 1.5]);
+        assert_eq!(&ahead.gradient[2][..2], &[4.0, -1.5]);
+        assert_eq!(ahead.gradient[1], [0.0; MAX_INPUTS]);
+    }
+
+    #[test]
+    fn nothing_is_foretold() {
+        let source = external(2, 2).expect("in range");
+        let (mut x, mut dx, mut ahead) = (X, X, Ahead::ZERO);
+        assert!(!source.predict(&mut x, &[1.0, 2.0], 0.1));
+        assert!(!source.predict_along(&mut x, &mut dx, &[1.0, 2.0], 0.1));
+        assert!(!source.ahead(0.0, &X, &[1.0, 2.0], 0.1, &mut ahead));
+        assert!(!source.ahead_along(0.0, [&X, &X], [&[1.0, 2.0], &[0.0, 1.0]], 0.1, &mut ahead));
+        assert_eq!((x, dx), (X, X));
+        assert!(source.highest(0.0, &X, [&[-1.0; 2], &[1.0; 2]], [0.0, 1.0]).is_none());
+    }
+
+    /// Central differences of a bilinear function are exact; the numbers are dyadic.
+    #[test]
+    fn the_change_along_a_direction() {
+        let source = external(2, 2).expect("in range");
+        let (dx, u, du) = ([1.0, 0.5, -2.0, 0.25, 3.0], [1.0, 2.0], [-0.5, 4.0]);
+        let at = |by: f64| {
+            let x: [f64; 5] = std::array::from_fn(|i| X[i] + by * dx[i]);
+            let u: [f64; 2] = std::array::from_fn(|i| u[i] + by * du[i]);
+            let mut out = Ahead::ZERO;
+            assert!(source.ahead(0.0, &x, &u, 0.0, &mut out));
+            out
+        };
+        let (plus, minus) = (at(0.5), at(-0.5));
+        let mut found = Ahead::ZERO;
+        assert!(source.ahead_along(0.0, [&X, &dx], [&u, &du], 0.0, &mut found));
+        for k in 0..3 {
+            assert_eq!(found.value[k], plus.value[k] - minus.value[k], "order {k}");
+            for j in 0..2 {
+                assert_eq!(found.gradient[k][j], plus.gradient[k][j] - minus.gradient[k][j], "{k}, {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_are_checked() {
+        let refused = |n, inputs| external(n, inputs).err().map(|e| e.to_string());
+        assert_eq!(refused(0, 1).as_deref(), Some("relative_degree: is 0, must be 1 to 8"));
+        assert_eq!(refused(9, 1).as_deref(), Some("relative_degree: is 9, must be 1 to 8"));
+        assert_eq!(refused(1, 0).as_deref(), Some("u: has 0 components, must have 1 to 12"));
+        assert_eq!(refused(1, 13).as_deref(), Some("u: has 13 components, must have 1 to 12"));
+        assert!(external(8, 12).is_ok());
+    }
+}

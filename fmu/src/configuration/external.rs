@@ -1,0 +1,99 @@
+//! `shape = "external"`: a barrier whose derivatives are inputs of the filter, computed by whoever simulates.
+
+use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+
+use super::{
+    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, ShapeName,
+    over_seconds, unit_per,
+};
+
+/// A real input of a filter that belongs to a barrier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BarrierInput {
+    /// The variable's name.
+    pub name: String,
+    /// The unit.
+    pub unit: String,
+    /// The start value.
+    pub start: f64,
+    /// Meaning, for a human.
+    pub description: String,
+}
+
+/// The inputs of an external barrier, in the order of [`punctual_core::lie::external`].
+pub(super) fn inputs(section: &BarrierSection, plant: &PlantSection) -> Vec<BarrierInput> {
+    let unit = &section.unit(plant);
+    let n = section.relative_degree.unwrap_or(1);
+    let input = |field: String, unit: String, description: String| BarrierInput {
+        name: format!("{}.{field}", section.name),
+        unit,
+        start: 0.0,
+        description,
+    };
+    let mut rows = vec![input("lf0".to_owned(), unit.clone(), "h".to_owned())];
+    for k in 1..=n {
+        let without = if k == n { " where every input is 0" } else { "" };
+        let description = format!("time derivative of h of order {k}{without}");
+        rows.push(input(format!("lf{k}"), over_seconds(unit, k), description));
+    }
+    for u in plant.inputs() {
+        let description = format!("what one unit of {} adds to the derivative of order {n}", u.name);
+        rows.push(input(format!("lg.{}", u.name), unit_per(&over_seconds(unit, n), &u.unit), description));
+    }
+    rows
+}
+
+/// Refuses a relative degree out of range, by the path of the barrier.
+pub(super) fn check_degree(path: &str, degree: Option<usize>) -> Result<(), ConfigurationError> {
+    match degree {
+        Some(n) if !(1..=MAX_RELATIVE_DEGREE).contains(&n) => {
+            let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
+            Err(ConfigurationError::new(format!("{path}.relative_degree"), message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses inputs of a plant without a model that are too many or share a name.
+pub(super) fn check_inputs(plant: &PlantSection) -> Result<(), ConfigurationError> {
+    if plant.inputs.len() > MAX_INPUTS {
+        let message = format!("has {} entries, must have at most {MAX_INPUTS}", plant.inputs.len());
+        return Err(ConfigurationError::new("plant.inputs", message));
+    }
+    for (i, input) in plant.inputs.iter().enumerate() {
+        if plant.inputs[..i].iter().any(|other| other.name == input.name) {
+            let message = format!("is {:?}, which is already the name of something else", input.name);
+            return Err(ConfigurationError::new(format!("plant.inputs[{i}].name"), message));
+        }
+    }
+    Ok(())
+}
+
+impl FilterConfiguration {
+    /// The first barrier whose derivatives are inputs.
+    pub fn external(&self) -> Option<&BarrierSection> {
+        self.barrier.iter().find(|b| b.shape == ShapeName::External)
+    }
+
+    /// Says how it samples where the file does not, and refuses what needs a prediction nobody can make.
+    pub(super) fn complete_sampling(&mut self) -> Result<(), ConfigurationError> {
+        if self.sampling == SamplingName::Unstated {
+            let known = !self.plant.is_external();
+            self.sampling = if known { SamplingName::Measured } else { SamplingName::Pointwise };
+        }
+        let Some(barrier) = self.external() else { return Ok(()) };
+        let why = format!("barrier {} is external, and what it is given cannot be predicted", barrier.name);
+        if self.sampling != SamplingName::Pointwise {
+            let message = format!("must be \"pointwise\": {why}");
+            return Err(ConfigurationError::new("sampling", message));
+        }
+        if self.actuation_delay != 0.0 {
+            let message = format!("is {}, must be 0: {why}", self.actuation_delay);
+            return Err(ConfigurationError::new("actuation_delay", message));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;
