@@ -141,7 +141,8 @@ impl Channel {
     ) -> bool {
         match promise.phase {
             Phase::Late => true,
-            Phase::Approach => {
+            // What a disturbance may do for h is not ruled out.
+            Phase::Approach if self.promise.settings().disturbance == 0.0 => {
                 let size = promise.anchor[0].abs() + promise.margin;
                 reach::ruled_out(&*self.source, now, bounds, time_left, size)
             }
