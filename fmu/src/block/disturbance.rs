@@ -113,9 +113,9 @@ mod tests {
             let mut x = [0.0];
             let disturbance = example(seed);
             if blur {
-                disturbance.blur(1.0, &mut x)
+                disturbance.blur(1.0, &mut x);
             } else {
-                disturbance.push(1.0, &mut x)
+                disturbance.push(1.0, &mut x);
             }
             x[0]
         };
