@@ -36,6 +36,7 @@
 //! | T | `deadline` | s | scalar > 0 |
 //! | a | `rate` | 1/s | scalar |
 //! | μ | `margin` | `[h]` | scalar ≥ 0 |
+//! | W | `disturbance` | `[h]`/s^n | scalar ≥ 0 |
 //! | e = h − μ − r | `error` | `[h]` | scalar |
 //! | r | `profile` | `[h]` | scalar |
 //! | τ = t − t₀ | `elapsed` | s | scalar ≥ 0 |

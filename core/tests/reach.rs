@@ -217,3 +217,23 @@ fn low_peaks_need_smaller_bounds() {
     let (hermite, low) = (bound(ProfileKind::Hermite), bound(ProfileKind::LowPeak));
     assert!((hermite - 6.0).abs() < 0.4 && (low - 4.0).abs() < 0.4, "{hermite} {low}");
 }
+
+/// 20 m in 1 s from rest with 4 m/s² is ruled out; with a wind that nobody knows the size of within 60 m/s² it is not.
+#[test]
+fn what_a_disturbance_may_do_is_not_ruled_out() {
+    let start = [0.0, 0.0, 0.0, 0.0];
+    for disturbance in [0.0, 60.0] {
+        let settings = BarrierSettings { disturbance, ..BarrierSettings::within(1.0) };
+        let line = HalfPlane::new([1.0, 0.0], [20.0, 0.0]).expect("a valid barrier");
+        let mut filter = SafetyFilter::builder(4, 2)
+            .barrier("line", PointMass, line, settings)
+            .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
+            .and_then(FilterBuilder::build)
+            .expect("a valid filter");
+        let known = disturbance == 0.0;
+        assert_eq!(filter.is_ruled_out(0, 0.0, &start, 1.0).expect("valid"), known);
+        assert_eq!(filter.soonest(0, 0.0, &start, 9.0).expect("valid").is_some(), known);
+        let report = filter.step(0.0, &start, &[0.0; 2], &mut [0.0; 2]).expect("valid");
+        assert_eq!(report.barriers[0].late_certain, known);
+    }
+}

@@ -200,7 +200,11 @@ fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
                 .expect("valid barriers");
             (formed(builder, form), 4)
         }
-        7 => (by_method(BarrierSettings { method: Method::RepeatedRoot, ..within(4.0) }, form), 4),
+        7 => {
+            // Its rate changes with the anchor, and so does what a disturbance asks for over a period.
+            let settings = BarrierSettings { method: Method::RepeatedRoot, disturbance: 3.0, ..within(4.0) };
+            (by_method(settings, form), 4)
+        }
         8 => (by_method(BarrierSettings { profile: ProfileKind::LowPeak, ..within(4.0) }, form), 4),
         9 => {
             let method = Method::FirstOrder(Exponent::default());

@@ -43,6 +43,8 @@ fn settings_out_of_range_are_refused() {
     for (value, shown) in [(-1.0, "-1"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         let message = format!("goal.margin: is {shown}, must be finite and >= 0");
         bad(BarrierSettings { margin: value, ..good }, &message);
+        let message = format!("goal.disturbance: is {shown}, must be finite and >= 0");
+        bad(BarrierSettings { disturbance: value, ..good }, &message);
     }
     assert!(build(BarrierSettings { margin: 0.0, ..good }, BOUNDS, 1e6).is_ok());
 }

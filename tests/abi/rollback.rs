@@ -37,12 +37,21 @@ radius = 0.75
 deadline = 1.0
 "#;
 
+/// Of the unicycle, with values that last longer than some steps and shorter than others.
+const DISTURBANCE: &str = "[disturbance]
+seed = 7
+period = 0.02
+inputs = { a = 1.0 }
+measurements = { x_p = 0.1, theta = 0.01 }
+";
+
 fn every_fmu() -> Vec<Fmu> {
     let mut fmus = vec![
         Fmu::new(FILTER),
         Fmu::new(&format!("direct_feedthrough = false\n{}", FILTER.trim_start())),
         Fmu::new(CONFLICTS),
     ];
+    fmus.push(Fmu::new(&format!("{}{DISTURBANCE}", PLANT.trim_start())));
     for model in MODELS {
         let plant = PLANT.replace("unicycle", model).replace("x0 = { theta = 0.5, v = 2.0 }", "");
         fmus.push(Fmu::new(&plant));

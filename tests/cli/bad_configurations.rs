@@ -29,8 +29,8 @@ fn an_unknown_key() {
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
          unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `centre_input`, `radius`, `smoothing`, \
          `half_axes`, `half_sides`, `angle`, `normal`, `state`, `bound`, `expression`, `unit`, `relative_degree`, \
-         `deadline`, `method`, `profile`, \
-         `when_infeasible`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`, `priority`, `penalty`, `begin`, \
+         `deadline`, `method`, `profile`, `when_infeasible`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`, \
+         `disturbance`, `priority`, `penalty`, `begin`, \
          `after`, `end`, `until_arrival`",
     );
 }

@@ -13,6 +13,7 @@ mod hostile;
 mod in_process;
 mod inspecting;
 mod misbehaving;
+mod models;
 mod packing;
 mod running;
 mod surviving;

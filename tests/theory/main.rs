@@ -5,6 +5,7 @@
 //! bands are those of the figures, far above what another platform's round-off changes.
 
 mod chains;
+mod disturbances;
 mod obstacles;
 mod profiles;
 mod sampling;

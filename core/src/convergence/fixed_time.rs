@@ -113,7 +113,7 @@ impl FixedTimeState {
 /// What the constraint asks for at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ.
+    /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: what the constraint asks for, and the disturbance on top.
     pub floor: f64,
     /// The lower bound on h that the constraint promises now, `[h]`.
     pub profile: f64,
@@ -268,6 +268,7 @@ impl FixedTime {
             Phase::Stay | Phase::Left => (-lower_terms(stay_rate, &e), 0.0),
             _ => self.approach(state, elapsed, &e),
         };
+        let floor = floor + self.settings.disturbance;
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
 

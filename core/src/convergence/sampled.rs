@@ -206,8 +206,29 @@ impl FixedTime {
         };
         let (now, then) = (target(elapsed), target(elapsed + period));
         let decay = (-last * period).exp();
-        let floor = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
+        let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
+        let floor = undisturbed + self.disturbed(&weights, period);
         Some(SampledDemand { weights, floor, attenuation })
+    }
+
+    /// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period may fall below its prediction under disturbances of
+    /// h⁽ⁿ⁾ up to W: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
+    fn disturbed(&self, weights: &Stack, period: f64) -> f64 {
+        let bound = self.settings.disturbance;
+        let mut grown = bound;
+        let mut sum = 0.0;
+        for k in (0..self.n).rev() {
+            grown *= period / (self.n - k) as f64;
+            sum += weights[k].abs() * grown;
+        }
+        sum
+    }
+
+    /// The derivative of what [`Self::disturbed`] adds, where `weights` change by `change`.
+    pub(super) fn disturbed_along(&self, weights: &Stack, change: &Stack, period: f64) -> f64 {
+        let signed: Stack = std::array::from_fn(|k| change[k] * weights[k].signum());
+        let positive = self.disturbed(&signed.map(|w| w.max(0.0)), period);
+        positive - self.disturbed(&signed.map(|w| w.min(0.0)), period)
     }
 
     /// As in [`SampledDemand`], for errors against the profile at `rate` or the rates of the settings.

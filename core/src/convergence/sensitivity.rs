@@ -171,6 +171,7 @@ impl FixedTime {
                 let (error, slope) = (h[k] - target, -period * rate * decay);
                 out.floor += out.weights[k] * (target + decay * error) + demand.weights[k] * slope * error;
             }
+            out.floor += self.disturbed_along(&demand.weights, &out.weights, period);
             let time_left = (state.deadline - elapsed).max(period);
             out.attenuation = sampled::attenuation_along(state.rate, n, time_left) * rate;
         }

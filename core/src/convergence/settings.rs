@@ -71,6 +71,10 @@ pub struct FixedTimeSettings {
     /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
     /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
     pub recovery: Option<f64>,
+    /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on what the model does not know of h⁽ⁿ⁾, such as L_wL_f^{n−1}h w for a
+    /// disturbance w. The constraint asks for as much more, so that the promise holds for every disturbance
+    /// within the bound. It is one of h⁽ⁿ⁾ only: a disturbance must not enter an earlier derivative. Default 0.
+    pub disturbance: f64,
 }
 
 impl FixedTimeSettings {
@@ -92,6 +96,7 @@ impl FixedTimeSettings {
             stay_rate: None,
             margin: 0.0,
             recovery: None,
+            disturbance: 0.0,
         }
     }
 
@@ -145,6 +150,7 @@ impl FixedTimeSettings {
             }
         }
         non_negative("margin", self.margin)?;
+        non_negative("disturbance", self.disturbance)?;
         Ok(self)
     }
 }

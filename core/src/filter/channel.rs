@@ -130,6 +130,11 @@ impl Channel {
         }
     }
 
+    /// Whether the model says all of h: what a disturbance may do for it is never ruled out.
+    pub(super) fn is_undisturbed(&self) -> bool {
+        self.promise.settings().disturbance == 0.0
+    }
+
     /// Whether the deadline, `time_left` s after time and state `now`, certainly cannot be met: no input within
     /// `bounds` has h ≥ 0 then, or it has passed outside.
     pub(super) fn is_lost(
@@ -141,7 +146,7 @@ impl Channel {
     ) -> bool {
         match promise.phase {
             Phase::Late => true,
-            Phase::Approach => {
+            Phase::Approach if self.is_undisturbed() => {
                 let size = promise.anchor[0].abs() + promise.margin;
                 reach::ruled_out(&*self.source, now, bounds, time_left, size)
             }

@@ -331,7 +331,7 @@ impl SafetyFilter {
 
     /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the
     /// state `x` at `t` ([`reach::soonest`]), at most `horizon` (s, finite, > 0); `None` where that is not
-    /// known or there is no such barrier.
+    /// known (with a disturbance too) or there is no such barrier.
     ///
     /// # Errors
     ///
@@ -339,7 +339,7 @@ impl SafetyFilter {
     pub fn soonest(&self, index: usize, t: f64, x: &[f64], horizon: f64) -> Result<Option<f64>, Error> {
         length("x", x.len(), self.state_dim)?;
         let horizon = positive("horizon", horizon)?;
-        let channel = self.channels.get(index);
+        let channel = self.channels.get(index).filter(|c| c.is_undisturbed());
         Ok(channel.and_then(|c| reach::soonest(&*c.source, (t, x), &self.bounds, horizon)))
     }
 
@@ -352,7 +352,7 @@ impl SafetyFilter {
     pub fn is_ruled_out(&self, index: usize, t: f64, x: &[f64], after: f64) -> Result<bool, Error> {
         length("x", x.len(), self.state_dim)?;
         let after = non_negative("after", after)?;
-        let channel = self.channels.get(index);
+        let channel = self.channels.get(index).filter(|c| c.is_undisturbed());
         Ok(channel.is_some_and(|c| reach::ruled_out(&*c.source, (t, x), &self.bounds, after, 1.0)))
     }
 

@@ -1,6 +1,7 @@
 //! What an FMU computes, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
 mod controller;
+mod disturbance;
 mod filter;
 mod plant;
 

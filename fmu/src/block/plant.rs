@@ -2,6 +2,7 @@
 
 use punctual_core::dynamics::DynPlant;
 
+use super::disturbance::Disturbance;
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, updated};
 use crate::product::Layout;
@@ -15,16 +16,20 @@ pub(super) struct PlantBlock {
     parameters: Vec<Parameter<PlantConfiguration>>,
     layout: Layout,
     plant: Box<dyn DynPlant>,
+    disturbance: Disturbance,
     x: Vec<f64>,
     /// Scratch: the state after the step under way.
     next: Vec<f64>,
+    /// Scratch: the inputs with their disturbance.
+    u: Vec<f64>,
 }
 
 impl PlantBlock {
     pub(super) fn new(configuration: PlantConfiguration, layout: Layout) -> Result<Self, ConfigurationError> {
         let (parameters, plant) = (configuration.parameters(), configuration.build()?);
-        let x = vec![0.0; layout.states];
-        Ok(Self { next: x.clone(), x, configuration, parameters, layout, plant })
+        let (x, u) = (vec![0.0; layout.states], vec![0.0; layout.inputs]);
+        let disturbance = Disturbance::new(&configuration);
+        Ok(Self { next: x.clone(), x, u, configuration, parameters, layout, plant, disturbance })
     }
 }
 
@@ -33,14 +38,17 @@ impl Block for PlantBlock {
         let numbers = &values.reals[self.layout.parameters..self.layout.end];
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
         self.plant = configuration.build()?;
+        self.disturbance = Disturbance::new(&configuration);
         self.configuration = configuration;
         // The first parameters are the initial state.
         self.x.copy_from_slice(&numbers[..self.layout.states]);
         Ok(())
     }
 
-    fn output(&mut self, _t: f64, values: &mut Values) {
-        values.reals[self.layout.outputs..][..self.layout.states].copy_from_slice(&self.x);
+    fn output(&mut self, t: f64, values: &mut Values) {
+        let measured = &mut values.reals[self.layout.outputs..][..self.layout.states];
+        measured.copy_from_slice(&self.x);
+        self.disturbance.blur(t, measured);
     }
 
     /// The state does not depend on the inputs before a step.
@@ -68,8 +76,11 @@ impl Block for PlantBlock {
             ));
         }
         self.next.copy_from_slice(&self.x);
-        for _ in 0..substeps as u64 {
-            self.plant.rk4_step(&mut self.next, u, h / substeps).map_err(|e| e.to_string())?;
+        let inner = h / substeps;
+        for k in 0..substeps as u64 {
+            self.u.copy_from_slice(u);
+            self.disturbance.push(t + k as f64 * inner, &mut self.u);
+            self.plant.rk4_step(&mut self.next, &self.u, inner).map_err(|e| e.to_string())?;
         }
         if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
             let name = self.configuration.plant.state_name(i);
@@ -84,7 +95,17 @@ impl Block for PlantBlock {
 
     fn save(&self, state: &mut BlockState) {
         // Without `..`: whoever adds a field decides here whether it belongs to the state.
-        let Self { x: now, configuration: _, parameters: _, layout: _, plant: _, next: _ } = self;
+        // A disturbance is a function of time.
+        let Self {
+            x: now,
+            configuration: _,
+            parameters: _,
+            layout: _,
+            plant: _,
+            disturbance: _,
+            next: _,
+            u: _,
+        } = self;
         match state {
             BlockState::Plant { x } => x.clone_from(now),
             _ => *state = BlockState::Plant { x: now.clone() },

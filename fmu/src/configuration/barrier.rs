@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     BarrierInput, ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, ReferenceSection,
-    check_identifier, check_unit, external,
+    check_identifier, check_unit, external, over_seconds,
 };
 
 /// Default margin as a part of the radius, or of the smaller half axis or side.
@@ -239,6 +239,10 @@ pub struct BarrierSection {
     /// Time in s to be inside again after leaving, ≥ 0. Default 0: leaving is reported only.
     #[serde(default)]
     pub recovery: f64,
+    /// A bound on what the model does not know of h⁽ⁿ⁾ (a disturbance), in the unit of h per sⁿ, ≥ 0: the promise
+    /// holds for all within it. Default 0.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub disturbance: f64,
     /// Where not all barriers can be met: those of smaller numbers go first, of equal ones the one above.
     /// Default: 0 for one whose set the start is in, 1 for the others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -367,6 +371,7 @@ impl BarrierSection {
         &self,
         index: usize,
         plant: &PlantSection,
+        degree: Option<usize>,
     ) -> Vec<Parameter<FilterConfiguration>> {
         let unit = &self.unit(plant)[..];
         let mut rows = Vec::new();
@@ -403,6 +408,11 @@ impl BarrierSection {
         row("recovery", "s", non_negative, "deadline for coming back after leaving; 0: none", |b| {
             &mut b.recovery
         });
+        if self.disturbance != 0.0 {
+            let per_time = over_seconds(unit, degree.unwrap_or_default());
+            let meaning = "bound on what the model does not know of the derivative of h with an input";
+            row("disturbance", &per_time, non_negative, meaning, |b| &mut b.disturbance);
+        }
         if self.penalty != 0.0 {
             row("penalty", "1", positive, "distance in u beyond which it yields", |b| &mut b.penalty);
         }
@@ -487,6 +497,7 @@ impl BarrierSection {
             stay_rate: given(self.stay_rate),
             margin: self.margin.unwrap_or(0.0),
             recovery: given(self.recovery),
+            disturbance: self.disturbance,
         })
     }
 

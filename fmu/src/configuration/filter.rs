@@ -195,8 +195,11 @@ impl FilterConfiguration {
                 }));
             }
         }
+        // Only a disturbance has a unit that depends on them.
+        let disturbed = self.barrier.iter().any(|b| b.disturbance != 0.0);
+        let degrees = if disturbed { self.relative_degrees() } else { Vec::new() };
         for (i, barrier) in self.barrier.iter().enumerate() {
-            rows.extend(barrier.parameters(i, &self.plant));
+            rows.extend(barrier.parameters(i, &self.plant, degrees.get(i).copied()));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         rows

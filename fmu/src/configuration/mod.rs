@@ -21,7 +21,7 @@ pub use external::BarrierInput;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
-pub use plant::{IntegrationSection, PlantConfiguration};
+pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};

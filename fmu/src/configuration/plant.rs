@@ -33,6 +33,55 @@ impl IntegrationSection {
     }
 }
 
+/// `[disturbance]`: what a plant gets and what is measured of it beside what the model says, uniformly distributed
+/// within bounds. Each value is a function of seed, signal and time alone, so that the same run gives the same.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct DisturbanceSection {
+    /// Another number, another sequence; finite, ≥ 0. Default 0.
+    #[serde(default)]
+    pub seed: f64,
+    /// Time in s for which a value lasts, > 0, counted from time 0. Default 0.01.
+    #[serde(default = "hold")]
+    pub period: f64,
+    /// Largest size of what is added to an input, by name, in its unit; ≥ 0. Default: nothing.
+    #[serde(default)]
+    pub inputs: BTreeMap<String, f64>,
+    /// Largest size of what is added to an output `x.<state>`, by the name of the state, in its unit; ≥ 0. The state
+    /// itself stays what it is. Default: nothing.
+    #[serde(default)]
+    pub measurements: BTreeMap<String, f64>,
+}
+
+fn hold() -> f64 {
+    0.01
+}
+
+impl Default for DisturbanceSection {
+    fn default() -> Self {
+        Self { seed: 0.0, period: hold(), inputs: BTreeMap::new(), measurements: BTreeMap::new() }
+    }
+}
+
+/// How a number of the section is reached.
+type Access = Box<dyn Fn(&mut DisturbanceSection) -> &mut f64 + Send>;
+
+impl DisturbanceSection {
+    fn check(&self, plant: &PlantSection) -> Result<(), ConfigurationError> {
+        for (field, given, known, what) in [
+            ("inputs", &self.inputs, plant.inputs(), "input"),
+            ("measurements", &self.measurements, plant.states(), "state"),
+        ] {
+            if let Some(unknown) = given.keys().find(|k| known.iter().all(|s| s.name != **k)) {
+                let names: Vec<_> = known.iter().map(|s| s.name.as_str()).collect();
+                let message = format!("unknown {what}, must be one of {}", names.join(", "));
+                return Err(ConfigurationError::new(format!("disturbance.{field}.{unknown}"), message));
+            }
+        }
+        Ok(())
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum PlantKind {
@@ -52,6 +101,9 @@ pub struct PlantConfiguration {
     /// How it is integrated.
     #[serde(default)]
     pub integration: IntegrationSection,
+    /// What the model does not say. Default: nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<DisturbanceSection>,
     /// Initial state by name, in the units of the states; finite. Default 0, or nearest to it in the state's range.
     #[serde(default)]
     pub x0: BTreeMap<String, f64>,
@@ -72,6 +124,9 @@ impl PlantConfiguration {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown state, must be one of {}", names.join(", "));
             return Err(ConfigurationError::new(format!("x0.{unknown}"), message));
+        }
+        if let Some(disturbance) = &self.disturbance {
+            disturbance.check(&self.plant)?;
         }
         for state in states {
             let start = state.range().nearest(0.0);
@@ -105,6 +160,47 @@ impl PlantConfiguration {
             "largest Runge-Kutta step; the communication step is divided into equal ones",
             |c: &mut Self| &mut c.integration.inner_step,
         ));
+        rows.extend(self.disturbance.as_ref().map(|d| self.disturbance_parameters(d)).into_iter().flatten());
+        rows
+    }
+
+    fn disturbance_parameters(&self, given: &DisturbanceSection) -> Vec<Parameter<Self>> {
+        let row = |field: &str, place: &str, unit: String, range, meaning: String, access: Access| {
+            let names = (format!("disturbance.{field}"), format!("disturbance.{place}"));
+            Parameter::new(names, unit, range, meaning, move |c: &mut Self| {
+                access(c.disturbance.get_or_insert_with(DisturbanceSection::default))
+            })
+        };
+        let mut rows = vec![
+            row(
+                "seed",
+                "seed",
+                "1".to_owned(),
+                Range::NON_NEGATIVE,
+                "another number, another sequence".to_owned(),
+                Box::new(|d| &mut d.seed),
+            ),
+            row(
+                "period",
+                "period",
+                "s".to_owned(),
+                Range::POSITIVE,
+                "time for which a value lasts".to_owned(),
+                Box::new(|d| &mut d.period),
+            ),
+        ];
+        for input in self.plant.inputs().into_iter().filter(|i| given.inputs.contains_key(&i.name)) {
+            let (field, place) = (format!("u.{}", input.name), format!("inputs.{}", input.name));
+            let meaning = format!("largest size of what is added to {}", input.description);
+            let access: Access = Box::new(move |d| d.inputs.entry(input.name.clone()).or_default());
+            rows.push(row(&field, &place, input.unit, Range::NON_NEGATIVE, meaning, access));
+        }
+        for state in self.plant.states().into_iter().filter(|s| given.measurements.contains_key(&s.name)) {
+            let (field, place) = (format!("x.{}", state.name), format!("measurements.{}", state.name));
+            let meaning = format!("largest error of the measurement of {}", state.description);
+            let access: Access = Box::new(move |d| d.measurements.entry(state.name.clone()).or_default());
+            rows.push(row(&field, &place, state.unit, Range::NON_NEGATIVE, meaning, access));
+        }
         rows
     }
 

@@ -66,6 +66,21 @@ defects! {
     radius_zero: FILTER, "radius = 2.0" => "radius = 0.0", "barrier[0].radius: is 0, must be finite and >= 1e-9";
     negative_margin: FILTER, "radius = 2.0" => "radius = 2.0\nmargin = -0.1",
         "barrier[0].margin: is -0.1, must be finite and >= 0";
+    negative_disturbance: FILTER, "radius = 2.0" => "radius = 2.0\ndisturbance = -0.1",
+        "barrier[0].disturbance: is -0.1, must be finite and >= 0";
+    disturbance_of_no_input: PLANT, "[integration]" => "[disturbance]\ninputs = { omega = 1.0 }\n[integration]",
+        "disturbance.inputs.omega: unknown input, must be one of a, beta";
+    disturbance_of_no_state: PLANT, "[integration]" => "[disturbance]\nmeasurements = { w = 1.0 }\n[integration]",
+        "disturbance.measurements.w: unknown state, must be one of x_p, y_p, theta, v";
+    negative_bound_of_a_disturbance: PLANT,
+        "[integration]" => "[disturbance]\ninputs = { a = -1.0 }\n[integration]",
+        "disturbance.inputs.a: is -1, must be finite and >= 0";
+    negative_noise: PLANT, "[integration]" => "[disturbance]\nmeasurements = { v = -1.0 }\n[integration]",
+        "disturbance.measurements.v: is -1, must be finite and >= 0";
+    seed_that_is_none: PLANT, "[integration]" => "[disturbance]\nseed = inf\n[integration]",
+        "disturbance.seed: is inf, must be finite and >= 0";
+    disturbance_that_does_not_last: PLANT, "[integration]" => "[disturbance]\nperiod = 0.0\n[integration]",
+        "disturbance.period: is 0, must be finite and >= 1e-9";
     negative_rate: FILTER, "radius = 2.0" => "radius = 2.0\nrate = -1.0",
         "barrier[0].rate: is -1, must be finite and >= 0";
     negative_stay_rate: FILTER, "radius = 2.0" => "radius = 2.0\nstay_rate = -1.0",
@@ -226,6 +241,8 @@ const MODELS: [&str; 6] = [
 /// Valid configurations of every kind: models × shapes × methods, and some with everything stated.
 fn every_kind() -> Vec<String> {
     let mut texts = vec![FILTER.to_owned(), PLANT.to_owned(), HEADING.to_owned(), WAYPOINTS.to_owned()];
+    texts.push(format!("{FILTER}disturbance = 0.5\n"));
+    texts.push(format!("{PLANT}[disturbance]\nseed = 3\ninputs = {{ a = 0.5 }}\nmeasurements.v = 0.1\n"));
     for model in MODELS {
         texts.push(format!("kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"{model}\""));
         texts.push(format!("kind = \"plant\"\nname = \"p\"\nplant.model = \"{model}\"\nx0.x_p = 1e-300"));

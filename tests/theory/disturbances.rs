@@ -1,0 +1,135 @@
+//! Disturbances that do the worst they can, with and without what the settings allow for them.
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::StateBound;
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
+use punctual_core::plants::PointMass;
+use punctual_core::scalar::Scalar;
+use punctual_core::simulation::{Schedule, closed_loop};
+
+use super::distance;
+use super::starts::{DEADLINE, drawn};
+
+const STEP: f64 = 0.01;
+const MARGIN: f64 = 0.02;
+
+/// A point mass that is pushed with this many m/s² straight away from the centre of [`distance`].
+#[derive(Clone, Copy)]
+struct PushedAway(f64);
+
+impl ControlAffine<4, 2> for PushedAway {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        let (x_c, y_c) = (x[0] - 45.0, x[1] - 45.0);
+        let distance = (x_c * x_c + y_c * y_c).sqrt();
+        SVector::from([x[2], x[3], x_c / distance * self.0, y_c / distance * self.0])
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+        PointMass.input_map(x)
+    }
+}
+
+/// A car steered by its jerk, of which this many m/s³ are lost.
+#[derive(Clone, Copy)]
+struct JerkCar(f64);
+
+impl ControlAffine<3, 1> for JerkCar {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        SVector::from([x[1], x[2], S::from(-self.0)])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
+        SMatrix::from([S::zero(), S::zero(), S::one()])
+    }
+}
+
+/// How many of the runs were late, and how many outside at some sample from the deadline until 2T.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Failures {
+    late: usize,
+    outside: usize,
+    /// Steps that were not satisfied.
+    unmet: usize,
+}
+
+fn failures<M, P, B, const NX: usize, const NU: usize>(
+    [model, plant]: [M; 2],
+    barrier: B,
+    settings: BarrierSettings,
+    starts: impl Iterator<Item = SVector<f64, NX>>,
+    nominal: P,
+) -> Failures
+where
+    M: ControlAffine<NX, NU> + Copy + Send + 'static,
+    B: Barrier<NX> + Copy + Send + 'static,
+    P: Fn(&SVector<f64, NX>) -> SVector<f64, NU>,
+{
+    let mut failures = Failures::default();
+    for start in starts {
+        let mut filter = SafetyFilter::builder(NX, NU)
+            .barrier("goal", model, barrier, settings)
+            .and_then(|b| b.build())
+            .expect("a valid filter");
+        let steps = (2.0 * settings.deadline / STEP).round() as usize;
+        let (mut arrival, mut outside) = (None, false);
+        let schedule = Schedule { step: STEP, steps, substeps: 2 };
+        closed_loop(
+            &mut filter,
+            &plant,
+            start,
+            schedule,
+            |_, x| nominal(x),
+            |t, _, _, report| {
+                let b = &report.barriers[0];
+                arrival = b.arrival_time;
+                // Half a step early, so that round-off in t cannot skip the sample at the deadline.
+                outside |= t > settings.deadline - STEP / 2.0 && b.h < 0.0;
+                failures.unmet += usize::from(!report.status.is_satisfied());
+            },
+        )
+        .expect("a valid schedule");
+        failures.late += usize::from(arrival.is_none_or(|t| t > settings.deadline));
+        failures.outside += usize::from(outside);
+    }
+    failures
+}
+
+/// Of `count` starts: what is lost with and without the disturbance in the settings, for a point mass that is
+/// pushed with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ) and for a car that loses 10 m/s³ and wants to go back.
+fn table(count: usize) -> [[Failures; 2]; 2] {
+    let settings = |disturbance: f64| BarrierSettings {
+        rate: Some(5.0),
+        stay_rate: Some(5.0),
+        margin: MARGIN,
+        disturbance,
+        ..BarrierSettings::within(DEADLINE)
+    };
+    let line = StateBound::at_least(0, 45.0).expect("a valid barrier");
+    let starts = drawn(count);
+    [true, false].map(|robust| {
+        let settings = |bound: f64| settings(if robust { bound } else { 0.0 });
+        let places = starts.iter().map(|x0| SVector::from(*x0));
+        let damping = |x: &SVector<f64, 4>| vector![-x[2], -x[3]];
+        let pushed = failures([PushedAway(0.0), PushedAway(2.0)], distance(), settings(2.0), places, damping);
+        let places = starts.iter().map(|x0| vector![x0[0], x0[2], x0[3] / 5.0]);
+        let car = failures([JerkCar(0.0), JerkCar(10.0)], line, settings(10.0), places, |_| vector![-20.0]);
+        [pushed, car]
+    })
+}
+
+/// The row of the documentation: all kept with the bound in the settings, whatever pushes; without it the margin
+/// of 0.02 m is lost to 2/5² = 10/5³ = 0.08 m (lemma 3).
+#[test]
+#[allow(clippy::print_stdout, reason = "the figures of the documentation")]
+fn table_of_disturbances_at_their_worst() {
+    let count = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 1000 } else { 20 };
+    let [robust, plain] = table(count);
+    println!("of {count}, point mass and jerk car: with the bound {robust:?}, without {plain:?}");
+    assert_eq!(robust, [Failures::default(); 2], "with the bound, of {count}");
+    for lost in plain {
+        assert_eq!(lost.unmet, 0, "{lost:?}: a constraint was not met, so it is not the disturbance");
+        assert!(lost.outside > count / 2, "{lost:?} of {count}: the disturbance does nothing");
+    }
+}
