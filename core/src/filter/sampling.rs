@@ -14,7 +14,8 @@
 //! guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries the turn that
 //! was begun on through the instants at which the linearisation cannot see it. It is left out where the first
 //! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
-//! answer is the only one near), no further from u_ref than the step before went, or a half more.
+//! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
+//! count as equal: a sample taken again gives the same bits.
 
 use super::{Channel, FilterState};
 use crate::convergence::sampled::SampledDemand;
@@ -94,8 +95,6 @@ const HALVINGS: u32 = 8;
 const SUFFICIENT: f64 = 0.3;
 /// How much shorter each step of a search must be than the one before, for its answer to be the only one near.
 const CONTRACTION: f64 = 0.1;
-/// How much further from u_ref than the last input an answer may be that is taken without a second guess.
-const FURTHER: f64 = 1.5;
 
 /// One sampled problem: where it starts and what it asks for.
 pub(super) struct Held<'a> {
@@ -188,7 +187,7 @@ impl Held<'_> {
                 && best.as_ref().is_none_or(|b| found.better_than(b))
             {
                 u.copy_from_slice(&guess[..m]);
-                let near = last.is_none_or(|last| found.distance <= FURTHER * self.distance(last));
+                let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
                 let sure = found.sure && near;
                 (best, at_best) = (Some(found), true);
                 if sure {
@@ -385,7 +384,7 @@ struct Guess {
 
 impl Guess {
     fn better_than(&self, other: &Self) -> bool {
-        let key = |g: &Self| (g.given_up.count_ones(), g.violation, g.distance);
-        key(self) < key(other)
+        let key = |g: &Self| (g.given_up.count_ones(), g.violation);
+        key(self) < key(other) || key(self) == key(other) && self.distance < (1.0 - MET) * other.distance
     }
 }
