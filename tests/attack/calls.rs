@@ -96,6 +96,7 @@ fn call(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
         25..28 => machine.save(k, None),
         28..35 if !machine.held.is_empty() => state(machine, k, bytes),
         35 => logging(machine, k, bytes),
+        36 if bytes.below(2) == 0 => derivatives(machine, k, bytes),
         36 => absent(machine, k, bytes),
         37 if bytes.below(16) == 0 => machine.renew(k),
         38 if bytes.below(16) == 0 => refused_instance(bytes),
@@ -209,7 +210,37 @@ fn logging(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert_eq!(machine.answered(k, "set_debug_logging", None, status), usable);
 }
 
-/// What there is not: derivatives, asynchronous steps.
+/// Derivatives of some outputs by some inputs, or of what has none: the state stays as it is, and so do numbers
+/// that are not given.
+fn derivatives(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
+    let instance = &machine.slots[k].instance;
+    let some = |causality, bytes: &mut Bytes| -> Vec<_> {
+        let references = instance.references(causality, "");
+        let odd = [0, 1, 9999];
+        (0..bytes.below(4))
+            .map(|_| bytes.pick(if bytes.below(8) == 0 { &odd } else { &references }))
+            .collect()
+    };
+    let (unknown, known) = (some(Causality::Output, bytes), some(Causality::Input, bytes));
+    let seeds: Vec<_> = known.iter().map(|_| bytes.pick(&[1.0, -0.5, 0.0, 1e300, f64::NAN])).collect();
+    let (mut found, before) = (vec![0.5; unknown.len()], instance.now());
+    let status = (API.directional_derivative)(
+        instance.component,
+        unknown.as_ptr(),
+        unknown.len(),
+        known.as_ptr(),
+        known.len(),
+        seeds.as_ptr(),
+        found.as_mut_ptr(),
+    );
+    let call = Some(Call::GetDirectionalDerivative);
+    let done = machine.answered(k, "get_directional_derivative", call, status);
+    assert!(done || found.iter().all(|v| *v == 0.5), "{found:?}");
+    assert!(!done || seeds.iter().all(|v| v.is_finite()), "{seeds:?}");
+    assert!(before == machine.slots[k].instance.now(), "a derivative changed the state");
+}
+
+/// What there is not: derivatives in time, asynchronous steps.
 fn absent(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let c = machine.slots[k].instance.component;
     let (reference, order, mut real, mut int, mut text) = (0, 1, 0.5, 7, null());
@@ -224,12 +255,9 @@ fn absent(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
         _ => DISCARD,
     };
     assert_eq!((discarded, int, real.to_bits(), text), (DISCARD, 7, 0.5_f64.to_bits(), null()));
-    let (status, usable) = match bytes.below(4) {
+    let (status, usable) = match bytes.below(3) {
         0 => ((API.cancel_step)(c), false),
-        1 => {
-            ((API.directional_derivative)(c, refs, count, refs, count, &raw const real, &raw mut real), false)
-        }
-        2 => ((API.set_input_derivatives)(c, refs, count, orders, &raw const real), count == 0),
+        1 => ((API.set_input_derivatives)(c, refs, count, orders, &raw const real), count == 0),
         _ => ((API.get_output_derivatives)(c, refs, count, orders, &raw mut real), count == 0),
     };
     assert_eq!(machine.answered(k, "what there is not", None, status), usable);
