@@ -210,16 +210,21 @@ fn logging(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert_eq!(machine.answered(k, "set_debug_logging", None, status), usable);
 }
 
-/// Derivatives of some outputs by some inputs, or of what has none: the state stays as it is, and so do numbers
-/// that are not given.
+/// Derivatives of some outputs by some inputs, or of what has none: the state stays as it is, and so do the
+/// numbers of a call that fails.
 fn derivatives(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
+    // Outputs are computed where they are read, and then known.
+    machine.look(k);
     let instance = &machine.slots[k].instance;
     let some = |causality, bytes: &mut Bytes| -> Vec<_> {
         let references = instance.references(causality, "");
         let odd = [0, 1, 9999];
-        (0..bytes.below(4))
-            .map(|_| bytes.pick(if bytes.below(8) == 0 { &odd } else { &references }))
-            .collect()
+        let count = bytes.below(4);
+        let one = |_| {
+            let from = if bytes.below(8) == 0 { &odd[..] } else { &references };
+            bytes.pick(from)
+        };
+        (0..count).map(one).collect()
     };
     let (unknown, known) = (some(Causality::Output, bytes), some(Causality::Input, bytes));
     let seeds: Vec<_> = known.iter().map(|_| bytes.pick(&[1.0, -0.5, 0.0, 1e300, f64::NAN])).collect();
