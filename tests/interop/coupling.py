@@ -52,6 +52,7 @@ class Slave:
         values = {}
         for kind, read in [
             ("Real", self.fmu.getReal),
+            ("Integer", self.fmu.getInteger),
             ("Enumeration", self.fmu.getInteger),
             ("Boolean", self.fmu.getBoolean),
         ]:
