@@ -1,11 +1,12 @@
 //! A filter and a plant of expressions do not allocate in a step.
 
-#[path = "../../core/tests/counting/mod.rs"]
-mod counting;
-
-use counting::allocations;
 use punctual_core::filter::{BarrierSettings, SafetyFilter, Sampling, Status};
 use punctual_models::Model;
+
+/// Number of allocations that `work` makes on this thread.
+fn allocations(work: impl FnOnce()) -> u64 {
+    allocation_counter::measure(work).count_total
+}
 
 #[test]
 fn a_step_allocates_nothing() {
