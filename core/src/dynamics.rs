@@ -33,6 +33,10 @@ use crate::scalar::Scalar;
 /// f and g are smooth where the filter is used; derivatives up to the relative degree are taken by
 /// running these functions on Taylor series.
 pub trait ControlAffine<const NX: usize, const NU: usize> {
+    /// No output of the state has a larger relative degree along this plant. Default: the number of states,
+    /// which is true of every plant; what lies above is not compiled.
+    const LARGEST_DEGREE: usize = NX;
+
     /// f(x): the rate of change of the state at u = 0, per second.
     fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX>;
 
@@ -229,6 +233,9 @@ impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<E
 where
     P: ControlAffine<NX, NU>,
 {
+    /// A point that moves by itself is to the plant what time is.
+    const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
+
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
         const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };
         let f = self.0.drift(&SVector::<S, NX>::from_fn(|i, _| x[i]));

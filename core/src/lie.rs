@@ -241,12 +241,13 @@ where
     }
 }
 
-/// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the number of states:
-/// the gradients of h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
+/// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the plant's
+/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE); the number of states is always one, since the gradients of
+/// h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
 /// # Errors
 ///
-/// `n` outside 1 ..= min(`NX`, [`MAX_RELATIVE_DEGREE`]); `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
+/// `n` outside 1 ..= min(`LARGEST_DEGREE`, [`MAX_RELATIVE_DEGREE`]); `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
 /// relative degree is for [`detected`] to say, and checked at every evaluation
 /// ([`Derivatives::lower_sensitivity`]).
 pub fn along<P, B, const NX: usize, const NU: usize>(
@@ -263,10 +264,10 @@ where
         ($($n:literal => $k:literal),*) => {
             match n {
                 // A constant condition: what cannot be is not compiled.
-                $($n if const { $n <= NX } => {
+                $($n if const { $n <= P::LARGEST_DEGREE } => {
                     Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
                 })*
-                _ => Err(no_degree(n, NX.min(MAX_RELATIVE_DEGREE))),
+                _ => Err(no_degree(n, P::LARGEST_DEGREE.min(MAX_RELATIVE_DEGREE))),
             }
         };
     }

@@ -28,6 +28,10 @@ const V: Signal = signal("v", "m/s", "speed along the heading; negative when rev
 const BETA: Signal = signal("beta", "rad", "slip angle at the centre of mass");
 const A: Signal = signal("a", "m/s2", "acceleration along the heading");
 
+/// Of every plant below: what no input changes at once is a function of position and heading, and its rate
+/// is the speed times something, which the acceleration changes.
+const VEHICLE_DEGREE: usize = 2;
+
 /// The names and units of a plant's states and inputs.
 pub trait Signals {
     /// The states, in order.
@@ -50,6 +54,8 @@ impl Signals for PointMass {
 }
 
 impl ControlAffine<4, 2> for PointMass {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         SVector::from([x[2], x[3], S::zero(), S::zero()])
@@ -84,6 +90,8 @@ impl Signals for Unicycle {
 }
 
 impl ControlAffine<4, 2> for Unicycle {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         let (sin, cos) = x[2].sin_cos();
@@ -128,6 +136,8 @@ impl Signals for Bicycle {
 }
 
 impl ControlAffine<4, 2> for Bicycle {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         Unicycle.drift(x)
@@ -179,6 +189,8 @@ impl Signals for SmallSlipBicycle {
 }
 
 impl ControlAffine<4, 2> for SmallSlipBicycle {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         Unicycle.drift(x)
@@ -213,6 +225,8 @@ impl Signals for SmallSlipBicycleWithRate {
 }
 
 impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
         self.0.drift(x)
@@ -260,6 +274,8 @@ impl Signals for KinematicBicycle {
 }
 
 impl ControlAffine<5, 2> for KinematicBicycle {
+    const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
         let beta = (x[4].tan() * (self.l_r / (self.l_f + self.l_r))).atan();

@@ -209,9 +209,9 @@ fn a_moved_set_on_the_way() {
     let other = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.x: has 2 components, must have 4");
-    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 3).expect("in range");
+    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 1).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
-    assert_eq!(refused.to_string(), "goal.relative_degree: is 3, must stay 2");
+    assert_eq!(refused.to_string(), "goal.relative_degree: is 1, must stay 2");
 }
 
 /// The repeated root from rest at odd order: the report has the fallback, the filter the reason.
