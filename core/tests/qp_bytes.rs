@@ -93,11 +93,14 @@ fn any_bytes_give_a_finite_input_within_bounds() {
             let optimal = residuals.stationarity.max(residuals.complementarity) <= 1e-9;
             assert!(optimal && residuals.negativity <= 1e-9, "{case}: {residuals:?} {p:?}");
         }
-        // The same again, from a workspace that has seen another problem and from a new one.
-        let mut again = vec![0.5; m];
-        assert_eq!(Workspace::default().solve(&p, &mut again), solution, "{case}");
+        // The same again: from a new workspace, and from one whose last answer it was.
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&again), bits(&u), "{case}");
+        for workspace in [&mut Workspace::default(), &mut workspace] {
+            let mut again = vec![0.5; m];
+            let other = workspace.solve(&p, &mut again);
+            assert_eq!((other.outcome, other.solver), (solution.outcome, solution.solver), "{case}");
+            assert_eq!(bits(&again), bits(&u), "{case}");
+        }
     }
     println!("{failed} of {count} programmes without convergence");
 }

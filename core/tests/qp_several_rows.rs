@@ -113,6 +113,25 @@ proptest! {
         prop_assert_eq!(bits(&first), bits(&second));
     }
 
+    /// Whatever the workspace solved before: the same, or much the same, or something else.
+    #[test]
+    fn a_warm_start_changes_no_bit((rows, b, u_ref) in several(), (others, _, _) in several(), step in 0.0..0.2) {
+        let mut workspace = Workspace::default();
+        let before = Problem::new(&rows, &b, &u_ref, NO_LIMIT);
+        workspace.solve(&before, &mut vec![f64::NAN; u_ref.len()]);
+        let moved: Vec<f64> = u_ref.iter().map(|v| v + step).collect();
+        for rows in [&rows, &rows, &others, &rows] {
+            let p = Problem::new(rows, &b, &moved, NO_LIMIT);
+            let (mut warm, mut cold) = (vec![f64::NAN; moved.len()], vec![f64::NAN; moved.len()]);
+            let mut fresh = Workspace::default();
+            let (one, two) = (workspace.solve(&p, &mut warm), fresh.solve(&p, &mut cold));
+            prop_assert_eq!((one.outcome, one.solver), (two.outcome, two.solver));
+            let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+            prop_assert_eq!(bits(&warm), bits(&cold), "{:?} {:?}", warm, cold);
+            prop_assert_eq!(workspace.active(), fresh.active());
+        }
+    }
+
     #[test]
     fn extreme_data_give_a_finite_input_within_bounds((rows, b, u_ref, limit) in quadratic::extreme(0)) {
         let mut u = vec![f64::NAN; u_ref.len()];
@@ -175,6 +194,25 @@ fn a_feasible_reference_is_returned_bit_for_bit() {
     let solution = solve(&rows, &Bounds::NONE, &u_ref, NO_LIMIT, &mut u);
     assert_eq!((solution.outcome, solution.solver), (Outcome::Optimal, Solver::Unchanged));
     assert_eq!(u.map(f64::to_bits), u_ref.map(f64::to_bits));
+}
+
+/// Two rows and a bound active: found in rounds at first, then at once, until another set is active.
+#[test]
+fn the_last_answer_s_rows_are_tried_first() {
+    let mut workspace = Workspace::default();
+    let b = bounds(&[-1.0; 3], &[1.0; 3]);
+    let mut rounds = Vec::new();
+    for (second, third) in [(0.75, 0.75), (0.7, 0.6), (0.0, 0.6)] {
+        let rows = [row(&[1.0, 1.0, 0.0], 1.0 + second), row(&[1.0, 0.0, 1.0], 1.0 + third)];
+        let p = Problem::new(&rows, &b, &[3.0, 0.0, 0.0], NO_LIMIT);
+        let wanted = [1.0, second, third];
+        let mut u = [f64::NAN; 3];
+        let solution = workspace.solve(&p, &mut u);
+        assert_eq!((solution.outcome, solution.solver), (Outcome::Optimal, Solver::DualActiveSet));
+        assert!(u.iter().zip(wanted).all(|(a, w)| (a - w).abs() <= 1e-15), "{u:?} for {wanted:?}");
+        rounds.push(solution.iterations > 0);
+    }
+    assert_eq!(rounds, [true, false, true]);
 }
 
 /// A soft row pulls with its penalty and no more, whatever the unit of the row.

@@ -3,6 +3,7 @@
 mod scenario;
 
 use proptest::prelude::*;
+use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::comparison::binomial;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
@@ -383,5 +384,41 @@ proptest! {
             let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
             prop_assert!(u.iter().zip(high).all(|(v, m)| v.is_finite() && v.abs() <= m), "{u:?} {report:?}");
         }
+    }
+}
+
+/// The conditions of optimality at every step of a run with a goal, an obstacle and bounds: to round-off where the
+/// constraint is pointwise, to where the search stops where it looks over the period.
+#[test]
+fn every_answer_is_optimal() {
+    /// Where Newton's steps end, 1e-9 of u, times what a row's normal turns within a step of that length.
+    const SEARCH: f64 = 1e-8;
+    for (sampling, tolerance) in [(Sampling::Pointwise, 1e-13), (Sampling::Period(0.01), SEARCH)] {
+        let obstacle = Outside(DistanceDisc::new([24.0, 23.0], 4.0, 4.0).expect("valid disc"));
+        let mut filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, distance_disc(), settings())
+            .and_then(|b| b.barrier("obstacle", PointMass, obstacle, settings()))
+            .and_then(|b| b.bounds(&[-60.0; 2], &[60.0; 2])?.sampling(sampling))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        assert_eq!(filter.residuals(&[0.0; 2], &[0.0; 2]), Ok(None), "nothing was solved yet");
+        let (mut x, mut u) = (vector![0.0, 0.0, 1.0, 0.0], vector![0.0, 0.0]);
+        let mut filtered = 0;
+        for k in 0..1000 {
+            let u_ref = [-x[2], -x[3]];
+            let report = filter.step(f64::from(k) * 0.01, x.as_slice(), &u_ref, u.as_mut_slice());
+            let status = report.expect("right dimensions").status;
+            let residuals = filter.residuals(&u_ref, u.as_slice()).expect("right dimensions");
+            if status.is_satisfied() {
+                let r = residuals.expect("a programme was solved");
+                let worst = r.stationarity.max(r.violation).max(r.negativity).max(r.complementarity);
+                assert!(worst <= tolerance, "{sampling:?} at {k}: {r:?}");
+                filtered += u32::from(status == Status::Filtered);
+            }
+            x = rk4_step(&PointMass, &x, &u, 0.01);
+        }
+        assert!(filtered > 300, "{sampling:?}: {filtered} steps filtered");
+        filter.step(11.0, &[f64::NAN; 4], &[0.0; 2], u.as_mut_slice()).expect("right dimensions");
+        assert_eq!(filter.residuals(&[0.0; 2], u.as_slice()), Ok(None), "nothing was solved");
     }
 }

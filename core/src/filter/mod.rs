@@ -26,7 +26,7 @@ use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{DerivativeSource, Derivatives};
-use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Row};
+use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Residuals, Row};
 use crate::reach;
 use crate::scalar::all_finite;
 use sampling::Held;
@@ -359,6 +359,32 @@ impl SafetyFilter {
     /// The report of the last [`Self::step`] or [`Self::peek`].
     pub fn report(&self) -> &Report {
         &self.workspace.report
+    }
+
+    /// How far `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, is from satisfying the
+    /// conditions of optimality of its programme: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
+    /// the search stops where it looked over the period ([`Report::predicted`]; of the rows linearised at `u`).
+    /// `None` where no programme was solved. Costs another solve: a check, not for every step.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    pub fn residuals(&mut self, u_ref: &[f64], u: &[f64]) -> Result<Option<Residuals>, Error> {
+        length("u_ref", u_ref.len(), self.input_dim)?;
+        length("u", u.len(), self.input_dim)?;
+        let Workspace { rows, enforcement, report, programme, .. } = &mut self.workspace;
+        use Status::{InvalidInput, Singular, SolverFailed, WrongRelativeDegree};
+        let unsolved = matches!(report.status, InvalidInput | Singular | WrongRelativeDegree | SolverFailed);
+        if unsolved || report.time.is_nan() {
+            return Ok(None);
+        }
+        let count = self.channels.len();
+        let problem = Problem {
+            enforcement: &enforcement[..count],
+            ..Problem::new(&rows[..count], &self.bounds, u_ref, self.correction_limit)
+        };
+        programme.solve(&problem, &mut [0.0; MAX_INPUTS][..u.len()]);
+        Ok(Some(programme.residuals(&problem, u)))
     }
 
     /// The names of the barriers, in the order of the report.

@@ -21,9 +21,10 @@
 //! A row whose normal vanishes, or that would move u by more than the correction limit, is degenerate:
 //! where there are several rows it is left out and the others are met.
 //!
-//! There is no warm start: problems of the intended size need one to three rounds from u_ref, and where the
-//! active rows are not unique another start would change the last bits of the answer.
+//! A workspace starts warm: where several rows or bounds are active it tries those of its last answer first. The
+//! answer has the same bits either way (module `canonical`); [`Solution::iterations`] alone tells.
 
+mod canonical;
 mod dual_active_set;
 mod factors;
 mod interior_point;
@@ -216,12 +217,13 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Which method produced it.
     pub solver: Solver,
-    /// Rounds of the active-set method or iterations of the interior-point method, else 0.
+    /// Rounds of the active-set method or iterations of the interior-point method, else 0; 0 too where the rows
+    /// and bounds of the workspace's last answer were those of this one.
     pub iterations: u32,
 }
 
 /// What can be active.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Constraint {
     /// A row, by its place in the list.
     Row(usize),
@@ -241,7 +243,8 @@ pub struct Active {
     pub multiplier: f64,
 }
 
-/// The memory of a solve, to be used again and again. Nothing in it changes the next answer.
+/// The memory of a solve, to be used again and again. What it remembers of the last answer makes the next one
+/// faster where the same rows and bounds are active, and changes no bit of it.
 #[derive(Clone)]
 pub struct Workspace {
     backend: Backend,
@@ -283,6 +286,8 @@ impl Workspace {
     /// More than [`MAX_ROWS`] rows.
     pub fn solve(&mut self, p: &Problem, u: &mut [f64]) -> Solution {
         assert!(p.rows.len() <= MAX_ROWS, "{} rows, must be at most {MAX_ROWS}", p.rows.len());
+        // What the last answer was made of; nothing of one in which something yielded.
+        let guess = if self.relaxed | self.lost == 0 { self.active_len } else { 0 };
         (self.active_len, self.relaxed, self.lost) = (0, 0, 0);
         if let Some(answer) = one_active::solve(p, u)
             && (self.backend == Backend::DualActiveSet || matches!(answer, Answer::Reference))
@@ -320,19 +325,27 @@ impl Workspace {
         let Self { two, four, any, active, active_len, relaxed, lost, .. } = self;
         let (outcome, iterations);
         macro_rules! solve_with {
-            ($method:ident) => {{
-                (outcome, iterations) = $method.solve(p, u);
-                (*relaxed, *lost) = ($method.relaxed, $method.lost);
-                for (to, found) in active.iter_mut().zip($method.active(p)) {
-                    *to = found;
-                    *active_len += 1;
+            ($method:ident, $n:expr) => {{
+                if canonical::solve::<{ $n }>(p, &mut active[..guess], u) {
+                    *active_len = guess;
+                    (outcome, iterations) = (Outcome::Optimal, 0);
+                } else {
+                    (outcome, iterations) = $method.solve(p, u);
+                    (*relaxed, *lost) = ($method.relaxed, $method.lost);
+                    for (to, found) in active.iter_mut().zip($method.active(p)) {
+                        *to = found;
+                        *active_len += 1;
+                    }
+                    if outcome == Outcome::Optimal {
+                        canonical::solve::<{ $n }>(p, &mut active[..*active_len], u);
+                    }
                 }
             }};
         }
         match u.len() {
-            ..=2 => solve_with!(two),
-            3..=4 => solve_with!(four),
-            _ => solve_with!(any),
+            ..=2 => solve_with!(two, 2),
+            3..=4 => solve_with!(four, 4),
+            _ => solve_with!(any, MAX_INPUTS),
         }
         Solution { outcome, solver: Solver::DualActiveSet, iterations }
     }
