@@ -6,6 +6,7 @@ use std::hint::black_box;
 use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
 use punctual_core::plants::{PointMass, Unicycle};
+use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
 mod support;
@@ -13,12 +14,15 @@ mod support;
 /// A name and the work, to be done a number of times.
 type Case = (&'static str, fn(u32));
 
-const CASES: [Case; 11] = [
+const CASES: [Case; 13] = [
     ("by-hand", by_hand),
     ("step-point-mass", |times| step(goal(PointMass), [0.0; 2], times)),
     ("step-unicycle", |times| step(goal(Unicycle), [0.0; 2], times)),
     ("step-10-obstacles", |times| step(goal_and_obstacles(10), SAFE, times)),
     ("step-60-obstacles", |times| step(goal_and_obstacles(60), SAFE, times)),
+    // Two rows active of eleven; the second alternates between two such answers.
+    ("programme-same", |times| programme([[0.1, -0.2]; 2], times)),
+    ("programme-other", |times| programme([[0.1, -0.2], [8.0, 9.0]], times)),
     ("jets-2", |times| jets::<4>(2, times)),
     ("jets-4", |times| jets::<8>(4, times)),
     ("jets-8", |times| jets::<16>(8, times)),
@@ -40,6 +44,26 @@ fn step(builder: FilterBuilder, u_ref: [f64; 2], times: u32) {
     for _ in 0..times {
         let report = filter.step(black_box(T), black_box(&X), black_box(&u_ref), &mut u);
         assert!(report.expect("right dimensions").status.is_satisfied());
+    }
+}
+
+/// Solves for the references in turn.
+fn programme(references: [[f64; 2]; 2], times: u32) {
+    let row = |normal: [f64; 2], floor: f64| {
+        let mut row = Row { floor, ..Row::ZERO };
+        row.normal[..2].copy_from_slice(&normal);
+        row
+    };
+    let mut rows = vec![row([0.7, 0.3], 0.8), row([-0.2, 1.0], 0.5)];
+    rows.push(row([-0.7, -0.1], -4.0));
+    rows.push(row([0.2, -0.9], -4.0));
+    rows.extend((0..7_u8).map(f64::from).map(|angle| row([angle.cos(), angle.sin()], -30.0)));
+    let (mut workspace, mut u) = (Workspace::default(), [0.0; 2]);
+    for i in 0..times {
+        let u_ref = references[i as usize % 2];
+        let p = Problem::new(black_box(&rows), &Bounds::NONE, black_box(&u_ref), 1e6);
+        let solution = workspace.solve(&p, &mut u);
+        assert!(solution.outcome == Outcome::Optimal && workspace.active().len() == 2);
     }
 }
 
