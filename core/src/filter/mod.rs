@@ -57,7 +57,7 @@ impl Clone for FilterState {
     }
 }
 
-/// Scratch memory of a step; carries nothing from one step to the next.
+/// Scratch memory of a step; what it holds from the step before changes no bit of the next.
 struct Workspace {
     derivatives: Derivatives,
     rows: Vec<Row>,
