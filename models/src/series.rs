@@ -31,6 +31,16 @@ impl<C: Scalar> Series<C> {
         Self { coefficients: vec![C::zero(); registers * orders], orders }
     }
 
+    /// How many registers there are.
+    pub(crate) fn registers(&self) -> usize {
+        self.coefficients.len() / self.orders
+    }
+
+    /// Makes room for `registers`, with zeros.
+    pub(crate) fn grow(&mut self, registers: usize) {
+        self.coefficients.resize(registers * self.orders, C::zero());
+    }
+
     #[inline]
     pub(crate) fn get(&self, register: Register, k: usize) -> C {
         self.coefficients[register * self.orders + k]
