@@ -12,7 +12,7 @@ static const punctual_variable states[] = {
     {"v", "m/s", "speed", 0, 0, 0},
     {"acc", "m/s2", "acceleration", 0, 0, 0},
 };
-static const punctual_variable inputs[] = {{"jerk", "m/s3", "jerk", -80, 80, 0}};
+static const punctual_variable inputs[] = {{"jerk", "m/s3", "jerk", 0, 0, 0}};
 static const punctual_variable parameters[] = {
     {"d", "m", "where the merge is", 0, 1e6, 60},
     {"v_max", "m/s", "speed limit", 0, 1e3, 40},

@@ -40,8 +40,7 @@ struct RawVariable {
 
 type Initialize = unsafe extern "C" fn() -> *const c_char;
 /// Calculator, parameters, x, f, g.
-type Plant =
-    unsafe extern "C" fn(*const RawCalculator, *const f64, *const Number, *mut Number, *mut Number);
+type Plant = unsafe extern "C" fn(*const RawCalculator, *const f64, *const Number, *mut Number, *mut Number);
 /// Calculator, index, parameters, t, x.
 type Barrier = unsafe extern "C" fn(*const RawCalculator, u32, *const f64, Number, *const Number) -> Number;
 
@@ -149,12 +148,17 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
         return Err(format!("{SYMBOL} returned NULL"));
     }
     if !model.is_aligned() {
-        return Err(format!("{SYMBOL} returned an address that is not aligned to {} bytes", align_of::<RawModel>()));
+        return Err(format!(
+            "{SYMBOL} returned an address that is not aligned to {} bytes",
+            align_of::<RawModel>()
+        ));
     }
     // SAFETY: not NULL, aligned, and every version begins with these fields.
     let Head { abi, size } = unsafe { *model.cast::<Head>() };
     if abi != ABI {
-        return Err(format!("abi is {abi}, must be {ABI}: compile it with the punctual_model.h of this version"));
+        return Err(format!(
+            "abi is {abi}, must be {ABI}: compile it with the punctual_model.h of this version"
+        ));
     }
     if size as usize != size_of::<RawModel>() {
         return Err(format!(

@@ -301,7 +301,10 @@ impl BarrierSection {
             return refuse("shape", message);
         }
         if plant.plugin.is_some() && !matches!(self.shape, ShapeName::Plugin | ShapeName::External) {
-            return refuse("shape", format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"));
+            return refuse(
+                "shape",
+                format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"),
+            );
         }
         if plant.plugin.is_none() && self.shape == ShapeName::Plugin {
             return refuse("shape", "is \"plugin\", but the plant is none".to_owned());
@@ -330,7 +333,10 @@ impl BarrierSection {
                 Field::Unit => self.unit.is_some(),
                 Field::RelativeDegree => self.relative_degree.is_some(),
             };
-            let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle | Field::Output | Field::Unit);
+            let optional = matches!(
+                field,
+                Field::Velocity | Field::Smoothing | Field::Angle | Field::Output | Field::Unit
+            );
             if given && !fields.contains(&field) {
                 let name = if name == "velocity" && self.centre_input { "centre_input" } else { name };
                 return refuse(name, format!("{shape} has none"));
@@ -380,7 +386,9 @@ impl BarrierSection {
                 let state = plant.states().into_iter().find(|s| Some(&s.name) == self.state.as_ref());
                 return state.map_or_else(|| "1".to_owned(), |s| s.unit);
             }
-            ShapeName::Expression | ShapeName::External | ShapeName::Plugin => self.unit.as_deref().unwrap_or("1"),
+            ShapeName::Expression | ShapeName::External | ShapeName::Plugin => {
+                self.unit.as_deref().unwrap_or("1")
+            }
             _ => "m",
         };
         unit.to_owned()

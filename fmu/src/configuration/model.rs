@@ -208,10 +208,7 @@ impl PlantSection {
         }
         for (field, value) in [("l_r", self.l_r), ("l_f", self.l_f)] {
             if value.is_some() {
-                return refuse(
-                    field,
-                    "is a constant of the bicycle; other models have `parameters`".into(),
-                );
+                return refuse(field, "is a constant of the bicycle; other models have `parameters`".into());
             }
         }
         if let Some(name) = self.plugin.clone() {
@@ -319,7 +316,12 @@ fn texts(names: &[String]) -> Vec<&str> {
     names.iter().map(String::as_str).collect()
 }
 
-pub(super) fn check_variable(path: &str, name: &str, unit: &str, range: Range) -> Result<(), ConfigurationError> {
+pub(super) fn check_variable(
+    path: &str,
+    name: &str,
+    unit: &str,
+    range: Range,
+) -> Result<(), ConfigurationError> {
     check_identifier(&format!("{path}.name"), name)?;
     check_unit(&format!("{path}.unit"), unit)?;
     for (side, value) in [("min", range.min), ("max", range.max)] {

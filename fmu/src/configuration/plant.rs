@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use punctual_core::dynamics::DynPlant;
 use serde::{Deserialize, Serialize};
 
-use super::{ConfigurationError, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, check_identifier};
+use super::{
+    ConfigurationError, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, check_identifier,
+};
 
 /// `[integration]`: how the plant moves between communication points.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]

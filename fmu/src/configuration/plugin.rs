@@ -242,8 +242,10 @@ fn merge_parameters(
         let Some(place) = merged.iter_mut().find(|p| p.name == given.name) else {
             let names: Vec<_> = theirs.iter().map(|p| p.name.as_str()).collect();
             let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            let message =
-                format!("is {:?}, which is no parameter of the plug-in; its parameters are {names}", given.name);
+            let message = format!(
+                "is {:?}, which is no parameter of the plug-in; its parameters are {names}",
+                given.name
+            );
             return Err(ConfigurationError::new(format!("{path}.name"), message));
         };
         if own[..i].iter().any(|other| other.name == given.name) {
@@ -268,5 +270,8 @@ fn same_unit(path: &str, own: &str, theirs: &str) -> Result<(), ConfigurationErr
     if own == theirs {
         return Ok(());
     }
-    Err(ConfigurationError::new(format!("{path}.unit"), format!("is {own:?}, but the plug-in gives {theirs:?}")))
+    Err(ConfigurationError::new(
+        format!("{path}.unit"),
+        format!("is {own:?}, but the plug-in gives {theirs:?}"),
+    ))
 }
