@@ -1,6 +1,6 @@
 //! Cost of a filter step by where the derivatives come from: the same model built in, by expressions, by a plug-in, and
-//! handed over: `cargo bench --bench sources`. Fails where a model of a user costs more than [`MOST`] times the
-//! built-in one. Needs a C compiler.
+//! handed over: `cargo bench --bench sources`. Fails where a model of a user costs more than [`MOST`] times
+//! the built-in one. Needs a C compiler.
 //!
 //! All run in turn in the same process; the figure of each is the median over batches.
 
@@ -17,8 +17,9 @@ use support::{T, X, anchored, goal};
 
 mod support;
 
-/// What a step may cost, in steps of the built-in model.
-const MOST: f64 = 5.0;
+/// What a step may cost by expressions and by a plug-in, in steps of the built-in model: the latter is called once for
+/// each order, and calls back for each operation.
+const MOST: [f64; 2] = [5.0, 10.0];
 const BATCHES: usize = 301;
 const STEPS: usize = 400;
 
@@ -68,7 +69,8 @@ where
             "{name}, {words}: built in {:.0} ns, expressions {:.0} ns ({:.2}), plug-in {:.0} ns ({:.2}){given}",
             times[0], times[1], ratios[0], times[2], ratios[1]
         );
-        assert!(ratios.iter().all(|r| *r <= MOST), "{name}, {words}: {ratios:?}, must be at most {MOST}");
+        let kept = ratios.iter().zip(MOST).all(|(ratio, most)| *ratio <= most);
+        assert!(kept, "{name}, {words}: {ratios:?}, must be at most {MOST:?}");
     }
 }
 

@@ -271,32 +271,6 @@ impl Evaluated {
     fn time(&self) -> Register {
         self.states + self.inputs
     }
-
-    fn work<'a, C>(
-        &'a mut self,
-        series: &'a mut Series<C>,
-        orders: Range<usize>,
-        plant: bool,
-    ) -> Work<'a, C> {
-        let inputs = self.states..self.time();
-        let position = if plant { 0 } else { self.plant_steps };
-        if orders.start == 0 {
-            self.steps.truncate(position);
-        }
-        let next = if plant { self.time() + RESERVED } else { self.next };
-        Work {
-            series,
-            steps: &mut self.steps,
-            position,
-            next,
-            orders,
-            // Time is for barriers.
-            hidden: inputs.start..inputs.end + usize::from(plant),
-            zero: inputs.end + 1,
-            growing: self.growing,
-            fault: None,
-        }
-    }
 }
 
 /// One call of the code.
@@ -325,6 +299,7 @@ impl<C: Scalar> Work<'_, C> {
         self.not_a_number()
     }
 
+    #[inline]
     fn checked(&mut self, number: Number) -> Register {
         let register = number as Register;
         if register < self.next && !self.hidden.contains(&register) {
@@ -401,7 +376,7 @@ impl<C: Scalar> Record for Work<'_, C> {
         self.position += 1;
         self.next += operation.results();
         for k in self.orders.clone() {
-            self.series.advance(&[step], k);
+            self.series.advance_one(&step, k);
         }
         to
     }
@@ -471,29 +446,37 @@ impl Equations for Evaluated {
     }
 
     fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize) {
-        let code = Arc::clone(&self.code);
-        let (zero, mut f, mut g) =
-            (self.time() as Number + 1, std::mem::take(&mut self.f), std::mem::take(&mut self.g));
-        let mut derivatives = std::mem::take(&mut self.derivatives);
-        f.fill(zero);
-        g.fill(zero);
-        let parameters = std::mem::take(&mut self.parameters);
-        let x = std::mem::take(&mut self.x);
-        let mut work = self.work(series, k..k + 1, true);
-        code.plant(&mut work, &parameters, &x, &mut f, &mut g);
-        work.combine(&f, &g, &mut derivatives);
-        let (fault, next, position, nan) = (work.fault, work.next, work.position, work.not_a_number());
-        let fault = fault.or((position != self.steps.len() && k > 0).then_some(Fault::Different));
-        if fault.is_some() {
-            derivatives.fill(nan);
-        }
+        let time = self.time();
+        let zero = time as Number + 1;
+        self.f.fill(zero);
+        self.g.fill(zero);
         if k == 0 {
+            self.steps.clear();
             self.fault = None;
-            (self.next, self.plant_steps) = (next, position);
         }
+        let mut work = Work {
+            series,
+            steps: &mut self.steps,
+            position: 0,
+            next: time + RESERVED,
+            orders: k..k + 1,
+            // Time is for barriers.
+            hidden: self.states..time + 1,
+            zero: time + 1,
+            growing: self.growing,
+            fault: None,
+        };
+        self.code.plant(&mut work, &self.parameters, &self.x, &mut self.f, &mut self.g);
+        work.combine(&self.f, &self.g, &mut self.derivatives);
+        let (mut fault, next, position, nan) = (work.fault, work.next, work.position, work.not_a_number());
+        if k > 0 && position != self.plant_steps {
+            fault = fault.or(Some(Fault::Different));
+        }
+        if fault.is_some() {
+            self.derivatives.fill(nan);
+        }
+        (self.next, self.plant_steps) = (next, position);
         self.fault = self.fault.or(fault);
-        (self.f, self.g, self.derivatives) = (f, g, derivatives);
-        (self.parameters, self.x) = (parameters, x);
     }
 
     fn derivative(&self, i: usize) -> Register {
@@ -501,19 +484,26 @@ impl Equations for Evaluated {
     }
 
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register {
-        let code = Arc::clone(&self.code);
-        let (time, index) = (self.time() as Number, self.barrier);
-        let parameters = std::mem::take(&mut self.parameters);
-        let x = std::mem::take(&mut self.x);
-        let earlier = self.fault;
-        let mut work = self.work(series, 0..n + 1, false);
-        work.fault = earlier;
-        let h = code.barrier(index, &mut work, &parameters, time, &x);
+        let time = self.time();
+        self.steps.truncate(self.plant_steps);
+        let mut work = Work {
+            series,
+            steps: &mut self.steps,
+            position: self.plant_steps,
+            next: self.next,
+            orders: 0..n + 1,
+            hidden: self.states..time,
+            zero: time + 1,
+            growing: self.growing,
+            fault: self.fault,
+        };
+        let h = self.code.barrier(self.barrier, &mut work, &self.parameters, time as Number, &self.x);
         let h = work.checked(h);
         let (fault, nan, end) = (work.fault, work.not_a_number(), work.next);
         self.fault = fault;
-        (self.parameters, self.x) = (parameters, x);
-        self.registers = if self.growing { self.registers.max(end) } else { self.registers };
+        if self.growing {
+            self.registers = self.registers.max(end);
+        }
         if fault.is_some() { nan } else { h }
     }
 }
