@@ -300,17 +300,9 @@ impl BarrierSection {
                 format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"");
             return refuse("shape", message);
         }
-        if plant.plugin.is_some() && !matches!(self.shape, ShapeName::Plugin | ShapeName::External) {
-            return refuse(
-                "shape",
-                format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"),
-            );
-        }
-        if plant.plugin.is_none() && self.shape == ShapeName::Plugin {
-            return refuse("shape", "is \"plugin\", but the plant is none".to_owned());
-        }
-        let known = matches!(self.shape, ShapeName::Expression | ShapeName::External | ShapeName::Plugin);
-        if plant.reference().is_none() && !known {
+        self.check_plugin(path, plant)?;
+        let any = [ShapeName::Expression, ShapeName::External, ShapeName::Plugin];
+        if plant.reference().is_none() && !any.contains(&self.shape) {
             return refuse(
                 "shape",
                 format!("is {shape:?}, which is for the plants that have a name; give an `expression`"),
@@ -354,9 +346,8 @@ impl BarrierSection {
         if self.shape.has(Field::Angle) {
             self.angle.get_or_insert(0.0);
         }
-        if self.shape == ShapeName::Plugin {
-            self.complete_output(path, plant)?;
-        } else if self.shape.has(Field::Unit) {
+        self.complete_output(path, plant)?;
+        if self.shape.has(Field::Unit) {
             check_unit(&format!("{path}.unit"), self.unit.get_or_insert("1".to_owned()))?;
         }
         external::check_degree(path, self.relative_degree)?;

@@ -12,8 +12,8 @@ use punctual_models::evaluated::{Code, CodeModel, Dimensions};
 
 use super::model::check_variable;
 use super::{
-    BarrierSection, ConfigurationError, ParameterSection, PlantSection, Range, VariableSection,
-    check_identifier, check_unit,
+    BarrierSection, ConfigurationError, ParameterSection, PlantSection, Range, ShapeName, VariableSection,
+    check_identifier,
 };
 
 /// What a plug-in says of itself, and its code, which stays loaded as long as this is there.
@@ -167,12 +167,27 @@ impl PlantSection {
 }
 
 impl BarrierSection {
-    /// Takes over what the plug-in says of the barrier.
+    /// Refuses a shape that is not for plug-ins where the plant is one, and theirs elsewhere.
+    pub(super) fn check_plugin(&self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
+        let shape = self.shape.name();
+        let known = matches!(self.shape, ShapeName::Plugin | ShapeName::External);
+        let message = match plant.plugin {
+            Some(_) if !known => format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"),
+            None if self.shape == ShapeName::Plugin => format!("is {shape:?}, but the plant is none"),
+            _ => return Ok(()),
+        };
+        Err(ConfigurationError::new(format!("{path}.shape"), message))
+    }
+
+    /// Takes over what the plug-in says of the barrier, if it has it.
     pub(super) fn complete_output(
         &mut self,
         path: &str,
         plant: &PlantSection,
     ) -> Result<(), ConfigurationError> {
+        if self.shape != ShapeName::Plugin {
+            return Ok(());
+        }
         let output = self.output.get_or_insert_with(|| self.name.clone());
         let known = plant.plugin_barriers();
         let Some(barrier) = known.iter().find(|b| b.name == *output) else {
@@ -187,7 +202,7 @@ impl BarrierSection {
             let message = format!("is {unit:?}, but the plug-in gives {:?}", barrier.unit);
             return Err(ConfigurationError::new(format!("{path}.unit"), message));
         }
-        check_unit(&format!("{path}.unit"), unit)
+        Ok(())
     }
 
     /// Which of the plug-in's barriers it is.
