@@ -4,7 +4,7 @@
 use std::env;
 
 /// Functions with versions newer than 2.17, which the linker redirects to `__wrap_<name>`.
-const NEWER: [&str; 13] = [
+const NEWER: [&str; 17] = [
     "hypot",
     "exp",
     "log",
@@ -14,6 +14,10 @@ const NEWER: [&str; 13] = [
     "pthread_key_create",
     "pthread_key_delete",
     "pthread_setspecific",
+    "dlopen",
+    "dlsym",
+    "dlclose",
+    "dlerror",
     "gettid",
     "statx",
     "getrandom",
@@ -32,6 +36,9 @@ fn main() {
     for name in NEWER {
         println!("cargo::rustc-cdylib-link-arg=-Wl,--wrap={name}");
     }
-    // Before 2.34 threads had a library of their own; since then an empty one has its name.
-    println!("cargo::rustc-cdylib-link-arg=-Wl,--push-state,--no-as-needed,-l:libpthread.so.0,--pop-state");
+    // Before 2.34 threads and the loading of libraries had libraries of their own; since then empty ones have
+    // their names.
+    println!(
+        "cargo::rustc-cdylib-link-arg=-Wl,--push-state,--no-as-needed,-l:libpthread.so.0,-l:libdl.so.2,--pop-state"
+    );
 }

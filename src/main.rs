@@ -36,6 +36,9 @@ enum Command {
     /// The part of `validate` that may crash, in a process of its own
     #[command(hide = true)]
     Trial(validate::TrialArguments),
+    /// A plug-in, loaded in a process of its own
+    #[command(hide = true)]
+    TryPlugin(build::TryPluginArguments),
 }
 
 fn main() -> ExitCode {
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => inspect::execute(&arguments),
         Command::Validate(arguments) => validate::execute(&arguments),
         Command::Trial(arguments) => validate::execute_trial(&arguments),
+        Command::TryPlugin(arguments) => build::execute_try_plugin(&arguments),
     };
     match result {
         Ok(code) => code,

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each benchmark uses a part")]
 
+pub(crate) mod sources;
+
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 use punctual_core::dynamics::ControlAffine;

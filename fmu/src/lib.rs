@@ -10,7 +10,7 @@
 //! | [`block`] | what is computed: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
-//! | `abi` | the 34 exported functions: guard, convert, delegate. The only unsafe code |
+//! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |
 #![deny(unsafe_code)]
 
 #[cfg(not(panic = "unwind"))]
@@ -23,3 +23,5 @@ pub mod configuration;
 pub mod instance;
 pub mod product;
 pub mod state;
+
+pub use abi::{PluginFolder, file_name as plugin_file_name};

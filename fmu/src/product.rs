@@ -81,6 +81,7 @@ impl Product {
             }
             Configuration::Plant(c) => match c.plant.reference() {
                 Some(plant) => format!("Reference plant: {}", plant.model.title()),
+                None if c.plant.plugin.is_some() => "Plant given by a plug-in".to_owned(),
                 None => "Plant given by expressions".to_owned(),
             },
             Configuration::Controller(c) => {

@@ -90,7 +90,7 @@ pub use description::{
     NamingConvention,
 };
 pub use error::Error;
-pub use names::{is_c_identifier, is_structured_name};
+pub use names::{PLATFORM, is_c_identifier, is_structured_name};
 pub use system_structure::{
     Connector, ConnectorKind, ParameterSet, ParameterValue, SystemComponent, SystemConnection,
     SystemStructure,

@@ -43,12 +43,16 @@
 //! | `affine` | whether inputs enter linearly |
 //! | `programme` | trees to one list of operations, constants folded, equal ones merged |
 //! | `series` | Taylor coefficients of a list of operations |
-//! | `model` | plants and barriers |
+//! | `motion` | the motion of a plant, and the series of a barrier along it |
+//! | `evaluated` | plants and barriers that somebody else's code computes |
+//! | `model` | plants and barriers of expressions |
 #![forbid(unsafe_code)]
 
 mod affine;
 mod error;
+pub mod evaluated;
 mod model;
+mod motion;
 mod programme;
 mod series;
 mod syntax;

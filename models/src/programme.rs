@@ -73,13 +73,13 @@ impl Operation {
         }
     }
 
-    fn results(self) -> usize {
+    pub(crate) fn results(self) -> usize {
         if matches!(self, Self::SinCos(_) | Self::Tanh(_)) { 2 } else { 1 }
     }
 }
 
 /// An operation and the register of its first result; a second one follows it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
     pub(crate) to: Register,
@@ -125,29 +125,6 @@ impl Programme {
         Self { steps: Vec::new(), registers: variables, known: HashMap::new() }
     }
 
-    /// The register with a value.
-    pub(crate) fn register(&mut self, value: Value) -> Register {
-        match value {
-            Value::Register(register) => register,
-            Value::Number(number) => self.done(Operation::Constant(number.to_bits())),
-        }
-    }
-
-    fn done(&mut self, operation: Operation) -> Register {
-        if let Some(&register) = self.known.get(&operation) {
-            return register;
-        }
-        let to = self.registers;
-        self.registers += operation.results();
-        self.steps.push(Step { operation, to });
-        self.known.insert(operation, to);
-        to
-    }
-
-    fn of(&mut self, operation: Operation) -> Value {
-        Value::Register(self.done(operation))
-    }
-
     /// Adds the operations of `tree`; `resolve` says what a name stands for.
     ///
     /// # Errors
@@ -187,6 +164,37 @@ impl Programme {
                 Ok(self.call(function, a, b.unwrap_or(a)))
             }
         }
+    }
+}
+
+impl Record for Programme {
+    fn done(&mut self, operation: Operation) -> Register {
+        if let Some(&register) = self.known.get(&operation) {
+            return register;
+        }
+        let to = self.registers;
+        self.registers += operation.results();
+        self.steps.push(Step { operation, to });
+        self.known.insert(operation, to);
+        to
+    }
+}
+
+/// Something that does operations, one after the other: operators and functions in terms of those.
+pub(crate) trait Record {
+    /// The register of the first result of `operation`.
+    fn done(&mut self, operation: Operation) -> Register;
+
+    /// The register with a value.
+    fn register(&mut self, value: Value) -> Register {
+        match value {
+            Value::Register(register) => register,
+            Value::Number(number) => self.done(Operation::Constant(number.to_bits())),
+        }
+    }
+
+    fn of(&mut self, operation: Operation) -> Value {
+        Value::Register(self.done(operation))
     }
 
     fn negate(&mut self, a: Value) -> Value {

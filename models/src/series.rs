@@ -31,6 +31,16 @@ impl<C: Scalar> Series<C> {
         Self { coefficients: vec![C::zero(); registers * orders], orders }
     }
 
+    /// How many registers there are.
+    pub(crate) fn registers(&self) -> usize {
+        self.coefficients.len() / self.orders
+    }
+
+    /// Makes room for `registers`, with zeros.
+    pub(crate) fn grow(&mut self, registers: usize) {
+        self.coefficients.resize(registers * self.orders, C::zero());
+    }
+
     #[inline]
     pub(crate) fn get(&self, register: Register, k: usize) -> C {
         self.coefficients[register * self.orders + k]
@@ -70,10 +80,16 @@ impl<C: Scalar> Series<C> {
 
     /// Does `steps` for the coefficients of order `k`, after those below it.
     pub(crate) fn advance(&mut self, steps: &[Step], k: usize) {
-        for &Step { operation, to } in steps {
-            let value = if k == 0 { self.first(operation, to) } else { self.next(operation, to, k) };
-            self.set(to, k, value);
+        for step in steps {
+            self.advance_one(step, k);
         }
+    }
+
+    /// Does one step for the coefficient of order `k`.
+    #[inline]
+    pub(crate) fn advance_one(&mut self, &Step { operation, to }: &Step, k: usize) {
+        let value = if k == 0 { self.first(operation, to) } else { self.next(operation, to, k) };
+        self.set(to, k, value);
     }
 
     /// The coefficient of order 0.

@@ -43,6 +43,25 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Arguments of `punctual try-plugin`.
+#[derive(Debug, clap::Args)]
+pub struct TryPluginArguments {
+    /// The configuration file
+    configuration: PathBuf,
+    /// Where to leave the journal
+    folder: PathBuf,
+}
+
+/// The part of reading a configuration that may crash.
+///
+/// # Errors
+///
+/// What is wrong with the configuration or its plug-in.
+pub fn execute_try_plugin(arguments: &TryPluginArguments) -> Result<ExitCode, Error> {
+    package::plugin::perform(&arguments.configuration, &arguments.folder)?;
+    Ok(ExitCode::SUCCESS)
+}
+
 fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
     if arguments.library.is_some() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";

@@ -49,21 +49,6 @@ const URI_PATH: &AsciiSet = &CONTROLS
     .add(b'|')
     .add(b'}');
 
-/// The folder of this platform's binaries inside an FMI 2.0 archive.
-pub const PLATFORM: &str = if cfg!(target_os = "windows") {
-    if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
-} else if cfg!(target_os = "macos") {
-    "darwin64"
-} else if cfg!(all(target_os = "linux", target_arch = "x86_64")) {
-    "linux64"
-} else if cfg!(all(target_os = "linux", target_arch = "x86")) {
-    "linux32"
-} else if cfg!(all(target_os = "linux", target_arch = "aarch64")) {
-    "aarch64-linux"
-} else {
-    "unknown"
-};
-
 /// An unpacked archive.
 #[derive(Debug)]
 pub struct Archive {
@@ -159,7 +144,7 @@ impl Archive {
     /// Where this platform's shared library should be.
     pub(super) fn library(&self, model_identifier: &str) -> PathBuf {
         let file = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
-        self.directory.path().join("binaries").join(PLATFORM).join(file)
+        self.directory.path().join("binaries").join(super::PLATFORM).join(file)
     }
 
     /// The `fmuResourceLocation` for `fmi2Instantiate`: `file:///…/resources`, percent-encoded.

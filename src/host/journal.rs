@@ -86,7 +86,7 @@ pub fn finish() {
 
 /// Says which call comes next.
 #[inline]
-pub(super) fn entering(call: &str, instance: &str, fmu: &Path, time: Option<f64>) {
+pub fn entering(call: &str, instance: &str, fmu: &Path, time: Option<f64>) {
     if JOURNAL.get().is_some() {
         write(call, instance, &fmu.to_string_lossy(), time);
     }

@@ -17,11 +17,11 @@ use std::path::Path;
 
 pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
-    MAX_UNPACKED_BYTES, PLATFORM, SMALL_BYTES,
+    MAX_UNPACKED_BYTES, SMALL_BYTES,
 };
 pub use description::{Capabilities, DefaultExperiment, Description, Item, Kind, Output, Variable};
 pub use logging::LogMessage;
-pub use punctual_modeldescription::{Causality, Variability};
+pub use punctual_modeldescription::{Causality, PLATFORM, Variability};
 pub use slave::Slave;
 
 use library::Library;

@@ -4,6 +4,7 @@
 
 mod documentation;
 pub mod library;
+pub mod plugin;
 pub mod system;
 
 use std::path::Path;
@@ -19,14 +20,14 @@ use crate::host::{Fmu, PLATFORM, Slave};
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
 
-/// Reads a configuration file and completes it.
+/// Reads a configuration file and completes it. A plug-in is tried in a process of its own before it is loaded here.
 ///
 /// # Errors
 ///
 /// A file that cannot be read, or a configuration that cannot be used (naming the file and field).
 pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
-    Configuration::parse(&text).map_err(|e| Error::from(e).in_file(path))
+    let loader = plugin::Tried::of(path);
+    plugin::read(path, &loader)
 }
 
 /// What cannot be written, as it is told.
@@ -47,7 +48,7 @@ fn timestamp() -> Result<Timestamp, Error> {
 ///
 /// # Errors
 ///
-/// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold.
+/// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold; a plug-in that cannot be read.
 pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
     let broken = |e: punctual_modeldescription::Error| broken(&e);
     let timestamp = timestamp()?;
@@ -55,6 +56,11 @@ pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
     let canonical = product.configuration.canonical()?;
     let page = documentation::page(product, &description, &canonical);
     let suffix = std::env::consts::DLL_SUFFIX;
+    let plugin = product.configuration.plugin();
+    let plugin = plugin.map(|plugin| {
+        let bytes = std::fs::read(&plugin.path).map_err(|e| Error::io("read", &plugin.path, e))?;
+        Ok::<_, Error>((format!("resources/{PLATFORM}/{}", plugin.file), bytes))
+    });
     let library = format!("binaries/{PLATFORM}/{}{suffix}", description.co_simulation.model_identifier);
     let mut archive = Archive::new().with_timestamp(timestamp);
     archive.add("modelDescription.xml", description.to_xml().map_err(broken)?).map_err(broken)?;
@@ -62,6 +68,9 @@ pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
     archive.add("documentation/index.html", page).map_err(broken)?;
     archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
     archive.add(&library, binary).map_err(broken)?;
+    if let Some((place, bytes)) = plugin.transpose()? {
+        archive.add(&place, bytes).map_err(broken)?;
+    }
     Ok(archive)
 }
 

@@ -53,6 +53,10 @@ version! {
     "pthread_key_create" "GLIBC_2.2.5"
     "pthread_key_delete" "GLIBC_2.2.5"
     "pthread_setspecific" "GLIBC_2.2.5"
+    "dlopen" "GLIBC_2.2.5"
+    "dlsym" "GLIBC_2.2.5"
+    "dlclose" "GLIBC_2.2.5"
+    "dlerror" "GLIBC_2.2.5"
 }
 status! {
     "stat64" "__xstat64"

@@ -12,6 +12,7 @@
 mod glibc;
 mod guard;
 mod logger;
+mod plugin;
 mod resources;
 mod states;
 mod types;
@@ -19,6 +20,8 @@ mod unsupported;
 
 use std::ffi::{CString, c_int};
 use std::ptr;
+
+pub use plugin::{PluginFolder, file_name};
 
 use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
 use logger::Logger;

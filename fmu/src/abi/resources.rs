@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use percent_encoding::percent_decode_str;
+use punctual_modeldescription::PLATFORM;
 
+use super::plugin::PluginFolder;
 use crate::configuration::{Configuration, RESOURCE};
 
 /// Reads the configuration below `location`, a `file:` URI (one to four slashes, with or without a
@@ -13,7 +15,8 @@ pub(super) fn configuration(location: &str) -> Result<Configuration, String> {
     let path = folder.join(RESOURCE);
     let text = std::fs::read_to_string(&path)
         .map_err(|e| format!("cannot read {} (fmuResourceLocation {location:?}): {e}", path.display()))?;
-    Configuration::parse(&text).map_err(|e| format!("{}: {e}", path.display()))
+    let plugins = PluginFolder::new(folder.join(PLATFORM));
+    Configuration::parse_with(&text, &plugins).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 fn folder(location: &str) -> Result<PathBuf, String> {

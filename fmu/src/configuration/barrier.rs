@@ -53,7 +53,7 @@ pub enum InfeasibleName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeName {
-    /// Not said: `external` where the plant is not known, `expression` where there is one, else `disc`. Not in a completed configuration.
+    /// Not said: `plugin` where the plant is one, `external` where the plant is not known, `expression` where there is one, else `disc`. Not in a completed configuration.
     #[default]
     #[serde(skip)]
     Unstated,
@@ -81,6 +81,8 @@ pub enum ShapeName {
     SpeedLimit,
     /// Where an expression of states and time is ≥ 0.
     Expression,
+    /// Of the plant's plug-in.
+    Plugin,
     /// Of which the derivatives are inputs of the FMU ([`punctual_core::lie::external`]).
     External,
 }
@@ -99,12 +101,13 @@ enum Field {
     State,
     Bound,
     Expression,
+    Output,
     Unit,
     RelativeDegree,
 }
 
 impl Field {
-    const ALL: [(Self, &'static str); 13] = [
+    const ALL: [(Self, &'static str); 14] = [
         (Self::Centre, "centre"),
         (Self::Velocity, "velocity"),
         (Self::Radius, "radius"),
@@ -116,6 +119,7 @@ impl Field {
         (Self::State, "state"),
         (Self::Bound, "bound"),
         (Self::Expression, "expression"),
+        (Self::Output, "output"),
         (Self::Unit, "unit"),
         (Self::RelativeDegree, "relative_degree"),
     ];
@@ -144,6 +148,7 @@ impl ShapeName {
             Self::AtLeast => ("at_least", &[State, Bound]),
             Self::SpeedLimit => ("speed_limit", &[Bound]),
             Self::Expression => ("expression", &[Field::Expression, Field::Unit]),
+            Self::Plugin => ("plugin", &[Field::Output, Field::Unit]),
             Self::External => ("external", &[Field::RelativeDegree, Field::Unit]),
         }
     }
@@ -163,7 +168,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 pub struct BarrierSection {
     /// Its name, a C identifier, unique; prefix of its variables.
     pub name: String,
-    /// The shape. Default `external` where the plant has inputs only, `expression` where there is one, else `disc`.
+    /// The shape. Default `plugin` where the plant is one, `external` where the plant has inputs only, `expression` where there is one, else `disc`.
     #[serde(default)]
     pub shape: ShapeName,
     /// Discs, ellipses, rectangles: centre in m; of a moving disc where it is at time 0 of the simulation,
@@ -204,7 +209,10 @@ pub struct BarrierSection {
     /// `expression`: h, of states, parameters of the plant, and the time `t` in s of the simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<String>,
-    /// `expression` and `external`: the unit of h. Default `1`.
+    /// `plugin`: which of the plug-in's barriers. Default: the one that has its name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
+    /// `expression` and `external`: the unit of h. Default `1`. `plugin`: that of the plug-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// `external`: n, in 1 ..= 8: the order of the derivative of h that the inputs enter. Nobody checks it.
@@ -277,6 +285,7 @@ impl BarrierSection {
     pub(super) fn complete(&mut self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
         if self.shape == ShapeName::Unstated {
             self.shape = match self.expression {
+                _ if plant.plugin.is_some() => ShapeName::Plugin,
                 _ if plant.is_external() => ShapeName::External,
                 Some(_) => ShapeName::Expression,
                 None => ShapeName::Disc,
@@ -291,7 +300,9 @@ impl BarrierSection {
                 format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"");
             return refuse("shape", message);
         }
-        if plant.reference().is_none() && !matches!(self.shape, ShapeName::Expression | ShapeName::External) {
+        self.check_plugin(path, plant)?;
+        let any = [ShapeName::Expression, ShapeName::External, ShapeName::Plugin];
+        if plant.reference().is_none() && !any.contains(&self.shape) {
             return refuse(
                 "shape",
                 format!("is {shape:?}, which is for the plants that have a name; give an `expression`"),
@@ -310,10 +321,14 @@ impl BarrierSection {
                 Field::State => self.state.is_some(),
                 Field::Bound => self.bound.is_some(),
                 Field::Expression => self.expression.is_some(),
+                Field::Output => self.output.is_some(),
                 Field::Unit => self.unit.is_some(),
                 Field::RelativeDegree => self.relative_degree.is_some(),
             };
-            let optional = matches!(field, Field::Velocity | Field::Smoothing | Field::Angle | Field::Unit);
+            let optional = matches!(
+                field,
+                Field::Velocity | Field::Smoothing | Field::Angle | Field::Output | Field::Unit
+            );
             if given && !fields.contains(&field) {
                 let name = if name == "velocity" && self.centre_input { "centre_input" } else { name };
                 return refuse(name, format!("{shape} has none"));
@@ -331,6 +346,7 @@ impl BarrierSection {
         if self.shape.has(Field::Angle) {
             self.angle.get_or_insert(0.0);
         }
+        self.complete_output(path, plant)?;
         if self.shape.has(Field::Unit) {
             check_unit(&format!("{path}.unit"), self.unit.get_or_insert("1".to_owned()))?;
         }
@@ -361,7 +377,9 @@ impl BarrierSection {
                 let state = plant.states().into_iter().find(|s| Some(&s.name) == self.state.as_ref());
                 return state.map_or_else(|| "1".to_owned(), |s| s.unit);
             }
-            ShapeName::Expression | ShapeName::External => self.unit.as_deref().unwrap_or("1"),
+            ShapeName::Expression | ShapeName::External | ShapeName::Plugin => {
+                self.unit.as_deref().unwrap_or("1")
+            }
             _ => "m",
         };
         unit.to_owned()
@@ -526,7 +544,7 @@ impl BarrierSection {
     }
 
     /// Hands the shape to `visitor`, along a reference plant; a centre that is an input is at the states behind
-    /// the plant's. A barrier that is an expression or external is no shape, and taken for a disc here.
+    /// the plant's. A barrier that is an expression, a plug-in's or external is no shape, and taken for a disc here.
     pub(super) fn visit<V: Visitor>(
         &self,
         plant: ReferenceSection,
@@ -547,9 +565,11 @@ impl BarrierSection {
         let index = |name: &str| signals.iter().position(|s| s.name == name);
         let state = self.state.as_deref().and_then(index).unwrap_or(usize::MAX);
         Ok(match self.shape {
-            ShapeName::Disc | ShapeName::Unstated | ShapeName::Expression | ShapeName::External => {
-                visitor.shape(disc()?)
-            }
+            ShapeName::Disc
+            | ShapeName::Unstated
+            | ShapeName::Expression
+            | ShapeName::Plugin
+            | ShapeName::External => visitor.shape(disc()?),
             ShapeName::Obstacle => visitor.shape(Outside(disc()?)),
             ShapeName::QuadraticDisc => {
                 let disc = QuadraticDisc::new(centre, radius)?.moving(velocity)?;

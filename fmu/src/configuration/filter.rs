@@ -6,14 +6,14 @@ use punctual_core::MAX_ROWS;
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
-use punctual_core::lie::{self, RelativeDegree};
+use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
 use punctual_core::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range,
-    ReferenceSection, ShapeName, check_identifier,
+    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
+    Range, ReferenceSection, ShapeName, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -129,12 +129,12 @@ fn correction_limit() -> f64 {
 }
 
 impl FilterConfiguration {
-    pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
+    pub(super) fn completed(mut self, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
         if self.name.is_empty() {
             self.name = "filter".to_owned();
         }
         check_identifier("name", &self.name)?;
-        self.plant.complete()?;
+        self.plant.complete(loader)?;
         if self.barrier.is_empty() {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
         }
@@ -228,13 +228,27 @@ impl FilterConfiguration {
             let point = section.centre_input.then_some(first);
             next_point += section.inputs(&self.plant).len();
             let core = |e| self.refused(i, &punctual_core::Error::within(e, &section.name));
+            let refused = |e: punctual_models::Error| {
+                ConfigurationError::new(format!("barrier[{i}].{}", e.field()), e.message())
+            };
             builder = match self.plant.reference() {
                 _ if section.shape == ShapeName::External => self.add_external(builder, i, first)?,
+                _ if section.shape == ShapeName::Plugin => {
+                    let barrier = self.plant.code()?.barrier(section.output_index(&self.plant));
+                    let barrier = barrier.map_err(refused)?;
+                    let found = barrier.relative_degree(&self.plant.ranges());
+                    self.add_model(builder, i, found, |n| barrier.source(n).map_err(refused))?
+                }
                 Some(plant) if section.shape != ShapeName::Expression => {
                     let adding = Adding { configuration: self, plant, builder, index: i, point };
                     section.visit(plant, adding).map_err(core)??
                 }
-                _ => self.add_expression(builder, i)?,
+                _ => {
+                    let expression = section.expression.as_deref().unwrap_or_default();
+                    let barrier = self.plant.expressions()?.barrier(expression).map_err(refused)?;
+                    let found = barrier.relative_degree(&self.plant.ranges());
+                    self.add_model(builder, i, found, |n| barrier.source(n).map_err(refused))?
+                }
             };
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
@@ -368,27 +382,20 @@ impl FilterConfiguration {
             .map_err(|e| self.refused(index, &e))
     }
 
-    /// Adds barrier `index`, an expression.
-    fn add_expression(
+    /// Adds barrier `index`, of the relative degree `found`; `source` makes its derivatives.
+    fn add_model(
         &self,
         builder: FilterBuilder,
         index: usize,
+        found: RelativeDegree,
+        source: impl FnOnce(usize) -> Result<Box<dyn DerivativeSource>, ConfigurationError>,
     ) -> Result<FilterBuilder, ConfigurationError> {
         let section = &self.barrier[index];
-        let refused = |e: punctual_models::Error| {
-            ConfigurationError::new(format!("barrier[{index}].{}", e.field()), e.message())
-        };
         let named = |e: punctual_core::Error| self.refused(index, &e.within(&section.name));
-        let barrier = self.plant.expressions()?.barrier(section.expression.as_deref().unwrap_or_default());
-        let barrier = barrier.map_err(refused)?;
-        let states = self.plant.states();
-        let end = |value: Option<f64>, none: f64| value.unwrap_or(none);
-        let ranges: Vec<_> =
-            states.iter().map(|s| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)]).collect();
-        let n = barrier.relative_degree(&ranges).require(None).map_err(named)?;
-        let own: Vec<usize> = (0..states.len()).collect();
-        let dim = states.len() + self.barrier_inputs().len();
-        let source = lie::embedded(barrier.source(n).map_err(refused)?, dim, &own);
+        let n = found.require(None).map_err(named)?;
+        let own: Vec<usize> = (0..self.plant.states().len()).collect();
+        let dim = own.len() + self.barrier_inputs().len();
+        let source = lie::embedded(source(n)?, dim, &own);
         let settings = section.settings().map_err(named)?;
         builder.source(&section.name, source.map_err(named)?, settings).map_err(|e| self.refused(index, &e))
     }

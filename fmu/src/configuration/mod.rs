@@ -11,6 +11,7 @@ mod filter;
 mod model;
 mod parameter;
 mod plant;
+mod plugin;
 mod read;
 mod reference;
 mod unit;
@@ -22,12 +23,14 @@ pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
+pub use plugin::{Plugin, PluginLoader};
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};
 
 use serde::{Deserialize, Serialize};
 
+use plugin::NoPlugins;
 use unit::{check_unit, unit_per};
 
 /// The name of the canonical configuration inside an FMU's `resources/`.
@@ -60,7 +63,18 @@ impl Configuration {
     ///
     /// Text that is not TOML; an unknown key; a missing key; a value of the wrong type or outside its
     /// range: each with the field's path, the value and what is allowed.
+    ///
+    /// A plug-in is refused: there is no place to look for it.
     pub fn parse(text: &str) -> Result<Self, ConfigurationError> {
+        Self::parse_with(text, &NoPlugins)
+    }
+
+    /// As [`Self::parse`], with plug-ins, which `loader` finds.
+    ///
+    /// # Errors
+    ///
+    /// As there; a plug-in that cannot be used.
+    pub fn parse_with(text: &str, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
         // Reading in two steps keeps the path of a field in the message, which an enum would lose.
         #[derive(Deserialize)]
         struct Head {
@@ -78,8 +92,8 @@ impl Configuration {
             return Err(ConfigurationError::new("kind", message));
         };
         Ok(match kind {
-            Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed()?),
-            Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed()?),
+            Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed(loader)?),
+            Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed(loader)?),
             Kind::Controller => Self::Controller(read_toml::<ControllerConfiguration>(text)?.completed()?),
         })
     }
@@ -113,6 +127,15 @@ impl Configuration {
             Self::Filter(c) => &c.name,
             Self::Plant(c) => &c.name,
             Self::Controller(c) => &c.name,
+        }
+    }
+
+    /// The plug-in that its plant is, if it is one.
+    pub fn plugin(&self) -> Option<&Plugin> {
+        match self {
+            Self::Filter(c) => c.plant.loaded(),
+            Self::Plant(c) => c.plant.loaded(),
+            Self::Controller(_) => None,
         }
     }
 

@@ -8,6 +8,7 @@ use punctual_models::Model;
 use serde::{Deserialize, Serialize};
 
 use super::external::check_inputs as check_external_inputs;
+use super::plugin::{Loaded, PluginLoader};
 use super::{
     ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_identifier, check_unit,
 };
@@ -82,13 +83,22 @@ impl From<&Signal> for VariableSection {
 }
 
 /// `[plant]`: a reference plant (`model`, with its constants), a model of expressions (`states`, `inputs`,
-/// `parameters`, `derivatives`), or `inputs` alone, for a filter that is given the derivatives of its barriers.
+/// `parameters`, `derivatives`), a plug-in (`plugin`), or `inputs` alone, for a filter that is given the derivatives of its barriers.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantSection {
     /// Which reference plant. Default: none, the model is given by expressions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelName>,
+    /// The name of a plug-in, a shared library beside this file (`lib<name>.so`, `<name>.dll`, `lib<name>.dylib`);
+    /// states, inputs and parameters are its own, and given here only to change ranges and values. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plugin: Option<String>,
+    /// What the plug-in's bytes must come to. Default: whatever they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plugin_digest: Option<String>,
+    #[serde(skip)]
+    pub(super) loaded: Option<Loaded>,
     /// As [`ReferenceSection::l_r`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub l_r: Option<f64>,
@@ -116,18 +126,22 @@ impl PlantSection {
         Some(ReferenceSection { model, l_r: self.l_r, l_f: self.l_f })
     }
 
-    /// Its name in messages: that of the reference plant, or `expressions`.
+    /// Its name in messages: that of the reference plant, or what it is instead.
     pub fn name(&self) -> &'static str {
-        let unnamed = if self.is_external() { "external" } else { "expressions" };
+        let unnamed = match self.plugin {
+            Some(_) => "a plug-in",
+            None if self.is_external() => "external",
+            None => "expressions",
+        };
         self.model.map_or(unnamed, ModelName::name)
     }
 
     /// What it is, for a human.
     pub fn title(&self) -> &'static str {
-        let unnamed = if self.is_external() {
-            "plant whose simulator computes the derivatives"
-        } else {
-            "plant given by expressions"
+        let unnamed = match self.plugin {
+            Some(_) => "plant given by a plug-in",
+            None if self.is_external() => "plant whose simulator computes the derivatives",
+            None => "plant given by expressions",
         };
         self.model.map_or(unnamed, ModelName::title)
     }
@@ -135,7 +149,7 @@ impl PlantSection {
     /// Whether nothing is known of it but its inputs.
     pub fn is_external(&self) -> bool {
         let unknown = self.states.is_empty() && self.parameters.is_empty() && self.derivatives.is_empty();
-        self.model.is_none() && unknown && !self.inputs.is_empty()
+        self.model.is_none() && self.plugin.is_none() && unknown && !self.inputs.is_empty()
     }
 
     /// The states, in order.
@@ -170,15 +184,19 @@ impl PlantSection {
         }
     }
 
-    pub(super) fn complete(&mut self) -> Result<(), ConfigurationError> {
+    pub(super) fn complete(&mut self, loader: &dyn PluginLoader) -> Result<(), ConfigurationError> {
         let refuse =
             |field: &str, message: String| Err(ConfigurationError::new(format!("plant.{field}"), message));
         let given = [
+            ("plugin", self.plugin.is_some()),
             ("states", !self.states.is_empty()),
             ("inputs", !self.inputs.is_empty()),
             ("parameters", !self.parameters.is_empty()),
             ("derivatives", !self.derivatives.is_empty()),
         ];
+        if self.plugin_digest.is_some() && self.plugin.is_none() {
+            return refuse("plugin_digest", "given without `plugin`".into());
+        }
         if let Some(mut reference) = self.reference() {
             if let Some((field, _)) = given.iter().find(|(_, given)| *given) {
                 let message = format!("given beside `model`; {} has its own", reference.model.name());
@@ -190,11 +208,11 @@ impl PlantSection {
         }
         for (field, value) in [("l_r", self.l_r), ("l_f", self.l_f)] {
             if value.is_some() {
-                return refuse(
-                    field,
-                    "is a constant of the bicycle; a model of expressions has `parameters`".into(),
-                );
+                return refuse(field, "is a constant of the bicycle; other models have `parameters`".into());
             }
+        }
+        if let Some(name) = self.plugin.clone() {
+            return self.complete_plugin(&name, loader);
         }
         if given.iter().all(|(_, given)| !given) {
             return refuse(
@@ -211,14 +229,7 @@ impl PlantSection {
         if self.is_external() {
             return check_external_inputs(self);
         }
-        for (i, p) in self.parameters.iter().enumerate() {
-            let path = format!("plant.parameters[{i}]");
-            check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
-            if RESERVED.contains(&p.name.as_str()) {
-                let message = format!("is {:?}, which is already the name of something else", p.name);
-                return Err(ConfigurationError::new(format!("{path}.name"), message));
-            }
-        }
+        self.check_parameters()?;
         if let Some(unknown) = self.derivatives.keys().find(|k| self.states.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = self.states.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown state, must be one of {}", names.join(", "));
@@ -229,6 +240,25 @@ impl PlantSection {
         }
         self.expressions()?;
         Ok(())
+    }
+
+    pub(super) fn check_parameters(&self) -> Result<(), ConfigurationError> {
+        for (i, p) in self.parameters.iter().enumerate() {
+            let path = format!("plant.parameters[{i}]");
+            check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
+            if RESERVED.contains(&p.name.as_str()) {
+                let message = format!("is {:?}, which is already the name of something else", p.name);
+                return Err(ConfigurationError::new(format!("{path}.name"), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// For each state the range in which it is meant to be, or infinite.
+    pub(super) fn ranges(&self) -> Vec<[f64; 2]> {
+        let end = |value: Option<f64>, none: f64| value.unwrap_or(none);
+        let range = |s: VariableSection| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)];
+        self.states().into_iter().map(range).collect()
     }
 
     /// The plant as a model of expressions.
@@ -276,6 +306,7 @@ impl PlantSection {
     pub fn build(&self) -> Result<Box<dyn DynPlant>, ConfigurationError> {
         match self.reference() {
             Some(reference) => reference.build(),
+            None if self.plugin.is_some() => Ok(self.code()?.plant()),
             None => Ok(self.expressions()?.plant()),
         }
     }
@@ -285,7 +316,12 @@ fn texts(names: &[String]) -> Vec<&str> {
     names.iter().map(String::as_str).collect()
 }
 
-fn check_variable(path: &str, name: &str, unit: &str, range: Range) -> Result<(), ConfigurationError> {
+pub(super) fn check_variable(
+    path: &str,
+    name: &str,
+    unit: &str,
+    range: Range,
+) -> Result<(), ConfigurationError> {
     check_identifier(&format!("{path}.name"), name)?;
     check_unit(&format!("{path}.unit"), unit)?;
     for (side, value) in [("min", range.min), ("max", range.max)] {

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use punctual_core::dynamics::DynPlant;
 use serde::{Deserialize, Serialize};
 
-use super::{ConfigurationError, ExperimentSection, Parameter, PlantSection, Range, check_identifier};
+use super::{
+    ConfigurationError, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, check_identifier,
+};
 
 /// `[integration]`: how the plant moves between communication points.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
@@ -113,12 +115,12 @@ pub struct PlantConfiguration {
 }
 
 impl PlantConfiguration {
-    pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
+    pub(super) fn completed(mut self, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
         if self.name.is_empty() {
             self.name = self.plant.reference().map_or("plant", |r| r.model.name()).to_owned();
         }
         check_identifier("name", &self.name)?;
-        self.plant.complete()?;
+        self.plant.complete(loader)?;
         let states = self.plant.states();
         if let Some(unknown) = self.x0.keys().find(|k| states.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();

@@ -105,7 +105,7 @@ fn defects() {
         (
             "[plant]\n",
             "[plant]\nl_r = 1.0\n",
-            "plant.l_r: is a constant of the bicycle; a model of expressions has `parameters`",
+            "plant.l_r: is a constant of the bicycle; other models have `parameters`",
         ),
         (
             "expression = \"p - d\"",

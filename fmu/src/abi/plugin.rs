@@ -1,0 +1,335 @@
+//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them.
+
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::ffi::{CStr, c_char, c_void};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use libloading::Library;
+use punctual_models::evaluated::{Calculator, Code, Dimensions, Number};
+use uuid::Uuid;
+
+use super::guard::catch;
+use crate::configuration::{ParameterSection, Plugin, PluginLoader, VariableSection};
+
+/// `PUNCTUAL_ABI`.
+const ABI: u32 = 1;
+/// Most parameters of a model.
+const MAX_PARAMETERS: u32 = 256;
+/// Longest text that is read.
+const MAX_TEXT: usize = 4096;
+
+/// `punctual_calculator`.
+#[repr(C)]
+struct RawCalculator {
+    host: *mut c_void,
+    apply: extern "C" fn(*mut c_void, u32, Number, Number, f64) -> Number,
+    value: extern "C" fn(*mut c_void, Number) -> f64,
+}
+
+/// `punctual_variable`.
+#[repr(C)]
+struct RawVariable {
+    name: *const c_char,
+    unit: *const c_char,
+    description: *const c_char,
+    minimum: f64,
+    maximum: f64,
+    start: f64,
+}
+
+type Initialize = unsafe extern "C" fn() -> *const c_char;
+/// Calculator, parameters, x, f, g.
+type Plant = unsafe extern "C" fn(*const RawCalculator, *const f64, *const Number, *mut Number, *mut Number);
+/// Calculator, index, parameters, t, x.
+type Barrier = unsafe extern "C" fn(*const RawCalculator, u32, *const f64, Number, *const Number) -> Number;
+
+/// The first two fields of every version.
+#[repr(C)]
+#[derive(Clone, Copy)]
+struct Head {
+    abi: u32,
+    size: u32,
+}
+
+/// `punctual_model_description`.
+#[repr(C)]
+#[derive(Clone, Copy)]
+struct RawModel {
+    head: Head,
+    states: u32,
+    inputs: u32,
+    parameters: u32,
+    barriers: u32,
+    state: *const RawVariable,
+    input: *const RawVariable,
+    parameter: *const RawVariable,
+    barrier: *const RawVariable,
+    initialize: Option<Initialize>,
+    plant: Option<Plant>,
+    barrier_value: Option<Barrier>,
+}
+
+type GetModel = unsafe extern "C" fn() -> *const RawModel;
+
+/// The name of the export.
+const SYMBOL: &str = "punctual_model";
+
+/// The folder in which plug-ins are looked for.
+pub struct PluginFolder {
+    folder: PathBuf,
+    watch: fn(&Path, &str),
+}
+
+impl PluginFolder {
+    /// Plug-ins in `folder`.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), watch: |_, _| {} }
+    }
+
+    /// `watch` is told the file and what is done with it, before it is done: whoever watches this process knows
+    /// then where it ended.
+    #[must_use]
+    pub fn watched(self, watch: fn(&Path, &str)) -> Self {
+        Self { watch, ..self }
+    }
+
+    /// Where the plug-in `name` is.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(file_name(name))
+    }
+}
+
+/// The name of the file of the plug-in `name` on this platform.
+pub fn file_name(name: &str) -> String {
+    format!("{DLL_PREFIX}{name}{DLL_SUFFIX}")
+}
+
+impl PluginLoader for PluginFolder {
+    fn load(&self, name: &str) -> Result<Plugin, String> {
+        let (path, file) = (self.file(name), file_name(name));
+        let bytes = std::fs::read(&path)
+            .map_err(|e| format!("is {name:?}, but {} cannot be read: {e}", path.display()))?;
+        let digest = Uuid::new_v5(&Uuid::NAMESPACE_OID, &bytes).to_string();
+        drop(bytes);
+        loaded(&path, &file, self.watch)
+            .map(|plugin| Plugin { digest, file: file.clone(), ..plugin })
+            .map_err(|problem| format!("{file}: {problem}"))
+    }
+}
+
+#[cfg(unix)]
+fn open(path: &Path) -> Result<Library, libloading::Error> {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    // Without a folder the system would look elsewhere.
+    let path = if path.parent() == Some(Path::new("")) { Path::new(".").join(path) } else { path.to_owned() };
+    // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
+    let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }?;
+    Ok(library.into())
+}
+
+#[cfg(not(unix))]
+fn open(path: &Path) -> Result<Library, libloading::Error> {
+    // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
+    unsafe { Library::new(path) }
+}
+
+fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, String> {
+    watch(path, "its loading");
+    // The words of the system name a path of this machine and say why.
+    let library = open(path).map_err(|e| format!("cannot be loaded: {}", chain(&e)))?;
+    // SAFETY: the header gives the function of this name this type.
+    let symbol = unsafe { library.get::<GetModel>(SYMBOL) };
+    let get = *symbol.map_err(|_| format!("exports no {SYMBOL}, the function that makes it a plug-in"))?;
+    watch(path, SYMBOL);
+    // SAFETY: the function takes nothing and may be called at any time.
+    let model = unsafe { get() };
+    if model.is_null() {
+        return Err(format!("{SYMBOL} returned NULL"));
+    }
+    if !model.is_aligned() {
+        return Err(format!(
+            "{SYMBOL} returned an address that is not aligned to {} bytes",
+            align_of::<RawModel>()
+        ));
+    }
+    // SAFETY: not NULL, aligned, and every version begins with these fields.
+    let Head { abi, size } = unsafe { *model.cast::<Head>() };
+    if abi != ABI {
+        return Err(format!(
+            "abi is {abi}, must be {ABI}: compile it with the punctual_model.h of this version"
+        ));
+    }
+    if size as usize != size_of::<RawModel>() {
+        return Err(format!(
+            "size is {size}, must be {}, the size of punctual_model_description: compile it with the \
+             punctual_model.h of this version, unchanged",
+            size_of::<RawModel>()
+        ));
+    }
+    // SAFETY: version and size are those of this type.
+    let raw = unsafe { *model };
+    let dimensions = Dimensions {
+        states: raw.states as usize,
+        inputs: raw.inputs as usize,
+        barriers: raw.barriers as usize,
+    };
+    dimensions.check().map_err(|e| e.to_string())?;
+    if raw.parameters > MAX_PARAMETERS {
+        return Err(format!("parameters is {}, must be 0 to {MAX_PARAMETERS}", raw.parameters));
+    }
+    let plant = raw.plant.ok_or("plant is NULL")?;
+    if raw.barriers > 0 && raw.barrier_value.is_none() {
+        return Err(format!("barrier_value is NULL with barriers = {}", raw.barriers));
+    }
+    let states = variables("state", "states", raw.state, raw.states)?;
+    let inputs = variables("input", "inputs", raw.input, raw.inputs)?;
+    let parameters = variables("parameter", "parameters", raw.parameter, raw.parameters)?;
+    let barriers = variables("barrier", "barriers", raw.barrier, raw.barriers)?;
+    if let Some(initialize) = raw.initialize {
+        watch(path, "initialize");
+        // SAFETY: the header allows a call at any time after loading.
+        let refusal = unsafe { initialize() };
+        if let Some(refusal) = text("what initialize returned", refusal)? {
+            return Err(format!("initialize refused: {refusal}"));
+        }
+    }
+    watch(path, "plant or barrier_value");
+    let code = LoadedCode { plant, barrier: raw.barrier_value, states: states.len(), _library: library };
+    Ok(Plugin {
+        file: file.to_owned(),
+        path: path.to_owned(),
+        digest: String::new(),
+        states: states.into_iter().map(|v| v.0).collect(),
+        inputs: inputs.into_iter().map(|v| v.0).collect(),
+        parameters: parameters.into_iter().map(parameter).collect(),
+        barriers: barriers.into_iter().map(|v| VariableSection { min: None, max: None, ..v.0 }).collect(),
+        code: Arc::new(code),
+    })
+}
+
+/// `error` with its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        words += &format!(": {error}");
+        cause = error.source();
+    }
+    words
+}
+
+fn parameter((v, start): (VariableSection, f64)) -> ParameterSection {
+    let VariableSection { name, unit, description, min, max } = v;
+    ParameterSection { name, start, unit, description, min, max }
+}
+
+/// The `count` variables at `first`, each with its start value; `field` is the name of the list.
+fn variables(
+    field: &str,
+    counter: &str,
+    first: *const RawVariable,
+    count: u32,
+) -> Result<Vec<(VariableSection, f64)>, String> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    if first.is_null() {
+        return Err(format!("{field} is NULL with {counter} = {count}"));
+    }
+    if !first.is_aligned() {
+        return Err(format!("{field} is not aligned to {} bytes", align_of::<RawVariable>()));
+    }
+    // SAFETY: not NULL, aligned, and the header asks for as many as are counted, which are few.
+    let list = unsafe { std::slice::from_raw_parts(first, count as usize) };
+    let row = |(i, raw): (usize, &RawVariable)| {
+        let path = |part: &str| format!("{field}[{i}].{part}");
+        let name = text(&path("name"), raw.name)?.ok_or_else(|| format!("{} is NULL", path("name")))?;
+        let unit = text(&path("unit"), raw.unit)?.unwrap_or_else(|| "1".to_owned());
+        let description = text(&path("description"), raw.description)?.unwrap_or_default();
+        let none = raw.minimum == 0.0 && raw.maximum == 0.0;
+        let end = |value: f64, infinite: f64| (!none && value != infinite).then_some(value);
+        let (min, max) = (end(raw.minimum, f64::NEG_INFINITY), end(raw.maximum, f64::INFINITY));
+        Ok((VariableSection { name, unit, description, min, max }, raw.start))
+    };
+    list.iter().enumerate().map(row).collect()
+}
+
+/// The text at `pointer`; `None` for NULL.
+fn text(field: &str, pointer: *const c_char) -> Result<Option<String>, String> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: not NULL, and the header asks for a text that ends with zero.
+    let bytes = unsafe { CStr::from_ptr(pointer) };
+    let text = bytes.to_str().map_err(|_| format!("{field} is not UTF-8"))?;
+    match text.len() {
+        0..=MAX_TEXT => Ok(Some(text.to_owned())),
+        len => Err(format!("{field} has {len} bytes, must have at most {MAX_TEXT}")),
+    }
+}
+
+/// The functions of a plug-in, which is unloaded when nobody has them any more.
+struct LoadedCode {
+    plant: Plant,
+    barrier: Option<Barrier>,
+    states: usize,
+    _library: Library,
+}
+
+/// The operation for the code behind `host`.
+extern "C" fn apply(host: *mut c_void, operation: u32, a: Number, b: Number, literal: f64) -> Number {
+    let result = catch(|| {
+        // SAFETY: `called` made `host` of such a reference, which lives during the call.
+        let calculator = unsafe { &mut *host.cast::<&mut dyn Calculator>() };
+        calculator.apply(operation, a, b, literal)
+    });
+    // A number that nobody was given.
+    result.unwrap_or(Number::MAX)
+}
+
+/// The value for the code behind `host`.
+extern "C" fn value(host: *mut c_void, a: Number) -> f64 {
+    let result = catch(|| {
+        // SAFETY: as in `apply`.
+        let calculator = unsafe { &*host.cast::<&mut dyn Calculator>() };
+        calculator.value(a)
+    });
+    result.unwrap_or(f64::NAN)
+}
+
+/// Hands `calculator` to `body` as the code knows it.
+fn called<R>(mut calculator: &mut dyn Calculator, body: impl FnOnce(*const RawCalculator) -> R) -> R {
+    let raw = RawCalculator { host: (&raw mut calculator).cast(), apply, value };
+    body(&raw const raw)
+}
+
+impl Code for LoadedCode {
+    fn plant(
+        &self,
+        c: &mut dyn Calculator,
+        parameters: &[f64],
+        x: &[Number],
+        f: &mut [Number],
+        g: &mut [Number],
+    ) {
+        debug_assert!(x.len() == self.states && f.len() == self.states);
+        // SAFETY: the arrays have the lengths that the header promises; what the code does in them is its own.
+        called(c, |raw| unsafe {
+            (self.plant)(raw, parameters.as_ptr(), x.as_ptr(), f.as_mut_ptr(), g.as_mut_ptr());
+        });
+    }
+
+    fn barrier(
+        &self,
+        index: usize,
+        c: &mut dyn Calculator,
+        parameters: &[f64],
+        t: Number,
+        x: &[Number],
+    ) -> Number {
+        let Some(barrier) = self.barrier else { return Number::MAX };
+        // SAFETY: as above.
+        called(c, |raw| unsafe { barrier(raw, index as u32, parameters.as_ptr(), t, x.as_ptr()) })
+    }
+}

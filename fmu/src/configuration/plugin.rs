@@ -1,0 +1,292 @@
+//! `plant.plugin`: a plant and barriers that are compiled code, a shared library beside the configuration.
+//!
+//! What the library says of itself (names, units, ranges, parameters) is written into the completed configuration,
+//! with a number made from the library's bytes; so variables and GUID follow from that as for any plant, and a
+//! library that is exchanged afterwards is noticed.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use punctual_models::evaluated::{Code, CodeModel, Dimensions};
+
+use super::model::check_variable;
+use super::{
+    BarrierSection, ConfigurationError, ParameterSection, PlantSection, Range, ShapeName, VariableSection,
+    check_identifier,
+};
+
+/// What a plug-in says of itself, and its code, which stays loaded as long as this is there.
+#[derive(Clone)]
+pub struct Plugin {
+    /// Its file, without the folder: for messages.
+    pub file: String,
+    /// Its file.
+    pub path: PathBuf,
+    /// Made from its bytes: other bytes, another text.
+    pub digest: String,
+    /// The states, in order.
+    pub states: Vec<VariableSection>,
+    /// The inputs, in order.
+    pub inputs: Vec<VariableSection>,
+    /// The parameters, in order, with their defaults.
+    pub parameters: Vec<ParameterSection>,
+    /// Its barriers, in order; they have no range.
+    pub barriers: Vec<VariableSection>,
+    /// The functions.
+    pub code: Arc<dyn Code>,
+}
+
+/// Finds plug-ins by their names.
+pub trait PluginLoader {
+    /// The plug-in `name`, a C identifier.
+    ///
+    /// # Errors
+    ///
+    /// Why there is none that can be used.
+    fn load(&self, name: &str) -> Result<Plugin, String>;
+}
+
+/// For configurations without a place: refuses every plug-in.
+pub(super) struct NoPlugins;
+
+impl PluginLoader for NoPlugins {
+    fn load(&self, name: &str) -> Result<Plugin, String> {
+        Err(format!("is {name:?}, but this text is in no folder from which a plug-in could be loaded"))
+    }
+}
+
+/// A plug-in of a completed section.
+#[derive(Clone)]
+pub(super) struct Loaded(Arc<Plugin>);
+
+impl PartialEq for Loaded {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.digest == other.0.digest
+    }
+}
+
+impl fmt::Debug for Loaded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Loaded({:?})", self.0.file)
+    }
+}
+
+impl Plugin {
+    /// Whether its names, units and ranges are possible.
+    fn check(&self) -> Result<(), ConfigurationError> {
+        let groups = [("state", &self.states), ("input", &self.inputs), ("barrier", &self.barriers)];
+        let variables = groups.iter().flat_map(|(group, variables)| {
+            let row = |(i, v): (usize, &VariableSection)| {
+                (format!("{group}[{i}]"), v.name.clone(), v.unit.clone(), v.range())
+            };
+            variables.iter().enumerate().map(row).collect::<Vec<_>>()
+        });
+        let row = |(i, p): (usize, &ParameterSection)| {
+            (format!("parameter[{i}]"), p.name.clone(), p.unit.clone(), Range { min: p.min, max: p.max })
+        };
+        let all: Vec<_> = variables.chain(self.parameters.iter().enumerate().map(row)).collect();
+        for (i, (path, name, unit, range)) in all.iter().enumerate() {
+            check_variable(path, name, unit, *range)?;
+            if all[..i].iter().any(|other| other.1 == *name) {
+                let message = format!("is {name:?}, which is already the name of something else");
+                return Err(ConfigurationError::new(format!("{path}.name"), message));
+            }
+        }
+        for (i, p) in self.parameters.iter().enumerate() {
+            Range { min: p.min, max: p.max }.check(&format!("parameter[{i}].start"), p.start)?;
+        }
+        Ok(())
+    }
+}
+
+impl PlantSection {
+    /// Loads its plug-in and takes over what that says of itself, unless the section says otherwise where it may.
+    pub(super) fn complete_plugin(
+        &mut self,
+        name: &str,
+        loader: &dyn PluginLoader,
+    ) -> Result<(), ConfigurationError> {
+        let refuse = |message: String| Err(ConfigurationError::new("plant.plugin", message));
+        if !self.derivatives.is_empty() {
+            let message = "given beside `plugin`, which has its own";
+            return Err(ConfigurationError::new("plant.derivatives", message));
+        }
+        check_identifier("plant.plugin", name)?;
+        let plugin = loader.load(name).map_err(|e| ConfigurationError::new("plant.plugin", e))?;
+        if let Err(error) = plugin.check() {
+            return refuse(format!("{}: {error}", plugin.file));
+        }
+        let given = self.plugin_digest.get_or_insert_with(|| plugin.digest.clone());
+        if *given != plugin.digest {
+            let message = format!(
+                "is {given:?}, but {} has {:?}: it is not the file that this was made with",
+                plugin.file, plugin.digest
+            );
+            return Err(ConfigurationError::new("plant.plugin_digest", message));
+        }
+        merge("states", &mut self.states, &plugin.states)?;
+        merge("inputs", &mut self.inputs, &plugin.inputs)?;
+        merge_parameters(&mut self.parameters, &plugin.parameters)?;
+        self.loaded = Some(Loaded(Arc::new(plugin)));
+        self.check_parameters()?;
+        for (i, p) in self.parameters.iter().enumerate() {
+            let field = format!("plant.parameters[{i}].start");
+            Range { min: p.min, max: p.max }.check(&field, p.start)?;
+        }
+        self.code().map(drop)
+    }
+
+    /// The model of its plug-in, with its parameters.
+    ///
+    /// # Errors
+    ///
+    /// It has none; the code does what it must not.
+    pub(super) fn code(&self) -> Result<CodeModel, ConfigurationError> {
+        let Some(plugin) = self.loaded() else {
+            return Err(ConfigurationError::new("plant.plugin", "is not loaded"));
+        };
+        let dimensions = Dimensions {
+            states: plugin.states.len(),
+            inputs: plugin.inputs.len(),
+            barriers: plugin.barriers.len(),
+        };
+        let parameters = self.parameters.iter().map(|p| p.start).collect();
+        CodeModel::new(Arc::clone(&plugin.code), dimensions, parameters, &self.ranges())
+            .map_err(|e| ConfigurationError::new("plant.plugin", format!("{}: {e}", plugin.file)))
+    }
+
+    /// Its plug-in, if it is one.
+    pub(super) fn loaded(&self) -> Option<&Plugin> {
+        self.loaded.as_ref().map(|loaded| &*loaded.0)
+    }
+
+    fn plugin_barriers(&self) -> &[VariableSection] {
+        self.loaded().map_or(&[], |plugin| &plugin.barriers)
+    }
+}
+
+impl BarrierSection {
+    /// Refuses a shape that is not for plug-ins where the plant is one, and theirs elsewhere.
+    pub(super) fn check_plugin(&self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
+        let shape = self.shape.name();
+        let known = matches!(self.shape, ShapeName::Plugin | ShapeName::External);
+        let message = match plant.plugin {
+            Some(_) if !known => format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"),
+            None if self.shape == ShapeName::Plugin => format!("is {shape:?}, but the plant is none"),
+            _ => return Ok(()),
+        };
+        Err(ConfigurationError::new(format!("{path}.shape"), message))
+    }
+
+    /// Takes over what the plug-in says of the barrier, if it has it.
+    pub(super) fn complete_output(
+        &mut self,
+        path: &str,
+        plant: &PlantSection,
+    ) -> Result<(), ConfigurationError> {
+        if self.shape != ShapeName::Plugin {
+            return Ok(());
+        }
+        let output = self.output.get_or_insert_with(|| self.name.clone());
+        let known = plant.plugin_barriers();
+        let Some(barrier) = known.iter().find(|b| b.name == *output) else {
+            let names: Vec<_> = known.iter().map(|b| b.name.as_str()).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let message =
+                format!("is {output:?}, which is no barrier of the plug-in; its barriers are {names}");
+            return Err(ConfigurationError::new(format!("{path}.output"), message));
+        };
+        let unit = self.unit.get_or_insert_with(|| barrier.unit.clone());
+        if *unit != barrier.unit {
+            let message = format!("is {unit:?}, but the plug-in gives {:?}", barrier.unit);
+            return Err(ConfigurationError::new(format!("{path}.unit"), message));
+        }
+        Ok(())
+    }
+
+    /// Which of the plug-in's barriers it is.
+    pub(super) fn output_index(&self, plant: &PlantSection) -> usize {
+        let known = plant.plugin_barriers();
+        known.iter().position(|b| Some(&b.name) == self.output.as_ref()).unwrap_or(usize::MAX)
+    }
+}
+
+/// `own` unless it is not said, which `unsaid` is.
+fn fill<T: PartialEq>(own: &mut T, unsaid: &T, theirs: T) {
+    if own == unsaid {
+        *own = theirs;
+    }
+}
+
+/// Fills `own`, which is empty or has the names of `theirs` in their order; a range of its own it keeps.
+fn merge(
+    group: &str,
+    own: &mut Vec<VariableSection>,
+    theirs: &[VariableSection],
+) -> Result<(), ConfigurationError> {
+    if own.is_empty() {
+        *own = theirs.to_vec();
+        return Ok(());
+    }
+    let names = |list: &[VariableSection]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
+    if own.len() != theirs.len() || own.iter().zip(theirs).any(|(a, b)| a.name != b.name) {
+        let message = format!("are {}, but those of the plug-in are {}", names(own), names(theirs));
+        return Err(ConfigurationError::new(format!("plant.{group}"), message));
+    }
+    for (i, (own, theirs)) in own.iter_mut().zip(theirs).enumerate() {
+        let path = format!("plant.{group}[{i}]");
+        fill(&mut own.unit, &"1".to_owned(), theirs.unit.clone());
+        same_unit(&path, &own.unit, &theirs.unit)?;
+        fill(&mut own.description, &String::new(), theirs.description.clone());
+        fill(&mut own.min, &None, theirs.min);
+        fill(&mut own.max, &None, theirs.max);
+        check_variable(&path, &own.name, &own.unit, own.range())?;
+    }
+    Ok(())
+}
+
+/// Replaces `own` by `theirs` with the values that `own` gives.
+fn merge_parameters(
+    own: &mut Vec<ParameterSection>,
+    theirs: &[ParameterSection],
+) -> Result<(), ConfigurationError> {
+    let mut merged = theirs.to_vec();
+    for (i, given) in own.iter().enumerate() {
+        let path = format!("plant.parameters[{i}]");
+        let Some(place) = merged.iter_mut().find(|p| p.name == given.name) else {
+            let names: Vec<_> = theirs.iter().map(|p| p.name.as_str()).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let message = format!(
+                "is {:?}, which is no parameter of the plug-in; its parameters are {names}",
+                given.name
+            );
+            return Err(ConfigurationError::new(format!("{path}.name"), message));
+        };
+        if own[..i].iter().any(|other| other.name == given.name) {
+            let message = format!("is {:?}, which stands there twice", given.name);
+            return Err(ConfigurationError::new(format!("{path}.name"), message));
+        }
+        if given.unit != "1" {
+            same_unit(&path, &given.unit, &place.unit)?;
+        }
+        place.start = given.start;
+        place.min = given.min.or(place.min);
+        place.max = given.max.or(place.max);
+        if !given.description.is_empty() {
+            place.description.clone_from(&given.description);
+        }
+    }
+    *own = merged;
+    Ok(())
+}
+
+fn same_unit(path: &str, own: &str, theirs: &str) -> Result<(), ConfigurationError> {
+    if own == theirs {
+        return Ok(());
+    }
+    Err(ConfigurationError::new(
+        format!("{path}.unit"),
+        format!("is {own:?}, but the plug-in gives {theirs:?}"),
+    ))
+}

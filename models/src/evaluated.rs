@@ -1,0 +1,509 @@
+//! Plants and barriers that somebody else's code computes, such as a plug-in's: it is given numbers that it cannot
+//! look into, asks for operations on them, and these are done on Taylor coefficients.
+//!
+//! The code is run once for each order: the first call does its operations on the coefficients of order 0, the next
+//! one continues them to order 1, and so on, so that an operation costs what it costs in an expression. For this the
+//! code has to ask for the same operations whenever it is called at the same state; it may look at the values
+//! ([`Calculator::value`]), branch on them and look things up. What it asks for is written down at order 0 and
+//! compared afterwards.
+
+mod trial;
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use punctual_core::dynamics::DynPlant;
+use punctual_core::lie::{DerivativeSource, RelativeDegree};
+use punctual_core::scalar::Scalar;
+use punctual_core::{MAX_INPUTS, MAX_ROWS};
+
+use crate::motion::{self, Equations};
+use crate::programme::{Operation, Record, Register, Step, Value};
+use crate::series::Series;
+use crate::syntax::{Function, Operator};
+use crate::{Error, MAX_OPERATIONS, MAX_STATES};
+
+/// A number that is computed with: a name for it, to hand back.
+pub type Number = u32;
+
+/// In place of a [`Number`]: the plain number of the call.
+pub const LITERAL: Number = Number::MAX;
+
+/// What can be asked for, each by its place in this list.
+pub const OPERATIONS: [&str; 19] = [
+    "constant", "add", "subtract", "multiply", "divide", "power", "negate", "sqrt", "exp", "ln", "sin",
+    "cos", "tan", "atan", "atan2", "abs", "tanh", "min", "max",
+];
+
+/// What does the operations.
+pub trait Calculator {
+    /// The result of the operation numbered `operation` in [`OPERATIONS`] on `a`, and `b` where it takes two;
+    /// `literal` is what [`LITERAL`] stands for. What cannot be done gives something that is not a number.
+    fn apply(&mut self, operation: u32, a: Number, b: Number, literal: f64) -> Number;
+
+    /// The value of `a`, to branch on and to look up with; nothing that is made from it has derivatives.
+    fn value(&self, a: Number) -> f64;
+}
+
+/// The code of a model `ẋ = f(x) + g(x) u` with barriers: pure functions, that may be called on any thread.
+pub trait Code: Send + Sync {
+    /// Writes f(x), one number for each state, and g(x), state i and input j at `j * states + i`. Both come as zeros.
+    fn plant(
+        &self,
+        c: &mut dyn Calculator,
+        parameters: &[f64],
+        x: &[Number],
+        f: &mut [Number],
+        g: &mut [Number],
+    );
+
+    /// Barrier `index` at the time `t` and the state `x`.
+    fn barrier(
+        &self,
+        index: usize,
+        c: &mut dyn Calculator,
+        parameters: &[f64],
+        t: Number,
+        x: &[Number],
+    ) -> Number;
+}
+
+/// Numbers of states, inputs and barriers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dimensions {
+    /// Of x: 1 to [`MAX_STATES`].
+    pub states: usize,
+    /// Of u: 1 to [`MAX_INPUTS`].
+    pub inputs: usize,
+    /// At most [`MAX_ROWS`].
+    pub barriers: usize,
+}
+
+impl Dimensions {
+    /// Whether they are in range.
+    ///
+    /// # Errors
+    ///
+    /// The one that is not.
+    pub fn check(&self) -> Result<(), Error> {
+        for (field, count, range) in [
+            ("states", self.states, 1..=MAX_STATES),
+            ("inputs", self.inputs, 1..=MAX_INPUTS),
+            ("barriers", self.barriers, 0..=MAX_ROWS),
+        ] {
+            if !range.contains(&count) {
+                let message = format!("is {count}, must be {} to {}", range.start(), range.end());
+                return Err(Error::new(field, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A model by somebody's code.
+#[derive(Clone)]
+pub struct CodeModel {
+    equations: Evaluated,
+    barriers: usize,
+}
+
+impl fmt::Debug for CodeModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("CodeModel")
+    }
+}
+
+impl CodeModel {
+    /// The model that `code` computes with `parameters`, tried at [`samples`](punctual_core::lie::samples) of states within
+    /// `ranges`: there it is seen what memory it needs. Steps may do twice as many operations and 64 more.
+    ///
+    /// # Errors
+    ///
+    /// Dimensions out of range; a range missing; code that uses a number it was not given or asks for an operation
+    /// that there is not, for more than [`MAX_OPERATIONS`] of them, or for others when it is called again; a derivative
+    /// that differences of the values contradict at most of the samples.
+    pub fn new(
+        code: Arc<dyn Code>,
+        dimensions: Dimensions,
+        parameters: Vec<f64>,
+        ranges: &[[f64; 2]],
+    ) -> Result<Self, Error> {
+        dimensions.check()?;
+        let Dimensions { states, inputs, barriers } = dimensions;
+        if ranges.len() != states {
+            return Err(Error::new("ranges", format!("has {} entries, must have {states}", ranges.len())));
+        }
+        let mut equations = Evaluated {
+            code,
+            parameters,
+            states,
+            inputs,
+            barrier: 0,
+            growing: true,
+            registers: states + inputs + RESERVED,
+            x: (0..states as Number).collect(),
+            f: vec![0; states],
+            g: vec![0; states * inputs],
+            derivatives: vec![0; states],
+            steps: Vec::new(),
+            plant_steps: 0,
+            next: 0,
+            fault: None,
+        };
+        trial::run(&mut equations, barriers, ranges)?;
+        equations.growing = false;
+        equations.registers = (2 * equations.registers + 64).min(MAX_OPERATIONS + states + inputs + RESERVED);
+        equations.steps = Vec::new();
+        Ok(Self { equations, barriers })
+    }
+
+    /// The plant, to simulate.
+    pub fn plant(&self) -> Box<dyn DynPlant> {
+        motion::simulated(&self.equations)
+    }
+
+    /// Barrier number `index` of the code.
+    ///
+    /// # Errors
+    ///
+    /// There are not as many.
+    pub fn barrier(&self, index: usize) -> Result<CodeBarrier, Error> {
+        if index >= self.barriers {
+            return Err(Error::new("barrier", format!("is {index}, must be < {}", self.barriers)));
+        }
+        Ok(CodeBarrier { equations: Evaluated { barrier: index, ..self.equations.clone() } })
+    }
+}
+
+/// A barrier along a [`CodeModel`].
+#[derive(Clone)]
+pub struct CodeBarrier {
+    equations: Evaluated,
+}
+
+impl CodeBarrier {
+    /// The relative degree, found on [`samples`](punctual_core::lie::samples) of states within `ranges`.
+    pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
+        motion::relative_degree(&self.equations, &self.equations, ranges)
+    }
+
+    /// Its derivatives at relative degree `n`, for a filter.
+    ///
+    /// # Errors
+    ///
+    /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`](punctual_core::MAX_RELATIVE_DEGREE).
+    pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
+        motion::source(&self.equations, &self.equations, n)
+    }
+}
+
+/// Registers between those of the inputs and the first result: time, zero, one, not a number.
+const RESERVED: usize = 4;
+
+/// Why what code asked for could not be done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    Number(Number),
+    Operation(u32),
+    TooMany,
+    Different,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "uses a number that it was not given ({number})"),
+            Self::Operation(code) => {
+                write!(f, "asks for operation {code}, must be 0 to {}", OPERATIONS.len() - 1)
+            }
+            Self::TooMany => write!(f, "asks for more than {MAX_OPERATIONS} operations"),
+            Self::Different => {
+                f.write_str("asks for other operations when it is called again at the same state")
+            }
+        }
+    }
+}
+
+/// The operations of a model by code. Registers: states, inputs, [`RESERVED`], results.
+struct Evaluated {
+    code: Arc<dyn Code>,
+    parameters: Vec<f64>,
+    states: usize,
+    inputs: usize,
+    /// Which barrier.
+    barrier: usize,
+    /// Whether memory may be added.
+    growing: bool,
+    registers: usize,
+    x: Vec<Number>,
+    f: Vec<Number>,
+    g: Vec<Number>,
+    derivatives: Vec<Register>,
+    /// What was done at order 0.
+    steps: Vec<Step>,
+    /// How many of them belong to the plant.
+    plant_steps: usize,
+    /// The first register that they leave free.
+    next: Register,
+    fault: Option<Fault>,
+}
+
+impl Clone for Evaluated {
+    /// With room for the steps.
+    fn clone(&self) -> Self {
+        let mut steps = Vec::with_capacity(self.registers);
+        steps.extend_from_slice(&self.steps);
+        Self {
+            code: Arc::clone(&self.code),
+            parameters: self.parameters.clone(),
+            x: self.x.clone(),
+            f: self.f.clone(),
+            g: self.g.clone(),
+            derivatives: self.derivatives.clone(),
+            steps,
+            ..*self
+        }
+    }
+}
+
+impl Evaluated {
+    fn time(&self) -> Register {
+        self.states + self.inputs
+    }
+}
+
+/// One call of the code.
+struct Work<'a, C> {
+    series: &'a mut Series<C>,
+    steps: &'a mut Vec<Step>,
+    /// Which of the steps is next.
+    position: usize,
+    next: Register,
+    orders: Range<usize>,
+    /// Registers that the code is not given.
+    hidden: Range<Register>,
+    /// The reserved registers from this one on: zero, one, not a number.
+    zero: Register,
+    growing: bool,
+    fault: Option<Fault>,
+}
+
+impl<C: Scalar> Work<'_, C> {
+    fn not_a_number(&self) -> Register {
+        self.zero + 2
+    }
+
+    fn fail(&mut self, fault: Fault) -> Register {
+        self.fault.get_or_insert(fault);
+        self.not_a_number()
+    }
+
+    #[inline]
+    fn checked(&mut self, number: Number) -> Register {
+        let register = number as Register;
+        if register < self.next && !self.hidden.contains(&register) {
+            return register;
+        }
+        self.fail(Fault::Number(number))
+    }
+
+    fn operand(&mut self, number: Number, literal: f64) -> Value {
+        if number == LITERAL { Value::Number(literal) } else { Value::Register(self.checked(number)) }
+    }
+
+    fn constant(&mut self, number: f64) -> Register {
+        // Not −0, which is equal to 0.
+        if number.to_bits() == 0 {
+            self.zero
+        } else if number == 1.0 {
+            self.zero + 1
+        } else {
+            self.done(Operation::Constant(number.to_bits()))
+        }
+    }
+
+    /// Writes f + g u to `derivatives`.
+    fn combine(&mut self, f: &[Number], g: &[Number], derivatives: &mut [Register]) {
+        let states = f.len();
+        for (i, derivative) in derivatives.iter_mut().enumerate() {
+            let mut sum = self.checked(f[i]);
+            for (j, column) in g.chunks_exact(states).enumerate() {
+                let (factor, input) = (self.checked(column[i]), self.hidden.start + j);
+                if factor == self.zero {
+                    continue;
+                }
+                let product = match factor == self.zero + 1 {
+                    true => input,
+                    false => self.done(Operation::Multiply(factor.min(input), factor.max(input))),
+                };
+                let nothing = sum == self.zero;
+                sum = if nothing { product } else { self.done(Operation::Add(sum, product)) };
+            }
+            *derivative = sum;
+        }
+    }
+}
+
+impl<C: Scalar> Record for Work<'_, C> {
+    fn done(&mut self, operation: Operation) -> Register {
+        if self.fault.is_some() {
+            return self.not_a_number();
+        }
+        // Sine and cosine are computed together, and mostly asked for one after the other.
+        if let (Operation::SinCos(_), Some(last)) = (operation, self.position.checked_sub(1))
+            && self.steps.get(last).is_some_and(|step| step.operation == operation)
+        {
+            return self.steps[last].to;
+        }
+        let to = self.next;
+        let step = Step { operation, to };
+        if self.orders.start == 0 {
+            if self.steps.len() >= MAX_OPERATIONS {
+                return self.fail(Fault::TooMany);
+            }
+            let end = to + operation.results();
+            if end > self.series.registers() {
+                if !self.growing {
+                    return self.fail(Fault::TooMany);
+                }
+                self.series.grow(2 * end);
+            }
+            self.steps.push(step);
+        } else if self.steps.get(self.position) != Some(&step) {
+            return self.fail(Fault::Different);
+        }
+        self.position += 1;
+        self.next += operation.results();
+        for k in self.orders.clone() {
+            self.series.advance_one(&step, k);
+        }
+        to
+    }
+}
+
+impl<C: Scalar> Calculator for Work<'_, C> {
+    fn apply(&mut self, operation: u32, a: Number, b: Number, literal: f64) -> Number {
+        let function = match operation {
+            0 => return self.constant(literal) as Number,
+            1..=5 => {
+                use Operator::{Add, Divide, Multiply, Power, Subtract};
+                let operator = [Add, Subtract, Multiply, Divide, Power][operation as usize - 1];
+                let (a, b) = (self.operand(a, literal), self.operand(b, literal));
+                let result = self.binary(operator, a, b);
+                return self.register(result) as Number;
+            }
+            6 => {
+                let a = self.operand(a, literal);
+                let result = self.negate(a);
+                return self.register(result) as Number;
+            }
+            7 => Function::Sqrt,
+            8 => Function::Exp,
+            9 => Function::Ln,
+            10 => Function::Sin,
+            11 => Function::Cos,
+            12 => Function::Tan,
+            13 => Function::Atan,
+            14 => Function::Atan2,
+            15 => Function::Abs,
+            16 => Function::Tanh,
+            17 => Function::Min,
+            18 => Function::Max,
+            other => return self.fail(Fault::Operation(other)) as Number,
+        };
+        let a = self.operand(a, literal);
+        let two = matches!(function, Function::Atan2 | Function::Min | Function::Max);
+        let b = if two { self.operand(b, literal) } else { a };
+        let result = self.call(function, a, b);
+        self.register(result) as Number
+    }
+
+    fn value(&self, a: Number) -> f64 {
+        let register = a as Register;
+        let known = register < self.next && !self.hidden.contains(&register);
+        if known { self.series.get(register, 0).value() } else { f64::NAN }
+    }
+}
+
+impl Equations for Evaluated {
+    fn states(&self) -> usize {
+        self.states
+    }
+
+    fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    fn series<C: Scalar>(&self, orders: usize) -> Series<C> {
+        let mut series = Series::new(self.registers, orders);
+        let zero = self.time() + 1;
+        series.set(zero + 1, 0, C::from(1.0));
+        for k in 0..orders {
+            series.set(zero + 2, k, C::from(f64::NAN));
+        }
+        series
+    }
+
+    fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize) {
+        let time = self.time();
+        let zero = time as Number + 1;
+        self.f.fill(zero);
+        self.g.fill(zero);
+        if k == 0 {
+            self.steps.clear();
+            self.fault = None;
+        }
+        let mut work = Work {
+            series,
+            steps: &mut self.steps,
+            position: 0,
+            next: time + RESERVED,
+            orders: k..k + 1,
+            // Time is for barriers.
+            hidden: self.states..time + 1,
+            zero: time + 1,
+            growing: self.growing,
+            fault: None,
+        };
+        self.code.plant(&mut work, &self.parameters, &self.x, &mut self.f, &mut self.g);
+        work.combine(&self.f, &self.g, &mut self.derivatives);
+        let (mut fault, next, position, nan) = (work.fault, work.next, work.position, work.not_a_number());
+        if k > 0 && position != self.plant_steps {
+            fault = fault.or(Some(Fault::Different));
+        }
+        if fault.is_some() {
+            self.derivatives.fill(nan);
+        }
+        (self.next, self.plant_steps) = (next, position);
+        self.fault = self.fault.or(fault);
+    }
+
+    fn derivative(&self, i: usize) -> Register {
+        self.derivatives[i]
+    }
+
+    fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register {
+        let time = self.time();
+        self.steps.truncate(self.plant_steps);
+        let mut work = Work {
+            series,
+            steps: &mut self.steps,
+            position: self.plant_steps,
+            next: self.next,
+            orders: 0..n + 1,
+            hidden: self.states..time,
+            zero: time + 1,
+            growing: self.growing,
+            fault: self.fault,
+        };
+        let h = self.code.barrier(self.barrier, &mut work, &self.parameters, time as Number, &self.x);
+        let h = work.checked(h);
+        let (fault, nan, end) = (work.fault, work.not_a_number(), work.next);
+        self.fault = fault;
+        if self.growing {
+            self.registers = self.registers.max(end);
+        }
+        if fault.is_some() { nan } else { h }
+    }
+}

@@ -1,0 +1,107 @@
+//! Code run at sample states before anything depends on it.
+
+use punctual_core::lie;
+
+use super::{Evaluated, Fault};
+use crate::Error;
+use crate::motion::Equations;
+use crate::series::Series;
+
+/// How far differences reach, as a part of a component and absolutely: their own error, of the order of its square,
+/// and round-off over it are both far below [`APART`] unless a function changes over such a distance.
+const REACH: f64 = 1e-5;
+
+/// The part by which a difference may be off: a derivative that is wrong is mostly wrong as a whole.
+const APART: f64 = 0.05;
+
+/// Round-off of a value in a difference, as a part of it.
+const ROUND_OFF: f64 = 1e-10;
+
+/// What a call computed at a sample: values and slopes of f, g and all barriers.
+type Outcome = Vec<[f64; 2]>;
+
+/// Runs the code at samples within `ranges` as often as it takes to see what it does.
+///
+/// # Errors
+///
+/// What it did that it must not.
+pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]]) -> Result<(), Error> {
+    let mut samples = 0;
+    let mut wrong: Vec<(usize, String)> = Vec::new();
+    for (k, (t, x)) in lie::samples(ranges).into_iter().enumerate() {
+        // Forwards and backwards in turn, and no two components by the same part.
+        let part = |i: usize| if (i + k).is_multiple_of(2) { 1.0 } else { -0.7 + 0.01 * i as f64 };
+        let v: Vec<f64> = x.iter().enumerate().map(|(i, x)| (1.0 + x.abs()) * part(i)).collect();
+        let at = |s: f64| x.iter().zip(&v).map(|(x, v)| x + s * v).collect::<Vec<_>>();
+        let here = outcome(equations, barriers, t, &x, &v)?;
+        let ahead = outcome(equations, barriers, t + REACH, &at(REACH), &v)?;
+        let behind = outcome(equations, barriers, t - REACH, &at(-REACH), &v)?;
+        let numbers = || here.iter().chain(&ahead).chain(&behind).flatten();
+        if !numbers().all(|v| v.is_finite()) {
+            continue;
+        }
+        samples += 1;
+        wrong.resize(here.len(), (0, String::new()));
+        for (i, wrong) in wrong.iter_mut().enumerate() {
+            let (slope, difference) = (here[i][1] * REACH, (ahead[i][0] - behind[i][0]) / 2.0);
+            let size = slope.abs().max(difference.abs());
+            if (slope - difference).abs() > APART * size + ROUND_OFF * here[i][0].abs() {
+                wrong.0 += 1;
+                wrong.1 = format!("{:.6e}, but by its values {:.6e}", slope / REACH, difference / REACH);
+            }
+        }
+    }
+    // Not where it is so at few samples: a function may have kinks and jumps.
+    match wrong.iter().position(|wrong| 2 * wrong.0 > samples) {
+        Some(i) => {
+            let (states, inputs) = (equations.states(), equations.inputs());
+            let place = match i.checked_sub(states) {
+                None => format!("f[{i}]"),
+                Some(i) if i < states * inputs => format!("g[{i}]"),
+                Some(i) => format!("barrier[{}]", i - states * inputs),
+            };
+            let message = format!(
+                "has a derivative along a direction of {} at most samples: something was computed from plain values",
+                wrong[i].1
+            );
+            Err(Error::new(place, message))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Values at `t` and `x`, and slopes along (1, `v`).
+fn outcome(
+    equations: &mut Evaluated,
+    barriers: usize,
+    t: f64,
+    x: &[f64],
+    v: &[f64],
+) -> Result<Outcome, Error> {
+    let refused = |field: String, fault: Option<Fault>| match fault {
+        Some(fault) => Err(Error::new(field, fault.to_string())),
+        None => Ok(()),
+    };
+    let mut series: Series<f64> = equations.series(2);
+    for (i, (&x, &v)) in x.iter().zip(v).enumerate() {
+        series.set(i, 0, x);
+        series.set(i, 1, v);
+    }
+    series.set(equations.time(), 0, t);
+    series.set(equations.time(), 1, 1.0);
+    for k in 0..2 {
+        equations.advance(&mut series, k);
+        refused("plant".to_owned(), equations.fault)?;
+    }
+    let get = |series: &Series<f64>, register| [series.get(register, 0), series.get(register, 1)];
+    let written = equations.f.iter().chain(&equations.g);
+    let mut outcome: Outcome = written.map(|&number| get(&series, number as usize)).collect();
+    equations.registers = equations.registers.max(equations.next);
+    for index in 0..barriers {
+        equations.barrier = index;
+        let h = equations.finish(&mut series, 1);
+        refused(format!("barrier[{index}]"), equations.fault)?;
+        outcome.push(get(&series, h));
+    }
+    Ok(outcome)
+}

@@ -1,0 +1,365 @@
+//! The motion of a plant and the series of a barrier along it, whatever does the operations.
+
+use std::cell::RefCell;
+
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::dynamics::DynPlant;
+use punctual_core::jet::{Dual, Tangent};
+use punctual_core::lie::{
+    self, Ahead, Coefficients, DerivativeSource, Derivatives, RelativeDegree, SUBSTEPS,
+};
+use punctual_core::scalar::Scalar;
+
+use crate::Error;
+use crate::programme::Register;
+use crate::series::Series;
+
+/// The operations of a plant, or of a barrier along one. Registers: states, inputs, time, then results.
+pub(crate) trait Equations: Clone + Send + 'static {
+    /// Number of states.
+    fn states(&self) -> usize;
+
+    /// Number of inputs.
+    fn inputs(&self) -> usize;
+
+    /// Memory for `orders` coefficients of every register.
+    fn series<C: Scalar>(&self, orders: usize) -> Series<C>;
+
+    /// Computes coefficient `k` of the derivatives of the states, after those below it.
+    fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize);
+
+    /// Where the derivative of state `i` is, once [`Self::advance`] was done.
+    fn derivative(&self, i: usize) -> Register;
+
+    /// Computes the coefficients of the barrier up to `n`, after those of the states, and says where they are.
+    fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
+}
+
+/// Calls `$function::<_, M>` with the least number `M` of directions that is enough for `$inputs`: fewer instances,
+/// for a few zeros.
+macro_rules! with_directions {
+    ($inputs:expr, $function:ident($($argument:expr),*)) => {
+        match $inputs {
+            1 => $function::<_, 1>($($argument),*),
+            2 => $function::<_, 2>($($argument),*),
+            3 => $function::<_, 3>($($argument),*),
+            4 => $function::<_, 4>($($argument),*),
+            5..=6 => $function::<_, 6>($($argument),*),
+            7..=8 => $function::<_, 8>($($argument),*),
+            _ => $function::<_, { punctual_core::MAX_INPUTS }>($($argument),*),
+        }
+    };
+}
+
+/// The relative degree of the barrier `along` the plant, found on [`samples`](lie::samples) of states within `ranges`.
+pub(crate) fn relative_degree<E: Equations>(plant: &E, along: &E, ranges: &[[f64; 2]]) -> RelativeDegree {
+    fn found<E: Equations, const M: usize>(plant: &E, along: &E, ranges: &[[f64; 2]]) -> RelativeDegree {
+        let mut series = Along::<E, Dual<M>>::new(plant, along, MAX_RELATIVE_DEGREE);
+        let samples = lie::samples(ranges);
+        lie::relative_degree_of(plant.inputs(), samples, |t, x| series.coefficients(t, x))
+    }
+    with_directions!(plant.inputs(), found(plant, along, ranges))
+}
+
+/// The derivatives of the barrier `along` the plant at relative degree `n`, for a filter.
+///
+/// # Errors
+///
+/// `n` outside 1 to [`MAX_RELATIVE_DEGREE`].
+pub(crate) fn source<E: Equations>(
+    plant: &E,
+    along: &E,
+    n: usize,
+) -> Result<Box<dyn DerivativeSource>, Error> {
+    fn made<E: Equations, const M: usize>(plant: &E, along: &E, n: usize) -> Box<dyn DerivativeSource> {
+        let work = Work::<E, M> {
+            along: Along::new(plant, along, n),
+            flow: Flow::new(plant),
+            along_tangent: Along::new(plant, along, n),
+            flow_tangent: Flow::new(plant),
+        };
+        let (states, inputs) = (plant.states(), plant.inputs());
+        Box::new(Source { work: RefCell::new(work), states, inputs, n })
+    }
+    if n == 0 || n > MAX_RELATIVE_DEGREE {
+        let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
+        return Err(Error::new("relative_degree", message));
+    }
+    Ok(with_directions!(plant.inputs(), made(plant, along, n)))
+}
+
+/// The plant, to simulate.
+pub(crate) fn simulated<E: Equations>(plant: &E) -> Box<dyn DynPlant> {
+    Box::new(Simulated { work: RefCell::new(Flow::new(plant)), inputs: plant.inputs() })
+}
+
+/// The motion of a plant: registers, and the stages of the Runge-Kutta method.
+struct Flow<E, C> {
+    equations: E,
+    series: Series<C>,
+    start: Vec<C>,
+    stages: [Vec<C>; 4],
+}
+
+impl<E: Equations, C: Scalar> Flow<E, C> {
+    fn new(equations: &E) -> Self {
+        let zeros = || vec![C::zero(); equations.states()];
+        Self {
+            equations: equations.clone(),
+            series: equations.series(1),
+            start: zeros(),
+            stages: [zeros(), zeros(), zeros(), zeros()],
+        }
+    }
+
+    fn inputs(&self) -> std::ops::Range<Register> {
+        let first = self.equations.states();
+        first..first + self.equations.inputs()
+    }
+
+    fn set_state(&mut self, x: impl Iterator<Item = C>) {
+        for (i, value) in x.enumerate() {
+            self.series.set(i, 0, value);
+        }
+    }
+
+    fn state(&self, i: usize) -> C {
+        self.series.get(i, 0)
+    }
+
+    fn hold(&mut self, u: impl Iterator<Item = C>) {
+        for (register, value) in self.inputs().zip(u) {
+            self.series.set(register, 0, value);
+        }
+    }
+
+    /// Moves the state; the method and its order of additions are those of [`lie::flow`].
+    fn run(&mut self, duration: f64, steps: usize) {
+        let dt = duration / steps as f64;
+        for _ in 0..steps {
+            for (i, start) in self.start.iter_mut().enumerate() {
+                *start = self.series.get(i, 0);
+            }
+            for stage in 0..4 {
+                if stage > 0 {
+                    let part = if stage == 3 { dt } else { dt / 2.0 };
+                    for (i, (&start, &slope)) in self.start.iter().zip(&self.stages[stage - 1]).enumerate() {
+                        self.series.set(i, 0, start + slope * part);
+                    }
+                }
+                self.equations.advance(&mut self.series, 0);
+                for (i, slope) in self.stages[stage].iter_mut().enumerate() {
+                    *slope = self.series.get(self.equations.derivative(i), 0);
+                }
+            }
+            let [k1, k2, k3, k4] = &self.stages;
+            for (i, &start) in self.start.iter().enumerate() {
+                let sum = k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i];
+                self.series.set(i, 0, start + sum * (dt / 6.0));
+            }
+        }
+    }
+}
+
+/// A plant to simulate.
+struct Simulated<E> {
+    work: RefCell<Flow<E, f64>>,
+    inputs: usize,
+}
+
+impl<E: Equations> DynPlant for Simulated<E> {
+    fn state_dim(&self) -> usize {
+        self.work.borrow().start.len()
+    }
+
+    fn input_dim(&self) -> usize {
+        self.inputs
+    }
+
+    fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), punctual_core::Error> {
+        punctual_core::dynamics::check_lengths((x, self.state_dim()), (u, self.inputs))?;
+        moved(&mut self.work.borrow_mut(), x, u, dt, 1);
+        Ok(())
+    }
+}
+
+fn moved<E: Equations>(flow: &mut Flow<E, f64>, x: &mut [f64], u: &[f64], duration: f64, steps: usize) {
+    flow.set_state(x.iter().copied());
+    flow.hold(u.iter().copied());
+    flow.run(duration, steps);
+    for (i, x) in x.iter_mut().enumerate() {
+        *x = flow.state(i);
+    }
+}
+
+/// Series of h along the plant.
+struct Along<E, C> {
+    flow: Flow<E, C>,
+    equations: E,
+    series: Series<C>,
+    h: Register,
+    n: usize,
+}
+
+impl<E: Equations, C: Scalar> Along<E, C> {
+    fn new(plant: &E, along: &E, n: usize) -> Self {
+        let mut series = along.series(n + 1);
+        // Time goes on by itself; inputs are held.
+        series.set(along.states() + along.inputs(), 1, C::from(1.0));
+        Self { flow: Flow::new(plant), equations: along.clone(), series, h: 0, n }
+    }
+
+    /// The coefficients of h from the state and the inputs that `flow` has, at time `t`.
+    fn continue_from_flow(&mut self, t: f64) {
+        let (series, flow) = (&mut self.series, &self.flow);
+        let time = flow.inputs().end;
+        for register in 0..time {
+            series.set(register, 0, flow.series.get(register, 0));
+        }
+        series.set(time, 0, C::from(t));
+        for k in 0..self.n {
+            self.equations.advance(series, k);
+            for i in 0..self.equations.states() {
+                let slope = series.get(self.equations.derivative(i), k);
+                series.set(i, k + 1, slope * (1.0 / (k + 1) as f64));
+            }
+        }
+        self.h = self.equations.finish(series, self.n);
+    }
+
+    /// h⁽ᵏ⁾.
+    fn derivative(&self, k: usize) -> C {
+        self.series.get(self.h, k) * (1..=k).map(|i| i as f64).product::<f64>()
+    }
+
+    /// Its coefficients a moment ahead, from the state and the inputs that `flow` has.
+    fn ahead(&mut self, t: f64, duration: f64) {
+        self.flow.run(duration, SUBSTEPS);
+        self.continue_from_flow(t + duration);
+    }
+}
+
+/// With derivatives along `M` ≥ the number of inputs.
+impl<E: Equations, const M: usize> Along<E, Dual<M>> {
+    fn hold(&mut self, u: impl Fn(usize) -> f64) {
+        self.flow.hold((0..M).map(|i| Dual::variable(u(i), i)));
+    }
+
+    /// From the state `x` at time `t`, along the free motion.
+    fn evaluate(&mut self, t: f64, x: &[f64]) {
+        self.flow.set_state(x.iter().map(|&v| Dual::from(v)));
+        self.hold(|_| 0.0);
+        self.continue_from_flow(t);
+    }
+
+    fn coefficients(&mut self, t: f64, x: &[f64]) -> Coefficients {
+        self.evaluate(t, x);
+        std::array::from_fn(|k| {
+            let h = self.series.get(self.h, k);
+            (h.value, std::array::from_fn(|i| h.gradient.get(i).copied().unwrap_or_default()))
+        })
+    }
+}
+
+/// A barrier along a plant, as the filter takes it.
+struct Source<E, const M: usize> {
+    work: RefCell<Work<E, M>>,
+    states: usize,
+    inputs: usize,
+    n: usize,
+}
+
+/// Memory of the evaluations.
+struct Work<E, const M: usize> {
+    along: Along<E, Dual<M>>,
+    flow: Flow<E, f64>,
+    along_tangent: Along<E, Tangent<Dual<M>>>,
+    flow_tangent: Flow<E, Tangent<f64>>,
+}
+
+impl<E, const M: usize> Source<E, M> {
+    fn write(&self, out: &mut Ahead, derivative: impl Fn(usize) -> Dual<M>) {
+        *out = Ahead::ZERO;
+        for k in 0..=self.n {
+            let Dual { value, gradient } = derivative(k);
+            out.value[k] = value;
+            out.gradient[k][..self.inputs].copy_from_slice(&gradient[..self.inputs]);
+        }
+    }
+}
+
+impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
+    fn relative_degree(&self) -> usize {
+        self.n
+    }
+
+    fn state_dim(&self) -> usize {
+        self.states
+    }
+
+    fn input_dim(&self) -> usize {
+        self.inputs
+    }
+
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
+        let along = &mut self.work.borrow_mut().along;
+        along.evaluate(t, x);
+        *out = Derivatives::ZERO;
+        for k in 0..=self.n {
+            let Dual { value, gradient } = along.derivative(k);
+            out.drift[k] = value;
+            if k == self.n {
+                out.row[..self.inputs].copy_from_slice(&gradient[..self.inputs]);
+            } else {
+                // A sum and not a maximum: `f64::max` would drop a NaN.
+                out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>();
+            }
+        }
+    }
+
+    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
+        moved(&mut self.work.borrow_mut().flow, x, u, duration, SUBSTEPS);
+        true
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
+        let along = &mut self.work.borrow_mut().along;
+        along.flow.set_state(x.iter().map(|&v| Dual::from(v)));
+        along.hold(|i| u.get(i).copied().unwrap_or_default());
+        along.ahead(t, duration);
+        self.write(out, |k| along.derivative(k));
+        true
+    }
+
+    fn ahead_along(
+        &self,
+        t: f64,
+        [x, dx]: [&[f64]; 2],
+        [u, du]: [&[f64]; 2],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> bool {
+        let along = &mut self.work.borrow_mut().along_tangent;
+        let state = x.iter().zip(dx).map(|(&v, &d)| Tangent { value: Dual::from(v), along: Dual::from(d) });
+        along.flow.set_state(state);
+        let input = u.iter().zip(du).enumerate();
+        along
+            .flow
+            .hold(input.map(|(i, (&v, &d))| Tangent { value: Dual::variable(v, i), along: Dual::from(d) }));
+        along.ahead(t, duration);
+        self.write(out, |k| along.derivative(k).along);
+        true
+    }
+
+    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
+        let flow = &mut self.work.borrow_mut().flow_tangent;
+        flow.set_state(x.iter().zip(&*dx).map(|(&value, &along)| Tangent { value, along }));
+        flow.hold(u.iter().map(|&value| Tangent { value, along: 0.0 }));
+        flow.run(duration, SUBSTEPS);
+        for (i, (x, dx)) in x.iter_mut().zip(dx).enumerate() {
+            let Tangent { value, along } = flow.state(i);
+            (*x, *dx) = (value, along);
+        }
+        true
+    }
+}

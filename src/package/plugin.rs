@@ -1,0 +1,71 @@
+//! Plug-ins of configurations: tried in a child process, where they may crash, before this one loads them.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use punctual_fmu::configuration::{Configuration, Plugin, PluginLoader};
+use punctual_fmu::{PluginFolder, plugin_file_name};
+
+use crate::error::Error;
+use crate::host::journal;
+use crate::isolation::{self, Child, End, Voice};
+
+/// The hidden command of the child.
+pub const COMMAND: &str = "try-plugin";
+
+/// The longest that a plug-in may take.
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn folder(configuration: &Path) -> PathBuf {
+    configuration.parent().unwrap_or(Path::new("")).to_owned()
+}
+
+/// Plug-ins beside a configuration file.
+pub(super) struct Tried<'a> {
+    configuration: &'a Path,
+    folder: PluginFolder,
+}
+
+impl<'a> Tried<'a> {
+    pub(super) fn of(configuration: &'a Path) -> Self {
+        Self { configuration, folder: PluginFolder::new(folder(configuration)) }
+    }
+}
+
+impl PluginLoader for Tried<'_> {
+    fn load(&self, name: &str) -> Result<Plugin, String> {
+        let tried = || {
+            let child = Child::new()?;
+            let words = [COMMAND.into(), "--".into(), self.configuration.into(), child.folder().into()];
+            child.run(words, Voice::Silent, Some(LIMIT))
+        };
+        // What is refused there is refused here with the same words.
+        if let End::Broken { how, last } = tried().map_err(|e| e.to_string())? {
+            let place = last.map_or_else(String::new, |last| format!(" in {}", last.call));
+            let file = plugin_file_name(name);
+            return Err(format!("{file} {how}{place}, when it was tried in a process of its own"));
+        }
+        self.folder.load(name)
+    }
+}
+
+/// Reads the configuration at `path` with plug-ins that `loader` finds.
+pub(super) fn read(path: &Path, loader: &dyn PluginLoader) -> Result<Configuration, Error> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+    Configuration::parse_with(&text, loader).map_err(|e| Error::from(e).in_file(path))
+}
+
+/// For the child: reads the configuration at `path` with its plug-in, and unloads that again.
+///
+/// # Errors
+///
+/// The folder cannot be written to; a configuration that cannot be used.
+pub fn perform(path: &Path, place: &Path) -> Result<(), Error> {
+    isolation::settle(place)?;
+    let watch = |file: &Path, what: &str| journal::entering(what, "", file, None);
+    let read = read(path, &PluginFolder::new(folder(path)).watched(watch));
+    journal::entering("its unloading", "", path, None);
+    let done = read.map(drop);
+    journal::finish();
+    done
+}
