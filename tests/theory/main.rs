@@ -4,6 +4,7 @@
 //! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`; the
 //! bands are those of the figures, far above what another platform's round-off changes.
 
+mod bicycles;
 mod chains;
 mod disturbances;
 mod obstacles;

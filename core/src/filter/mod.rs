@@ -7,6 +7,7 @@
 
 mod builder;
 mod channel;
+mod integrator;
 mod report;
 mod sampling;
 mod sensitivity;
@@ -17,6 +18,7 @@ pub use crate::convergence::{
 pub use builder::FilterBuilder;
 use channel::Channel;
 pub use channel::{Begin, End, Strictness};
+pub use integrator::Integrator;
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};

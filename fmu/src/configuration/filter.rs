@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, Range,
-    ReferenceSection, ShapeName, check_identifier,
+    BarrierInput, ConfigurationError, ExperimentSection, IntegratorSection, ModelName, Parameter,
+    PlantSection, Range, ReferenceSection, ShapeName, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -67,8 +67,28 @@ impl Visitor for Adding<'_> {
             ModelName::BicycleKinematic => {
                 c.add_along::<_, _, 5, 9>(builder, at, model.kinematic()?, barrier)
             }
+            ModelName::BicycleKinematicAngle | ModelName::BicycleKinematicSlip => {
+                Err(not_affine(model.model))
+            }
         }
     }
+}
+
+/// Why a filter cannot have `model`, which is not affine in its inputs.
+fn not_affine(model: ModelName) -> ConfigurationError {
+    let (angle, advice) = match model {
+        ModelName::BicycleKinematicAngle => {
+            ("delta", "take the model bicycle_kinematic with `[integrator] state = \"delta\"`")
+        }
+        _ => {
+            ("beta", "take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which nearly are it")
+        }
+    };
+    let message = format!(
+        "is {:?}, which is a plant only: {angle} does not enter linearly, as a filter needs it; {advice}",
+        model.name()
+    );
+    ConfigurationError::new("plant.model", message)
 }
 
 /// Which barrier, and the first of the filter's states that say where its point is, if it follows one.
@@ -110,6 +130,9 @@ pub struct FilterConfiguration {
     pub correction_limit: f64,
     /// The plant that the filter is for.
     pub plant: PlantSection,
+    /// Which state of it the filter commands and integrates itself. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integrator: Option<IntegratorSection>,
     /// The safe sets, at least one.
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input. Default: none (±1e30).
@@ -135,6 +158,12 @@ impl FilterConfiguration {
         }
         check_identifier("name", &self.name)?;
         self.plant.complete()?;
+        if let Some(model) = self.plant.model.filter(|model| !model.is_affine()) {
+            return Err(not_affine(model));
+        }
+        if let Some(integrator) = &self.integrator {
+            integrator.place(&self.plant)?;
+        }
         if self.barrier.is_empty() {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
         }
@@ -148,7 +177,8 @@ impl FilterConfiguration {
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
             let reserved =
-                ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f"].contains(&&*name);
+                ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f", "integrator"];
+            let reserved = reserved.contains(&&*name);
             let reserved = reserved || self.plant.parameters.iter().any(|p| p.name == name);
             if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
                 let message = format!("is {name:?}, which is already the name of something else");
@@ -178,7 +208,7 @@ impl FilterConfiguration {
             parameter.check(&mut self)?;
         }
         // Whatever the ranges of single numbers cannot say.
-        self.build()?;
+        self.build_integrator(&self.build()?)?;
         Ok(self)
     }
 
@@ -195,6 +225,7 @@ impl FilterConfiguration {
                 }));
             }
         }
+        rows.extend(self.integrator.iter().flat_map(|i| i.parameters(&self.plant)));
         // Only a disturbance has a unit that depends on them.
         let disturbed = self.barrier.iter().any(|b| b.disturbance != 0.0);
         let degrees = if disturbed { self.relative_degrees() } else { Vec::new() };
@@ -400,7 +431,7 @@ impl FilterConfiguration {
             let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
             let advice = match (self.plant.model, found) {
                 (Some(ModelName::BicycleSmallSlip), _) => {
-                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic"
+                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself"
                 }
                 (None, RelativeDegree::Mixed(_)) => {
                     "; one constraint cannot use both, so make the input that enters first a state whose derivative is the new input"
