@@ -4,7 +4,7 @@ mod support;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside};
-use punctual_core::dynamics::{ControlAffine, IntegratedInput, rk4_step};
+use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
 use punctual_core::lie::{self, Derivatives, RelativeDegree, detected, relative_degree};
 use punctual_core::nalgebra::{SMatrix, SVector, Vector4, vector};

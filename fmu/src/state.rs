@@ -42,7 +42,11 @@ pub fn size(product: &Product) -> usize {
     let values: usize = product.variables.iter().map(|v| value(v.kind.base_type())).sum();
     let block = match &product.configuration {
         Configuration::Filter(c) => {
-            bool::SIZE + c.barrier.len() * FixedTimeState::SIZE + 2 * <Option<f64>>::SIZE + Inputs::SIZE + f64::SIZE
+            bool::SIZE
+                + c.barrier.len() * FixedTimeState::SIZE
+                + 2 * <Option<f64>>::SIZE
+                + Inputs::SIZE
+                + f64::SIZE
         }
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
         Configuration::Controller(_) => u32::SIZE,

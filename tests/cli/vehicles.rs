@@ -121,7 +121,8 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
             let distance = (x[k] - 20.0).hypot(y[k] - 10.0);
             assert!(time[k] < DEADLINE || distance <= 2.0, "{plant}: {distance} m at {} s", time[k]);
         }
-        let (held, kept) = (table.column(&format!("f.u.{angle}")), table.column(&format!("f.integrator.{angle}")));
+        let (held, kept) =
+            (table.column(&format!("f.u.{angle}")), table.column(&format!("f.integrator.{angle}")));
         for k in 1..time.len() {
             // Half of one step and half of the next, each at a rate within 1 rad/s.
             let change = (held[k] - held[k - 1]).abs();

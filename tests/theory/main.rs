@@ -7,6 +7,7 @@
 mod bicycles;
 mod chains;
 mod disturbances;
+mod measurements;
 mod obstacles;
 mod profiles;
 mod sampling;

@@ -160,9 +160,7 @@ impl Block for FilterBlock {
         let (filter, change) = (&mut self.filter, &mut self.change);
         let unknown = match &mut self.integrator {
             None => filter.differentiate(t, [x, dx], [u_ref, du_ref], change),
-            Some(integrator) => {
-                integrator.differentiate(filter, (t, hold), [x, dx], [u_ref, du_ref], change)
-            }
+            Some(integrator) => integrator.differentiate(filter, (t, hold), [x, dx], [u_ref, du_ref], change),
         };
         if rising {
             self.filter.restore(&self.kept).map_err(|e| e.to_string())?;

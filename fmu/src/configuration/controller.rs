@@ -49,10 +49,8 @@ fn turns(controller: ControllerName, model: ModelName) -> bool {
 }
 
 fn slips(controller: ControllerName, model: ModelName) -> bool {
-    drives(controller, model) && matches!(
-            model,
-            ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip
-        )
+    drives(controller, model)
+        && matches!(model, ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip)
 }
 
 /// Default of the gain of the damping in 1/s.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::barrier::{BarrierSection, Visitor};
 use super::{
     BarrierInput, ConfigurationError, ExperimentSection, IntegratorSection, ModelName, Parameter,
-    PlantSection, Range, ReferenceSection, ShapeName, check_identifier,
+    PlantSection, Range, ReferenceSection, ShapeName, VariableSection, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -80,9 +80,10 @@ fn not_affine(model: ModelName) -> ConfigurationError {
         ModelName::BicycleKinematicAngle => {
             ("delta", "take the model bicycle_kinematic with `[integrator] state = \"delta\"`")
         }
-        _ => {
-            ("beta", "take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which nearly are it")
-        }
+        _ => (
+            "beta",
+            "take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which nearly are it",
+        ),
     };
     let message = format!(
         "is {:?}, which is a plant only: {angle} does not enter linearly, as a filter needs it; {advice}",
@@ -138,6 +139,10 @@ pub struct FilterConfiguration {
     /// Input bounds by name, `[min, max]` in the unit of the input. Default: none (±1e30).
     #[serde(default)]
     pub bounds: BTreeMap<String, [f64; 2]>,
+    /// Bounds on the errors of the measured states, by name, in their units; ≥ 0. The promises then hold for the true
+    /// state. Default: none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measurement_errors: BTreeMap<String, f64>,
     /// The run it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
@@ -176,8 +181,19 @@ impl FilterConfiguration {
             self.barrier[i].complete(&format!("barrier[{i}]"), &self.plant)?;
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
-            let reserved =
-                ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f", "integrator"];
+            let reserved = [
+                "x",
+                "u",
+                "u_ref",
+                "u_min",
+                "u_max",
+                "status",
+                "rearm",
+                "l_r",
+                "l_f",
+                "integrator",
+                "measurement_error",
+            ];
             let reserved = reserved.contains(&&*name);
             let reserved = reserved || self.plant.parameters.iter().any(|p| p.name == name);
             if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
@@ -203,6 +219,12 @@ impl FilterConfiguration {
                 *max = UNBOUNDED;
             }
         }
+        let states = self.measured_states();
+        if let Some(unknown) = self.measurement_errors.keys().find(|k| states.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
+            let message = format!("unknown measured state, must be one of {}", names.join(", "));
+            return Err(ConfigurationError::new(format!("measurement_errors.{unknown}"), message));
+        }
         self.experiment.check()?;
         for parameter in self.parameters() {
             parameter.check(&mut self)?;
@@ -224,6 +246,19 @@ impl FilterConfiguration {
                     &mut c.bounds.entry(input.name.clone()).or_default()[side]
                 }));
             }
+        }
+        let erroneous = |state: &VariableSection| self.measurement_errors.contains_key(&state.name);
+        for state in self.measured_states().into_iter().filter(erroneous) {
+            let names =
+                (format!("measurement_error.{}", state.name), format!("measurement_errors.{}", state.name));
+            let description = format!("largest error of the measured {}", state.description);
+            rows.push(Parameter::new(
+                names,
+                state.unit,
+                Range::NON_NEGATIVE,
+                description,
+                move |c: &mut Self| c.measurement_errors.entry(state.name.clone()).or_default(),
+            ));
         }
         rows.extend(self.integrator.iter().flat_map(|i| i.parameters(&self.plant)));
         // Only a disturbance has a unit that depends on them.
@@ -295,11 +330,16 @@ impl FilterConfiguration {
             min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });
             max.push(if high >= UNBOUNDED { f64::INFINITY } else { high });
         }
+        let mut errors = vec![0.0; states + self.barrier_inputs().len()];
+        for (error, state) in errors.iter_mut().zip(self.plant.states()) {
+            *error = self.measurement_errors.get(&state.name).copied().unwrap_or(0.0);
+        }
         builder
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
             .and_then(|b| b.actuation_delay(self.actuation_delay))
             .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
+            .and_then(|b| b.measurement_errors(&errors))
             .and_then(FilterBuilder::build)
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }

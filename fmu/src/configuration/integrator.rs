@@ -15,7 +15,7 @@ pub struct IntegratorSection {
     /// Which state: one whose derivative is an input alone, such as `beta` of `bicycle_small_slip_rate`. Bounds of that
     /// input bound the rate.
     pub state: String,
-    /// How fast it follows `u_ref.<state>` in 1/s, > 0, where nothing is in the way. Default 10.
+    /// How fast it follows `u_ref.<state>` in 1/s, > 0, where nothing is in the way. Default 2.
     #[serde(default = "gain")]
     pub gain: f64,
     /// Its smallest value, in its unit. Default: none (-1e30).
@@ -27,7 +27,7 @@ pub struct IntegratorSection {
 }
 
 fn gain() -> f64 {
-    10.0
+    2.0
 }
 
 fn none_below() -> f64 {
@@ -68,9 +68,13 @@ impl IntegratorSection {
         type Access = fn(&mut IntegratorSection) -> &mut f64;
         let row = |name: String, field: &str, unit: String, range, meaning: String, access: Access| {
             let given = self.clone();
-            Parameter::new((name, format!("integrator.{field}")), unit, range, meaning, move |c: &mut FilterConfiguration| {
-                access(c.integrator.get_or_insert_with(|| given.clone()))
-            })
+            Parameter::new(
+                (name, format!("integrator.{field}")),
+                unit,
+                range,
+                meaning,
+                move |c: &mut FilterConfiguration| access(c.integrator.get_or_insert_with(|| given.clone())),
+            )
         };
         let bounded = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
         let (least, largest) = (format!("u_min.{}", self.state), format!("u_max.{}", self.state));

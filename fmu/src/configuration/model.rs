@@ -13,8 +13,19 @@ use super::{
 };
 
 /// Names that parameters of a model must leave to the FMU.
-const RESERVED: [&str; 10] =
-    ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "x0", "inner_step", "integrator"];
+const RESERVED: [&str; 11] = [
+    "x",
+    "u",
+    "u_ref",
+    "u_min",
+    "u_max",
+    "status",
+    "rearm",
+    "x0",
+    "inner_step",
+    "integrator",
+    "measurement_error",
+];
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]

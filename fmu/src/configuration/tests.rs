@@ -80,6 +80,22 @@ defects! {
         "barrier[0].margin: is -0.1, must be finite and >= 0";
     negative_disturbance: FILTER, "radius = 2.0" => "radius = 2.0\ndisturbance = -0.1",
         "barrier[0].disturbance: is -0.1, must be finite and >= 0";
+    negative_measurement_error: FILTER, "bounds =" => "measurement_errors = { v = -0.1 }\nbounds =",
+        "measurement_errors.v: is -0.1, must be finite and >= 0";
+    measurement_error_of_no_state: FILTER, "bounds =" => "measurement_errors = { w = 0.1 }\nbounds =",
+        "measurement_errors.w: unknown measured state, must be one of x_p, y_p, theta, v";
+    measurement_error_of_an_integrated_state: STEERED, "bounds =" => "measurement_errors = { beta = 0.1 }\nbounds =",
+        "measurement_errors.beta: unknown measured state, must be one of x_p, y_p, theta, v";
+    measurement_error_of_a_pointwise_row: FILTER,
+        "bounds =" => "sampling = \"pointwise\"\nmeasurement_errors = { v = 0.1 }\nbounds =",
+        "measurement_errors: needs the prediction over the period, the sampling is pointwise";
+    measurement_error_of_the_repeated_root: FILTER,
+        "bounds = { a = [-9.0, 8.0] }\n[[barrier]]" =>
+        "measurement_errors = { v = 0.1 }\n[[barrier]]\nmethod = \"repeated_root\"",
+        "goal.measurement_errors: needs the reference profile";
+    measurement_error_of_a_delayed_filter: FILTER,
+        "bounds =" => "actuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
+        "measurement_errors: needs an actuation_delay of 0, it is 0.001";
     disturbance_of_no_input: PLANT, "[integration]" => "[disturbance]\ninputs = { omega = 1.0 }\n[integration]",
         "disturbance.inputs.omega: unknown input, must be one of a, beta";
     disturbance_of_no_state: PLANT, "[integration]" => "[disturbance]\nmeasurements = { w = 1.0 }\n[integration]",
@@ -279,6 +295,7 @@ const MODELS: [&str; 8] = [
 fn every_kind() -> Vec<String> {
     let mut texts = vec![FILTER.to_owned(), PLANT.to_owned(), HEADING.to_owned(), WAYPOINTS.to_owned()];
     texts.push(STEERED.to_owned());
+    texts.push(FILTER.replace("bounds =", "measurement_errors = { y_p = 0.1, v = 0.2 }\nbounds ="));
     texts.push(format!("{FILTER}disturbance = 0.5\n"));
     texts.push(format!("{PLANT}[disturbance]\nseed = 3\ninputs = {{ a = 0.5 }}\nmeasurements.v = 0.1\n"));
     for model in MODELS {

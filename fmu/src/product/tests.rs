@@ -299,11 +299,13 @@ fn no_variable_is_called_time() {
 fn an_integrated_state_is_commanded_and_not_measured() {
     let product = product(STEERED);
     let names: Vec<_> = product.variables.iter().map(|v| v.name.as_str()).collect();
-    let wanted = ["x.x_p", "x.y_p", "x.theta", "x.v", "u_ref.a", "u_ref.delta", "rearm", "u.a", "u.delta", "status"];
+    let wanted =
+        ["x.x_p", "x.y_p", "x.theta", "x.v", "u_ref.a", "u_ref.delta", "rearm", "u.a", "u.delta", "status"];
     assert_eq!(names[..wanted.len()], wanted);
     assert_eq!(names[product.layout.parameters - 1], "integrator.delta");
     let parameters = &names[product.layout.parameters..];
-    for parameter in ["u_min.delta", "u_max.delta", "u_min.delta_rate", "u_max.delta_rate", "integrator.gain"] {
+    for parameter in ["u_min.delta", "u_max.delta", "u_min.delta_rate", "u_max.delta_rate", "integrator.gain"]
+    {
         assert!(parameters.contains(&parameter), "{parameter} in {parameters:?}");
     }
 }
