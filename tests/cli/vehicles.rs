@@ -84,52 +84,51 @@ fn bicycles_steered_by_rates_keep_the_deadline() {
     }
 }
 
-/// A plant steered by an angle itself under a filter that integrates its rate: where the vehicle is follows from the
-/// plant's own columns, and the angle stays within its limits and those of its rate.
+/// The example of a car steered by an angle itself, and the same of a small-slip bicycle, exactly measured: where they
+/// are follows from the angle that the plant was given, which stays within its limits and those of its rate.
 #[test]
 fn bicycles_steered_by_angles_keep_the_deadline() {
-    let models = [
-        ("bicycle_kinematic", "bicycle_kinematic_angle", "delta"),
-        ("bicycle_small_slip_rate", "bicycle_small_slip", "beta"),
+    let edits: [&[(&str, &str)]; 2] = [
+        &[],
+        &[
+            ("bicycle_kinematic_angle", "bicycle_small_slip"),
+            ("bicycle_kinematic", "bicycle_small_slip_rate"),
+            ("delta", "beta"),
+            ("l_f = 1.5", ""),
+            ("x_p = 0.02", "x_p = 0.0"),
+            ("y_p = 0.02", "y_p = 0.0"),
+            ("v = 0.05", "v = 0.0"),
+        ],
     ];
-    for (model, plant, angle) in models {
+    for (edits, angle) in edits.into_iter().zip(["delta", "beta"]) {
         let workshop = Workshop::with_library();
-        let head = format!("kind = \"filter\"\nplant = {{ model = \"{model}\", l_r = 1.5 }}\n[bounds]\n");
-        let rate = format!("{angle}_rate = [-1.0, 1.0]\n");
-        let integrator = format!("[integrator]\nstate = \"{angle}\"\nmin = -0.4\nmax = 0.4\n");
-        let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 10.0]\nradius = 2.0\ndeadline = 5.0\n";
-        let experiment = "[experiment]\nstop_time = 10.0\nstep_size = 0.01\n";
-        workshop.write("f.toml", format!("{head}{rate}{integrator}{goal}{experiment}"));
-        let of = format!("kind = \"plant\"\nplant = {{ model = \"{plant}\", l_r = 1.5 }}\n");
-        workshop.write("p.toml", format!("{of}x0 = {{ theta = -0.2, v = 3.0 }}\n{experiment}"));
-        for name in ["f", "p"] {
-            workshop.punctual(["build", &format!("{name}.toml"), "-o", &format!("{name}.fmu")]).success();
+        for stem in ["car-filter", "car-plant", "car"] {
+            let toml = format!("{stem}.toml");
+            let text = fs::read_to_string(examples().join(&toml)).expect("an example");
+            workshop.write(&toml, edits.iter().fold(text, |text, (from, to)| text.replace(from, to)));
+            if stem != "car" {
+                workshop.punctual(["build", &toml, "-o", &format!("{stem}.fmu")]).success();
+            }
         }
-        workshop.write(
-            "s.toml",
-            "[experiment]\nstop_time = 10.0\nstep = 0.01\n[[component]]\nname = \"f\"\nfmu = \"f.fmu\"\n\
-             [[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n[[connect_by_name]]\n\
-             components = [\"f\", \"p\"]\n"
-                .to_owned()
-                + &damping("v", "a"),
-        );
-        workshop.punctual(["run", "s.toml", "--out", "out"]).success();
-        let table = Table::parse(&workshop.text("out/s.csv"));
-        every_step_is_satisfied(&table);
-        let (time, x, y) = (table.column("time"), table.column("p.x.x_p"), table.column("p.x.y_p"));
+        workshop.punctual(["run", "car.toml", "--out", "out", "--require", "kept"]).success();
+        let table = Table::parse(&workshop.text("out/car.csv"));
+        every_filter_step_is_satisfied(&table);
+        let (time, x, y) = (table.column("time"), table.column("plant.x.x_p"), table.column("plant.x.y_p"));
+        let error = if edits.is_empty() { 0.02 * 2.0_f64.sqrt() } else { 0.0 };
         for k in 0..time.len() {
-            let distance = (x[k] - 20.0).hypot(y[k] - 10.0);
-            assert!(time[k] < DEADLINE || distance <= 2.0, "{plant}: {distance} m at {} s", time[k]);
+            // The true distance is less than what was measured less its error; the margin is 0.05 m.
+            let distance = (x[k] - 20.0).hypot(y[k] - 10.0) - error;
+            assert!(time[k] < DEADLINE || distance <= 2.0, "{angle}: {distance} m at {} s", time[k]);
         }
-        let (held, kept) =
-            (table.column(&format!("f.u.{angle}")), table.column(&format!("f.integrator.{angle}")));
+        let held = table.column(&format!("filter.u.{angle}"));
+        let kept = table.column(&format!("filter.integrator.{angle}"));
         for k in 1..time.len() {
             // Half of one step and half of the next, each at a rate within 1 rad/s.
             let change = (held[k] - held[k - 1]).abs();
-            assert!(held[k].abs() <= 0.4 && change <= 0.01 + 1e-12, "{} rad at {} s", held[k], time[k]);
+            assert!(held[k].abs() <= 0.7 && change <= 0.01 + 1e-12, "{} rad at {} s", held[k], time[k]);
             assert!((kept[k] - 2.0 * held[k] + kept[k - 1]).abs() <= 1e-12, "the mean of a step");
         }
-        assert!(held.iter().any(|angle| angle.abs() > 0.05), "{plant} was never steered");
+        assert!(held.iter().any(|angle| angle.abs() > 0.05), "never steered by {angle}");
     }
 }
 

@@ -193,8 +193,7 @@ fn table_of_bicycles() {
     let starts = starts();
     let remedies = [
         ("none", NONE),
-        ("margin 0.2 m", Remedy { margin: 0.2, ..NONE }),
-        ("rate 2/s", Remedy { rate: 2.0, ..NONE }),
+        ("margin 0.5 m", Remedy { margin: 0.5, ..NONE }),
         ("rate 10/s", Remedy { rate: 10.0, ..NONE }),
         ("disturbance 5 m/s2", Remedy { disturbance: 5.0, ..NONE }),
     ];
