@@ -42,7 +42,7 @@ bounds = { beta_rate = [-4.0, 4.0] }
 name = "goal"
 centre = [25.0, 10.0]
 radius = 2.0
-deadline = 5.0
+deadline = 10.0
 "#;
 
 /// A unicycle that integrates with inner steps of 2⁻¹⁰ s, so that its times are exact.
