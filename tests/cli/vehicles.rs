@@ -98,6 +98,8 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
             ("x_p = 0.02", "x_p = 0.0"),
             ("y_p = 0.02", "y_p = 0.0"),
             ("v = 0.05", "v = 0.0"),
+            // Its row vanishes across the line of sight.
+            ("theta = -0.2", "theta = 0.4"),
         ],
     ];
     for (edits, angle) in edits.into_iter().zip(["delta", "beta"]) {
