@@ -318,9 +318,18 @@ pub fn rk4_step<P, const NX: usize, const NU: usize>(
 where
     P: ControlAffine<NX, NU>,
 {
-    let k1 = plant.derivative(x, u);
-    let k2 = plant.derivative(&(x + k1 * (dt / 2.0)), u);
-    let k3 = plant.derivative(&(x + k2 * (dt / 2.0)), u);
-    let k4 = plant.derivative(&(x + k3 * dt), u);
+    rk4(|x| plant.derivative(x, u), x, dt)
+}
+
+/// As [`rk4_step`], for any `derivative` of the state.
+pub(crate) fn rk4<const NX: usize>(
+    derivative: impl Fn(&SVector<f64, NX>) -> SVector<f64, NX>,
+    x: &SVector<f64, NX>,
+    dt: f64,
+) -> SVector<f64, NX> {
+    let k1 = derivative(x);
+    let k2 = derivative(&(x + k1 * (dt / 2.0)));
+    let k3 = derivative(&(x + k2 * (dt / 2.0)));
+    let k4 = derivative(&(x + k3 * dt));
     x + (k1 + (k2 + k3) * 2.0 + k4) * (dt / 6.0)
 }

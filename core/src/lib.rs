@@ -37,6 +37,7 @@
 //! | a | `rate` | 1/s | scalar |
 //! | μ | `margin` | `[h]` | scalar ≥ 0 |
 //! | W | `disturbance` | `[h]`/s^n | scalar ≥ 0 |
+//! | ε_i | [`measurement_errors`](filter::FilterBuilder::measurement_errors) | per component of x | `NX` |
 //! | e = h − μ − r | `error` | `[h]` | scalar |
 //! | r | `profile` | `[h]` | scalar |
 //! | τ = t − t₀ | `elapsed` | s | scalar ≥ 0 |

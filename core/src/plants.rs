@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::dynamics::{ControlAffine, IntegratedInput, Region, chain};
+use crate::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
 use crate::error::{Error, positive};
 use crate::scalar::Scalar;
 
@@ -27,6 +27,7 @@ const THETA: Signal = signal("theta", "rad", "heading, counter-clockwise from th
 const V: Signal = signal("v", "m/s", "speed along the heading; negative when reversing");
 const BETA: Signal = signal("beta", "rad", "slip angle at the centre of mass");
 const A: Signal = signal("a", "m/s2", "acceleration along the heading");
+const DELTA: Signal = signal("delta", "rad", "steering angle of the front wheel");
 
 /// Of every plant below: what no input changes at once is a function of position and heading, and its rate
 /// is the speed times something, which the acceleration changes.
@@ -265,11 +266,30 @@ impl KinematicBicycle {
     pub fn new(l_f: f64, l_r: f64) -> Result<Self, Error> {
         Ok(Self { l_f: positive("l_f", l_f)?, l_r: positive("l_r", l_r)? })
     }
+
+    /// β in rad that belongs to the steering angle `delta` in rad, |δ| < π/2.
+    pub fn slip_angle<S: Scalar>(&self, delta: S) -> S {
+        (delta.tan() * (self.l_r / (self.l_f + self.l_r))).atan()
+    }
+
+    /// δ in rad that belongs to the slip angle `beta` in rad, |β| < π/2.
+    pub fn steering_angle(&self, beta: f64) -> f64 {
+        (beta.tan() * ((self.l_f + self.l_r) / self.l_r)).atan()
+    }
+
+    /// The same vehicle with an angle for its input, which it then is not affine in: a plant, and no filter's model.
+    pub fn steered(self, steering: Steering) -> SteeredBicycle {
+        SteeredBicycle { bicycle: self, steering }
+    }
+
+    fn rates<S: Scalar>(&self, theta: S, v: S, beta: S) -> [S; 3] {
+        let (sin, cos) = (theta + beta).sin_cos();
+        [v * cos, v * sin, v * beta.sin() / self.l_r]
+    }
 }
 
 impl Signals for KinematicBicycle {
-    const STATES: &'static [Signal] =
-        &[X_P, Y_P, THETA, V, signal("delta", "rad", "steering angle of the front wheel")];
+    const STATES: &'static [Signal] = &[X_P, Y_P, THETA, V, DELTA];
     const INPUTS: &'static [Signal] = &[A, signal("delta_rate", "rad/s", "rate of the steering angle")];
 }
 
@@ -278,9 +298,8 @@ impl ControlAffine<5, 2> for KinematicBicycle {
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
-        let beta = (x[4].tan() * (self.l_r / (self.l_f + self.l_r))).atan();
-        let (sin, cos) = (x[2] + beta).sin_cos();
-        SVector::from([x[3] * cos, x[3] * sin, x[3] * beta.sin() / self.l_r, S::zero(), S::zero()])
+        let [x_p, y_p, theta] = self.rates(x[2], x[3], self.slip_angle(x[4]));
+        SVector::from([x_p, y_p, theta, S::zero(), S::zero()])
     }
 
     #[inline]
@@ -293,6 +312,62 @@ impl ControlAffine<5, 2> for KinematicBicycle {
 
     fn region(&self, x: &SVector<f64, 5>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
+    }
+}
+
+/// Which angle steers a [`SteeredBicycle`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Steering {
+    /// δ of the front wheel.
+    Angle,
+    /// β at the centre of mass, as the inputs of [`Bicycle`] and [`SmallSlipBicycle`] are: the conversion
+    /// δ = atan((l_f + l_r)/l_r tan β) is made inside.
+    SlipAngle,
+}
+
+impl Steering {
+    /// The inputs, in order.
+    pub fn inputs(self) -> &'static [Signal] {
+        match self {
+            Self::Angle => &[A, DELTA],
+            Self::SlipAngle => Bicycle::INPUTS,
+        }
+    }
+}
+
+/// The [`KinematicBicycle`] steered by an angle itself: x = (x_p, y_p, θ, v), u = (a, δ) or (a, β).
+#[derive(Clone, Copy, Debug)]
+pub struct SteeredBicycle {
+    bicycle: KinematicBicycle,
+    steering: Steering,
+}
+
+impl SteeredBicycle {
+    /// The states, in order.
+    pub const STATES: &'static [Signal] = Bicycle::STATES;
+}
+
+impl DynPlant for SteeredBicycle {
+    fn state_dim(&self) -> usize {
+        Self::STATES.len()
+    }
+
+    fn input_dim(&self) -> usize {
+        self.steering.inputs().len()
+    }
+
+    fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error> {
+        check_lengths((x, self.state_dim()), (u, self.input_dim()))?;
+        let beta = match self.steering {
+            Steering::Angle => self.bicycle.slip_angle(u[1]),
+            Steering::SlipAngle => u[1],
+        };
+        let derivative = |x: &SVector<f64, 4>| {
+            let [x_p, y_p, theta] = self.bicycle.rates(x[2], x[3], beta);
+            SVector::from([x_p, y_p, theta, u[0]])
+        };
+        x.copy_from_slice(rk4(derivative, &SVector::from_column_slice(x), dt).as_slice());
+        Ok(())
     }
 }
 

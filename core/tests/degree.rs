@@ -4,11 +4,11 @@ mod support;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside};
-use punctual_core::dynamics::{ControlAffine, IntegratedInput, rk4_step};
+use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
 use punctual_core::lie::{self, Derivatives, RelativeDegree, detected, relative_degree};
 use punctual_core::nalgebra::{SMatrix, SVector, Vector4, vector};
-use punctual_core::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
+use punctual_core::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Steering, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_core::simulation::{Schedule, closed_loop};
 use punctual_core::{Error, ErrorKind};
@@ -237,6 +237,26 @@ fn the_kinematic_bicycle_is_the_small_slip_one_for_small_angles() {
     for i in 0..4 {
         assert!((exact[i] - small[i]).abs() <= x[3] * beta * beta, "{i}: {} {}", exact[i], small[i]);
     }
+}
+
+/// Steered by the angle itself, in either form, the kinematic bicycle is the one whose angle is a state that rests.
+#[test]
+fn a_steered_bicycle_is_one_with_an_angle_at_rest() {
+    const DELTA: f64 = 0.4;
+    let mut state = SVector::from([1.0, -2.0, 0.5, 4.0, DELTA]);
+    let [mut by_angle, mut by_slip] = [[1.0, -2.0, 0.5, 4.0]; 2];
+    let beta = (1.6 / 2.8 * DELTA.tan()).atan();
+    assert!((kinematic().steering_angle(beta) - DELTA).abs() < 1e-15);
+    for _ in 0..100 {
+        state = rk4_step(&kinematic(), &state, &vector![0.75, 0.0], 0.01);
+        kinematic().steered(Steering::Angle).rk4_step(&mut by_angle, &[0.75, DELTA], 0.01).unwrap();
+        kinematic().steered(Steering::SlipAngle).rk4_step(&mut by_slip, &[0.75, beta], 0.01).unwrap();
+    }
+    assert_eq!(state.as_slice()[..4], by_angle);
+    // β is rounded once more.
+    assert!(by_angle.iter().zip(by_slip).all(|(a, b)| (a - b).abs() < 1e-13), "{by_angle:?} {by_slip:?}");
+    let refused = kinematic().steered(Steering::Angle).rk4_step(&mut by_angle, &[0.0; 3], 0.1);
+    assert_eq!(refused.unwrap_err().to_string(), "u: has 3 components, must have 2");
 }
 
 /// Seen from a point that moves with the disc the disc stands still. Exact in exact arithmetic; the

@@ -302,7 +302,7 @@ fn real(start: Option<f64>, unit: &str) -> VariableKind {
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
-    let (states, inputs) = (&c.plant.states(), &c.plant.inputs());
+    let (states, inputs) = (&c.measured_states(), &c.commanded());
     let mut table = Table::default();
     for state in states {
         let measured = table.signal("x", state, "measured ", Causality::Input);
@@ -356,6 +356,12 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         table.add(name("deadlocked"), deadlocked, output, flag());
         table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
         debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
+    }
+    if let Some(integrator) = &c.integrator {
+        let (name, inputs) = (&integrator.state, c.commanded());
+        let unit = inputs.iter().find(|i| i.name == *name).map_or("1", |i| &i.unit);
+        let ahead = "what the filter has integrated, at the end of the step; u is its mean over the step";
+        table.add(format!("integrator.{name}"), ahead, output, real(None, unit));
     }
     // Every output follows from state, reference and re-arming at once, or from nothing until a step.
     let direct: Vec<u32> = if c.direct_feedthrough { (0..outputs as u32).collect() } else { Vec::new() };

@@ -24,7 +24,7 @@ use crate::product::Product;
 const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// To be raised with every change of the layout. (The GUID changes with the version of the library.)
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
@@ -42,7 +42,11 @@ pub fn size(product: &Product) -> usize {
     let values: usize = product.variables.iter().map(|v| value(v.kind.base_type())).sum();
     let block = match &product.configuration {
         Configuration::Filter(c) => {
-            bool::SIZE + c.barrier.len() * FixedTimeState::SIZE + 2 * <Option<f64>>::SIZE + Inputs::SIZE
+            bool::SIZE
+                + c.barrier.len() * FixedTimeState::SIZE
+                + 2 * <Option<f64>>::SIZE
+                + Inputs::SIZE
+                + f64::SIZE
         }
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
         Configuration::Controller(_) => u32::SIZE,
@@ -82,13 +86,14 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
         }
     }
     match block {
-        BlockState::Filter { rearm_seen, filter } => {
+        BlockState::Filter { rearm_seen, filter, integrated } => {
             let FilterState { barriers, time, period, input } = filter;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
             period.write(&mut out);
             input.write(&mut out);
+            integrated.write(&mut out);
         }
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
         BlockState::Controller { waypoint } => waypoint.write(&mut out),
@@ -159,7 +164,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 period: input.field("period")?,
                 input: input.field("input")?,
             };
-            BlockState::Filter { rearm_seen, filter }
+            BlockState::Filter { rearm_seen, filter, integrated: input.finite("integrated")? }
         }
         Configuration::Plant(_) => {
             let x = (0..product.layout.states).map(|_| input.finite("x")).collect::<Result<_, _>>()?;

@@ -210,7 +210,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 return Err(Error::configuration("kind", message).in_file(file));
             }
         };
-        let states = configuration.plant.states();
+        let states = configuration.measured_states();
         let missing = states.iter().find(|s| !plant.x0.contains_key(&s.name));
         return match missing {
             Some(state) => {
@@ -218,7 +218,9 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 Err(Error::configuration("plant.model", message).in_file(file))
             }
             None => {
-                x0.iter_mut().zip(states).for_each(|(x, s)| *x = plant.x0[&s.name]);
+                // What the filter integrates itself begins with 0.
+                let all = configuration.plant.states();
+                x0.iter_mut().zip(all).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
                 Ok(Some(x0))
             }
         };

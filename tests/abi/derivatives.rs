@@ -6,7 +6,7 @@ use std::ptr::{null, null_mut};
 use punctual_modeldescription::{BaseType, Causality};
 
 use crate::api::{API, ERROR};
-use crate::fmu::{EXTERNAL, FILTER, Fmu, PLANT};
+use crate::fmu::{EXTERNAL, FILTER, Fmu, PLANT, STEERED};
 use crate::slave::Slave;
 
 /// Step of the differences, in units of inputs of order 1 to 10.
@@ -115,7 +115,10 @@ fn of_a_filter_in_every_mode_that_has_them() {
     let goal = [30.0, 22.0, 3.0, 4.0, 1.0, -1.0];
     let traffic = [8.0, 2.0, 0.3, 3.0, 12.0, 4.5, -0.5, 0.2, 2.0, 0.5];
     let external = [-30.0, 3.0, -0.5, 0.8, -0.6, -1.0, 1.0];
-    for (configuration, values) in [(FILTER, &goal[..]), (TRAFFIC, &traffic), (EXTERNAL, &external)] {
+    let steered = [3.0, -2.0, 0.45, 2.0, -0.5, 0.1];
+    for (configuration, values) in
+        [(FILTER, &goal[..]), (TRAFFIC, &traffic), (EXTERNAL, &external), (STEERED, &steered)]
+    {
         let fmu = Fmu::new(configuration);
         let slave = Slave::new(&fmu);
         let inputs = reals(&fmu, Causality::Input);

@@ -32,6 +32,19 @@ deadline = 10.0
 margin = 0.02
 "#;
 
+/// A filter that integrates the slip angle itself, with every number of the integrator in play.
+pub(crate) const STEERED: &str = r#"
+kind = "filter"
+plant = { model = "bicycle_small_slip_rate", l_r = 1.5 }
+integrator = { state = "beta", gain = 4.0, min = -0.5, max = 0.5 }
+bounds = { beta_rate = [-4.0, 4.0] }
+[[barrier]]
+name = "goal"
+centre = [25.0, 10.0]
+radius = 2.0
+deadline = 10.0
+"#;
+
 /// A unicycle that integrates with inner steps of 2⁻¹⁰ s, so that its times are exact.
 pub(crate) const PLANT: &str = r#"
 kind = "plant"

@@ -28,7 +28,7 @@ fn oracle(fmu: &Fmu, mut x: [f64; 4], u: [f64; 2], steps: usize, h: f64) -> [f64
 
 #[test]
 fn steps_are_those_of_core() {
-    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip"] {
+    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip", "bicycle_kinematic_angle"] {
         let fmu = Fmu::new(&PLANT.replace("unicycle", model).replace("x0 = { theta = 0.5, v = 2.0 }", ""));
         let slave = Slave::new(&fmu);
         let parameters = fmu.product.layout.parameters as u32;

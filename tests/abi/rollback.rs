@@ -5,17 +5,19 @@
 use punctual_modeldescription::{BaseType, Causality};
 
 use crate::api::API;
-use crate::fmu::{FILTER, Fmu, PLANT};
+use crate::fmu::{FILTER, Fmu, PLANT, STEERED};
 use crate::slave::Slave;
 
 /// Every model as a plant.
-const MODELS: [&str; 6] = [
+const MODELS: [&str; 8] = [
     "point_mass",
     "unicycle",
     "bicycle",
     "bicycle_small_slip",
     "bicycle_small_slip_rate",
     "bicycle_kinematic",
+    "bicycle_kinematic_angle",
+    "bicycle_kinematic_slip",
 ];
 
 /// A filter with two barriers that conflict at times, recoveries and anchors; measured periods.
@@ -50,6 +52,7 @@ fn every_fmu() -> Vec<Fmu> {
         Fmu::new(FILTER),
         Fmu::new(&format!("direct_feedthrough = false\n{}", FILTER.trim_start())),
         Fmu::new(CONFLICTS),
+        Fmu::new(STEERED),
     ];
     fmus.push(Fmu::new(&format!("{}{DISTURBANCE}", PLANT.trim_start())));
     for model in MODELS {

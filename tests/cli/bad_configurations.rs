@@ -58,7 +58,8 @@ fn an_unknown_model() {
         2,
         "my.toml: plant.model: at line 6, column 9\n  |\n6 | model = \"bike\"\n  |         ^^^^^^\n\
          unknown variant `bike`, expected one of `point_mass`, `unicycle`, `bicycle`, \
-         `bicycle_small_slip`, `bicycle_small_slip_rate`, `bicycle_kinematic`",
+         `bicycle_small_slip`, `bicycle_small_slip_rate`, `bicycle_kinematic`, \
+         `bicycle_kinematic_angle`, `bicycle_kinematic_slip`",
     );
 }
 

@@ -147,7 +147,7 @@ fn a_mixed_relative_degree_is_refused() {
         2,
         "filter.toml: barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, \
          a enters derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
-         bicycle_kinematic",
+         bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself",
     );
 }
 

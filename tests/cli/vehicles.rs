@@ -84,6 +84,56 @@ fn bicycles_steered_by_rates_keep_the_deadline() {
     }
 }
 
+/// The example of a car steered by an angle itself, and the same of a small-slip bicycle, exactly measured: where they
+/// are follows from the angle that the plant was given, which stays within its limits and those of its rate.
+#[test]
+fn bicycles_steered_by_angles_keep_the_deadline() {
+    let edits: [&[(&str, &str)]; 2] = [
+        &[],
+        &[
+            ("bicycle_kinematic_angle", "bicycle_small_slip"),
+            ("bicycle_kinematic", "bicycle_small_slip_rate"),
+            ("delta", "beta"),
+            ("l_f = 1.5", ""),
+            ("x_p = 0.02", "x_p = 0.0"),
+            ("y_p = 0.02", "y_p = 0.0"),
+            ("v = 0.05", "v = 0.0"),
+            // Its row vanishes across the line of sight.
+            ("theta = -0.2", "theta = 0.4"),
+        ],
+    ];
+    for (edits, angle) in edits.into_iter().zip(["delta", "beta"]) {
+        let workshop = Workshop::with_library();
+        for stem in ["car-filter", "car-plant", "car"] {
+            let toml = format!("{stem}.toml");
+            let text = fs::read_to_string(examples().join(&toml)).expect("an example");
+            workshop.write(&toml, edits.iter().fold(text, |text, (from, to)| text.replace(from, to)));
+            if stem != "car" {
+                workshop.punctual(["build", &toml, "-o", &format!("{stem}.fmu")]).success();
+            }
+        }
+        workshop.punctual(["run", "car.toml", "--out", "out", "--require", "kept"]).success();
+        let table = Table::parse(&workshop.text("out/car.csv"));
+        every_filter_step_is_satisfied(&table);
+        let (time, x, y) = (table.column("time"), table.column("plant.x.x_p"), table.column("plant.x.y_p"));
+        let error = if edits.is_empty() { 0.02 * 2.0_f64.sqrt() } else { 0.0 };
+        for k in 0..time.len() {
+            // The true distance is less than what was measured less its error; the margin is 0.05 m.
+            let distance = (x[k] - 20.0).hypot(y[k] - 10.0) - error;
+            assert!(time[k] < DEADLINE || distance <= 2.0, "{angle}: {distance} m at {} s", time[k]);
+        }
+        let held = table.column(&format!("filter.u.{angle}"));
+        let kept = table.column(&format!("filter.integrator.{angle}"));
+        for k in 1..time.len() {
+            // Half of one step and half of the next, each at a rate within 1 rad/s.
+            let change = (held[k] - held[k - 1]).abs();
+            assert!(held[k].abs() <= 0.7 && change <= 0.01 + 1e-12, "{} rad at {} s", held[k], time[k]);
+            assert!((kept[k] - 2.0 * held[k] + kept[k - 1]).abs() <= 1e-12, "the mean of a step");
+        }
+        assert!(held.iter().any(|angle| angle.abs() > 0.05), "never steered by {angle}");
+    }
+}
+
 /// A goal whose place comes from another FMU, past an obstacle: where the leader is follows from its own
 /// column, and it does not keep its velocity as the filter expects between samples.
 #[test]

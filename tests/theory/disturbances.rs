@@ -33,7 +33,7 @@ impl ControlAffine<4, 2> for PushedAway {
 
 /// A car steered by its jerk, of which this many m/s³ are lost.
 #[derive(Clone, Copy)]
-struct JerkCar(f64);
+pub(super) struct JerkCar(pub(super) f64);
 
 impl ControlAffine<3, 1> for JerkCar {
     fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
@@ -47,11 +47,11 @@ impl ControlAffine<3, 1> for JerkCar {
 
 /// How many of the runs were late, and how many outside at some sample from the deadline until 2T.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Failures {
-    late: usize,
-    outside: usize,
+pub(super) struct Failures {
+    pub(super) late: usize,
+    pub(super) outside: usize,
     /// Steps that were not satisfied.
-    unmet: usize,
+    pub(super) unmet: usize,
 }
 
 fn failures<M, P, B, const NX: usize, const NU: usize>(

@@ -4,8 +4,10 @@
 //! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`; the
 //! bands are those of the figures, far above what another platform's round-off changes.
 
+mod bicycles;
 mod chains;
 mod disturbances;
+mod measurements;
 mod obstacles;
 mod profiles;
 mod sampling;

@@ -20,16 +20,20 @@ pub(super) fn starts() -> Vec<[f64; 4]> {
     rows.collect()
 }
 
-/// Starts from the same box, drawn here: the figures must not hang on one file.
-pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
+/// Numbers in [0, 1): SplitMix64 (Steele, Lea and Flood, 2014), its upper 53 bits.
+pub(super) fn uniform() -> impl FnMut() -> f64 {
     let mut state = 2507_13888_u64;
-    // SplitMix64 (Steele, Lea and Flood, 2014), its upper 53 bits as a number in [0, 1).
-    let mut uniform = move || {
+    move || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    }
+}
+
+/// Starts from the same box, drawn here: the figures must not hang on one file.
+pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
+    let mut uniform = uniform();
     let mut start = || [20.0, 20.0, 20.0, 20.0].map(|width| width * uniform());
     (0..count).map(|_| start()).map(|[a, b, c, d]| [a, b, c - 10.0, d - 10.0]).collect()
 }

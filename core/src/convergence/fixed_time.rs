@@ -214,29 +214,43 @@ impl FixedTime {
     /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
     /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+        self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
+    }
+
+    /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0: what starts a theorem starts from the smallest
+    /// derivatives there can be, and what ends one is h < 0 for certain. Arrival stays that of `h` as it is given.
+    pub fn advance_within(&self, state: &mut FixedTimeState, t: f64, h: &[f64], errors: &Stack) -> Demand {
         // With n known to the compiler the short loops of the formulas unroll.
         match self.n {
-            1 => self.advance_degree::<1>(state, t, h),
-            2 => self.advance_degree::<2>(state, t, h),
-            3 => self.advance_degree::<3>(state, t, h),
-            4 => self.advance_degree::<4>(state, t, h),
-            5 => self.advance_degree::<5>(state, t, h),
-            6 => self.advance_degree::<6>(state, t, h),
-            7 => self.advance_degree::<7>(state, t, h),
-            _ => self.advance_degree::<8>(state, t, h),
+            1 => self.advance_degree::<1>(state, t, h, errors),
+            2 => self.advance_degree::<2>(state, t, h, errors),
+            3 => self.advance_degree::<3>(state, t, h, errors),
+            4 => self.advance_degree::<4>(state, t, h, errors),
+            5 => self.advance_degree::<5>(state, t, h, errors),
+            6 => self.advance_degree::<6>(state, t, h, errors),
+            7 => self.advance_degree::<7>(state, t, h, errors),
+            _ => self.advance_degree::<8>(state, t, h, errors),
         }
     }
 
-    /// [`Self::advance`] for n = `N`.
-    fn advance_degree<const N: usize>(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+    /// [`Self::advance_within`] for n = `N`.
+    fn advance_degree<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        t: f64,
+        h: &[f64],
+        errors: &Stack,
+    ) -> Demand {
+        let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
+        let is_outside = h[0] + errors[0] < 0.0;
         if state.phase == Phase::Waiting {
-            self.anchor(state, t, h, self.settings.deadline, 0.0);
+            self.anchor(state, t, &lowest, self.settings.deadline, 0.0);
         }
         if let Some(recovery) = self.settings.recovery
             && state.phase == Phase::Stay
-            && h[0] < 0.0
+            && is_outside
         {
-            self.anchor(state, t, h, recovery, state.period);
+            self.anchor(state, t, &lowest, recovery, state.period);
             state.recoveries = state.recoveries.saturating_add(1);
         }
         let FixedTimeState { stay_rate, margin, deadline, .. } = *state;
@@ -248,16 +262,16 @@ impl FixedTime {
             state.arrival = Some(t);
         }
         match state.phase {
-            _ if stay::is_invariant(stay_rate, &e) => {
+            _ if stay::is_invariant(stay_rate, &from_fn::<_, N, _>(|k| e[k] - errors[k])) => {
                 state.phase = Phase::Stay;
                 state.guaranteed = true;
             }
-            Phase::Stay if h[0] >= 0.0 => {}
+            Phase::Stay if !is_outside => {}
             Phase::Stay | Phase::Left => {
                 state.phase = Phase::Left;
                 state.guaranteed = false;
             }
-            _ if elapsed >= deadline && h[0] < 0.0 => {
+            _ if elapsed >= deadline && is_outside => {
                 state.phase = Phase::Late;
                 state.guaranteed = false;
             }
@@ -266,7 +280,7 @@ impl FixedTime {
 
         let (floor, profile) = match state.phase {
             Phase::Stay | Phase::Left => (-lower_terms(stay_rate, &e), 0.0),
-            _ => self.approach(state, elapsed, &e),
+            _ => self.approach(state, elapsed, &e, errors),
         };
         let floor = floor + self.settings.disturbance;
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
@@ -389,7 +403,13 @@ impl FixedTime {
 
     /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
     #[inline]
-    fn approach<const N: usize>(&self, state: &mut FixedTimeState, elapsed: f64, e: &[f64; N]) -> (f64, f64) {
+    fn approach<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        elapsed: f64,
+        e: &[f64; N],
+        errors: &Stack,
+    ) -> (f64, f64) {
         let anchor = &state.anchor[..N];
         match self.settings.method {
             Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
@@ -411,16 +431,17 @@ impl FixedTime {
                 let error: [f64; N] = from_fn(|k| e[k] - r[k]);
                 // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
                 let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
-                if state.margin > 0.0 && error[0] < -state.margin - scale {
+                if state.margin > 0.0 && error[0] < -state.margin - errors[0] - scale {
                     state.guaranteed = false;
                 }
                 let terms = match &self.settings.rates {
                     Some(rates) => rates.lower_terms(&error),
                     None => lower_terms(state.rate, &error),
                 };
+                let lowest: [f64; N] = from_fn(|k| error[k] - errors[k]);
                 let invariant = || match &self.settings.rates {
-                    Some(rates) => rates.is_invariant(&error),
-                    None => stay::is_invariant(state.rate, &error),
+                    Some(rates) => rates.is_invariant(&lowest),
+                    None => stay::is_invariant(state.rate, &lowest),
                 };
                 // The lemma can start at any sample before the deadline, also after one that was lost.
                 state.guaranteed = state.guaranteed || elapsed < state.deadline && invariant();

@@ -46,11 +46,14 @@ pub struct SampledDemand {
     /// ψ ≥ −c gives e ≥ −c/`attenuation`, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow, what they
     /// grow to until the deadline: (n − 1)! e^{aτ}/τⁿ⁻¹ for the time τ until then.
     pub attenuation: f64,
+    /// e^(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
+    pub decay: f64,
 }
 
 impl SampledDemand {
     /// Asks for nothing.
-    pub const ZERO: Self = Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0 };
+    pub const ZERO: Self =
+        Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0, decay: 0.0 };
 
     /// Whether it is [`Self::ZERO`].
     pub fn is_zero(&self) -> bool {
@@ -208,7 +211,7 @@ impl FixedTime {
         let decay = (-last * period).exp();
         let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
         let floor = undisturbed + self.disturbed(&weights, period);
-        Some(SampledDemand { weights, floor, attenuation })
+        Some(SampledDemand { weights, floor, attenuation, decay })
     }
 
     /// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period may fall below its prediction under disturbances of

@@ -2,6 +2,7 @@
 
 use nalgebra::SVector;
 
+use super::errors::{self, MeasurementErrors};
 use super::{
     BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Strictness, Workspace,
 };
@@ -13,7 +14,7 @@ use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource, Derivatives};
 use crate::qp::{self, Backend, Bounds, Enforcement, Row};
-use crate::{MAX_INPUTS, MAX_ROWS};
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
 /// Collects barriers and bounds for a [`SafetyFilter`].
 pub struct FilterBuilder {
@@ -24,6 +25,7 @@ pub struct FilterBuilder {
     correction_limit: f64,
     sampling: Sampling,
     delay: f64,
+    errors: Vec<f64>,
     backend: Backend,
 }
 
@@ -40,6 +42,7 @@ impl FilterBuilder {
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
             delay: 0.0,
+            errors: Vec::new(),
             backend: Backend::default(),
         }
     }
@@ -300,15 +303,45 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// Bounds on the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the
+    /// unit of x_i. Rows, anchors and phases are then such that the promises hold for the true state, to first order in
+    /// the errors. Default: none.
+    ///
+    /// Needs the reference profile and a prediction over the period; `late_certain` then stays false until the deadline
+    /// has passed, and there are no directional derivatives. Some four times the work of a step per measured state.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length, an error that is not finite or < 0.
+    pub fn measurement_errors(mut self, errors: &[f64]) -> Result<Self, Error> {
+        length("measurement_errors", errors.len(), self.state_dim)?;
+        for (i, &error) in errors.iter().enumerate() {
+            non_negative(&format!("measurement_errors[{}]", i + 1), error)?;
+        }
+        self.errors = errors.to_vec();
+        Ok(self)
+    }
+
     /// The filter, not yet anchored.
     ///
     /// # Errors
     ///
     /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
-    /// a given sampling period, or that a source cannot predict over.
+    /// a given sampling period, or that a source cannot predict over; measurement errors with such a delay, without a prediction
+    /// over the period, with another method than the reference profile, or with a source that gives no derivatives along
+    /// a direction.
     pub fn build(self) -> Result<SafetyFilter, Error> {
-        let Self { state_dim, input_dim, channels, bounds, correction_limit, sampling, delay, backend } =
-            self;
+        let Self {
+            state_dim,
+            input_dim,
+            mut channels,
+            bounds,
+            correction_limit,
+            sampling,
+            delay,
+            errors,
+            backend,
+        } = self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if channels.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
@@ -341,6 +374,10 @@ impl FilterBuilder {
                 );
             }
         }
+        let errors = MeasurementErrors::new(&errors);
+        if !errors.is_exact() {
+            errors::check_all(&mut channels, sampling, delay, input_dim)?;
+        }
         let barriers = vec![FixedTimeState::default(); channels.len()];
         let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {
@@ -350,6 +387,7 @@ impl FilterBuilder {
             demands: vec![SampledDemand::ZERO; channels.len()],
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],
+            slopes: vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count() * channels.len()],
             report: Report::new(channels.len()),
             programme: qp::Workspace::new(backend),
         };
@@ -364,6 +402,7 @@ impl FilterBuilder {
             correction_limit,
             sampling,
             delay,
+            errors,
             first_period,
             state,
             workspace,

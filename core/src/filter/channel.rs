@@ -54,6 +54,8 @@ pub(super) struct Channel {
     pub(super) begin: Begin,
     pub(super) end: End,
     pub(super) strictness: Strictness,
+    /// Whether the state is measured without errors.
+    pub(super) exact: bool,
 }
 
 /// Round-off of a time that is a sum of steps, as a part of it.
@@ -62,7 +64,7 @@ const SAME_TIME: f64 = 1e-12;
 impl Channel {
     pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
         let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
-        Self { name: name.to_owned(), source, promise, begin, end, strictness }
+        Self { name: name.to_owned(), source, promise, begin, end, strictness, exact: true }
     }
 
     /// How strictly its row is enforced.
@@ -130,9 +132,9 @@ impl Channel {
         }
     }
 
-    /// Whether the model says all of h: what a disturbance may do for it is never ruled out.
+    /// Whether model and measurement say all of h: what a disturbance may do for it is never ruled out.
     pub(super) fn is_undisturbed(&self) -> bool {
-        self.promise.settings().disturbance == 0.0
+        self.exact && self.promise.settings().disturbance == 0.0
     }
 
     /// Whether the deadline, `time_left` s after time and state `now`, certainly cannot be met: no input within

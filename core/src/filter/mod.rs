@@ -7,6 +7,8 @@
 
 mod builder;
 mod channel;
+mod errors;
+mod integrator;
 mod report;
 mod sampling;
 mod sensitivity;
@@ -17,11 +19,12 @@ pub use crate::convergence::{
 pub use builder::FilterBuilder;
 use channel::Channel;
 pub use channel::{Begin, End, Strictness};
+use errors::{MeasurementErrors, Slopes};
+pub use integrator::Integrator;
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 
-use crate::MAX_INPUTS;
 use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
@@ -29,6 +32,7 @@ use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Residuals, Row};
 use crate::reach;
 use crate::scalar::all_finite;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 use sampling::Held;
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -66,6 +70,8 @@ struct Workspace {
     next: FilterState,
     /// The state from which each barrier is held, one after the other.
     predicted: Vec<f64>,
+    /// Of each barrier by each measurement error.
+    slopes: Vec<Slopes>,
     report: Report,
     programme: qp::Workspace,
 }
@@ -93,6 +99,7 @@ pub struct SafetyFilter {
     correction_limit: f64,
     sampling: Sampling,
     delay: f64,
+    errors: MeasurementErrors,
     /// The period in s that [`Sampling::Measured`] starts from.
     first_period: f64,
     state: FilterState,
@@ -152,7 +159,7 @@ impl SafetyFilter {
         length("u", u.len(), self.input_dim)?;
         let begin = t + self.delay;
         let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
-        let Workspace { derivatives, rows, enforcement, demands, next, predicted, report, programme } =
+        let Workspace { derivatives, rows, enforcement, demands, next, predicted, slopes, report, programme } =
             &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
@@ -201,14 +208,21 @@ impl SafetyFilter {
             }
             // Phase: anchor, approach, arrival, stay; and the least h⁽ⁿ⁾ that keeps the promise.
             let stack = &derivatives.drift[..n];
-            channel.anchor(promise, (begin, self.delay), stack, (period, first));
-            let mut demand = channel.promise.advance(promise, begin, stack);
+            let mut unsure = [0.0; MAX_RELATIVE_DEGREE];
+            if !self.errors.is_exact() {
+                let slopes = &mut slopes[i * self.errors.count()..][..self.errors.count()];
+                unsure = self.errors.of_derivatives(&*channel.source, t, x, u.len(), slopes);
+            }
+            let lowest: [f64; MAX_RELATIVE_DEGREE] =
+                std::array::from_fn(|k| derivatives.drift[k] - unsure[k]);
+            channel.anchor(promise, (begin, self.delay), &lowest[..n], (period, first));
+            let mut demand = channel.promise.advance_within(promise, begin, stack, &unsure);
             let mut late_certain = promise.phase == Phase::Late;
             if late_certain || self.bounded {
                 let (now, time_left) = ((begin, from), demand.time_left);
                 late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
-                if late_certain && channel.postpone(promise, now, &self.bounds, stack, period) {
-                    demand = channel.promise.advance(promise, begin, stack);
+                if late_certain && channel.postpone(promise, now, &self.bounds, &lowest[..n], period) {
+                    demand = channel.promise.advance_within(promise, begin, stack, &unsure);
                     late_certain = false;
                 }
             }
@@ -239,8 +253,20 @@ impl SafetyFilter {
             report.period = period;
             let (channels, enforcement) = (&self.channels[..], &*enforcement);
             let (t, x, demands) = (begin, &predicted[..], &*demands);
-            let problem =
-                Held { channels, demands, t, x, period, bounds, u_ref, enforcement, correction_limit };
+            let (errors, slopes) = (&self.errors, &slopes[..]);
+            let problem = Held {
+                channels,
+                demands,
+                t,
+                x,
+                period,
+                bounds,
+                u_ref,
+                enforcement,
+                correction_limit,
+                errors,
+                slopes,
+            };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             held = problem.solve(rows, last, programme, u);
             if held.is_none() {
@@ -285,6 +311,9 @@ impl SafetyFilter {
             report_b.slack = row.slack(u);
             let soft = matches!(enforcement[i], Enforcement::Soft { .. });
             let met = report.status.is_satisfied() && !soft || row.holds(u);
+            // A row without what the errors may do is not the one of the theorem.
+            promise.guaranteed &= report.predicted || self.errors.is_exact();
+            report_b.guaranteed = promise.guaranteed;
             promise.unmet = (!met).then(|| Unmet::after(promise.unmet, t, report_b.h));
             if let Some(unmet) = promise.unmet {
                 promise.guaranteed = false;
@@ -416,8 +445,12 @@ impl SafetyFilter {
     /// No such barrier; a source of other dimensions or another relative degree.
     pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
         let dims = (self.state_dim, self.input_dim);
+        let (exact, count) = (self.errors.is_exact(), dims.1);
         let channel = self.channel(index)?;
         let named = |e: Error| e.within(&channel.name);
+        if !exact {
+            errors::check(&*source, count).map_err(named)?;
+        }
         length("x", source.state_dim(), dims.0).map_err(named)?;
         length("u", source.input_dim(), dims.1).map_err(named)?;
         let (found, wanted) = (source.relative_degree(), channel.source.relative_degree());

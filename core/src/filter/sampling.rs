@@ -17,7 +17,8 @@
 //! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
 //! count as equal: a sample taken again gives the same bits.
 
-use super::{Channel, FilterState};
+use super::errors::{Slopes, Uncertainty};
+use super::{Channel, FilterState, MeasurementErrors};
 use crate::convergence::sampled::SampledDemand;
 use crate::error::{Error, positive};
 use crate::lie::Ahead;
@@ -108,6 +109,9 @@ pub(super) struct Held<'a> {
     pub(super) u_ref: &'a [f64],
     pub(super) enforcement: &'a [Enforcement],
     pub(super) correction_limit: f64,
+    pub(super) errors: &'a MeasurementErrors,
+    /// How the derivatives of h at `t` change with each error, one barrier after the other.
+    pub(super) slopes: &'a [Slopes],
 }
 
 /// Models of the sampled rows, and how far each is from being met at the present u, in units of its terms.
@@ -264,6 +268,17 @@ impl Held<'_> {
             }
             // Divided by the period, the row is one on h⁽ⁿ⁾ as the pointwise one.
             value /= self.period;
+            if !self.errors.is_exact() {
+                let slopes = &self.slopes[i * self.errors.count()..][..self.errors.count()];
+                let held = (self.t, x, u, self.period);
+                let Uncertainty { size, gradient } =
+                    self.errors.of_row(&*channel.source, held, demand, slopes)?;
+                value -= size;
+                terms += size;
+                for (a, d) in normal.iter_mut().zip(&gradient) {
+                    *a -= d;
+                }
+            }
             let (mut at_u, mut moved) = (0.0, 0.0);
             for (a, v) in normal.iter().zip(u) {
                 at_u += a * v;

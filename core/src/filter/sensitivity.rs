@@ -73,6 +73,9 @@ pub enum NoDerivative {
     NotConverged,
     /// The active rows do not determine the change of the input.
     Dependent,
+    /// The state has [measurement errors](super::FilterBuilder::measurement_errors), whose rows contain derivatives by
+    /// the state already.
+    MeasurementErrors,
 }
 
 impl fmt::Display for NoDerivative {
@@ -83,6 +86,7 @@ impl fmt::Display for NoDerivative {
             Self::Postponed(i) => write!(f, "the deadline of barrier {i} is given up at this sample"),
             Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
             Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
+            Self::MeasurementErrors => f.write_str("not with measurement errors"),
         }
     }
 }
@@ -186,6 +190,9 @@ impl SafetyFilter {
         let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
         if constant.contains(&self.report().status) {
             return Ok(None);
+        }
+        if !self.errors.is_exact() {
+            return Ok(Some(NoDerivative::MeasurementErrors));
         }
         Ok(self.along(t, [x, dx], [u_ref, du_ref], u, out).err())
     }

@@ -1,6 +1,6 @@
 //! A filter: samples its inputs, remembers its promises.
 
-use punctual_core::filter::{FilterState, NoDerivative, SafetyFilter, SampleDerivative, Status};
+use punctual_core::filter::{FilterState, Integrator, NoDerivative, SafetyFilter, SampleDerivative, Status};
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
@@ -11,6 +11,7 @@ pub(super) struct FilterBlock {
     parameters: Vec<Parameter<FilterConfiguration>>,
     layout: Layout,
     filter: SafetyFilter,
+    integrator: Option<Integrator>,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
     /// Scratch: what to go back to after looking ahead over a re-arming.
@@ -27,9 +28,10 @@ impl FilterBlock {
         layout: Layout,
     ) -> Result<Self, ConfigurationError> {
         let (parameters, filter) = (configuration.parameters(), configuration.build()?);
+        let integrator = configuration.build_integrator(&filter)?;
         let (kept, u) = (filter.state().clone(), vec![0.0; layout.inputs]);
         let change = SampleDerivative::default();
-        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, kept, u, change })
+        Ok(Self { configuration, parameters, layout, filter, integrator, rearm_seen: false, kept, u, change })
     }
 
     fn rearm_index(&self) -> usize {
@@ -52,22 +54,38 @@ impl FilterBlock {
         rising
     }
 
-    /// One sample at `t`: with `commit` it is remembered, else only looked at.
-    fn sample(&mut self, t: f64, commit: bool, values: &mut Values) -> Result<(), String> {
+    /// For how long the input is going to be held, in s, where no step says so.
+    fn hold(&self) -> f64 {
+        self.filter.state().period.unwrap_or(self.configuration.experiment.step_size)
+    }
+
+    /// One sample at `t`: with the length of a step it is remembered, else only looked at.
+    fn sample(&mut self, t: f64, step: Option<f64>, values: &mut Values) -> Result<(), String> {
         let rising = self.rearm(values);
+        let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
         let [x, u_ref] = self.inputs(&values.reals);
-        let done = if commit {
-            self.rearm_seen = values.booleans[self.rearm_index()];
-            self.filter.step(t, x, u_ref, &mut self.u).map(|_| ())
-        } else {
-            let looked = self.filter.peek(t, x, u_ref, &mut self.u).map(|_| ());
-            if rising {
-                self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
+        let (filter, u) = (&mut self.filter, &mut self.u);
+        let mut integrated = self.integrator.as_ref().map_or(0.0, Integrator::value);
+        let done = match (&mut self.integrator, step) {
+            (None, Some(_)) => filter.step(t, x, u_ref, u).map(|_| ()),
+            (None, None) => filter.peek(t, x, u_ref, u).map(|_| ()),
+            (Some(integrator), Some(h)) => integrator.step(filter, t, hold, x, u_ref, u).map(|_| {
+                if h == 0.0 {
+                    integrator.set_value(integrated);
+                }
+                integrated = integrator.value();
+            }),
+            (Some(integrator), None) => {
+                integrator.peek(filter, t, hold, x, u_ref, u).map(|value| integrated = value)
             }
-            looked
         };
+        if step.is_some() {
+            self.rearm_seen = values.booleans[self.rearm_index()];
+        } else if rising {
+            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
+        }
         done.map_err(|e| e.to_string())?;
-        self.write(values);
+        self.write(values, integrated);
         Ok(())
     }
 
@@ -86,7 +104,7 @@ impl FilterBlock {
     }
 
     /// Writes the last sample to the outputs, in the order of the variable table.
-    fn write(&self, values: &mut Values) {
+    fn write(&self, values: &mut Values, integrated: f64) {
         let report = self.filter.report();
         let mut at = self.layout.outputs;
         values.reals[at..][..self.u.len()].copy_from_slice(&self.u);
@@ -104,6 +122,9 @@ impl FilterBlock {
             values.integers[at + 12] = b.phase as i32;
             at += BARRIER_OUTPUTS;
         }
+        if self.integrator.is_some() {
+            values.reals[at] = integrated;
+        }
     }
 }
 
@@ -111,7 +132,9 @@ impl Block for FilterBlock {
     fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError> {
         let numbers = &values.reals[self.layout.parameters..self.layout.end];
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
-        self.filter = configuration.build()?;
+        let filter = configuration.build()?;
+        self.integrator = configuration.build_integrator(&filter)?;
+        self.filter = filter;
         self.configuration = configuration;
         self.rearm_seen = false;
         self.kept.clone_from(self.filter.state());
@@ -120,7 +143,7 @@ impl Block for FilterBlock {
 
     fn output(&mut self, t: f64, values: &mut Values) {
         // The lengths are those of the filter by construction: the table was built from it.
-        let sampled = self.sample(t, false, values);
+        let sampled = self.sample(t, None, values);
         debug_assert!(sampled.is_ok(), "{sampled:?}");
     }
 
@@ -132,8 +155,13 @@ impl Block for FilterBlock {
         derivative: &mut [f64],
     ) -> Result<(), String> {
         let rising = self.rearm(values);
+        let hold = self.hold();
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
-        let unknown = self.filter.differentiate(t, [x, dx], [u_ref, du_ref], &mut self.change);
+        let (filter, change) = (&mut self.filter, &mut self.change);
+        let unknown = match &mut self.integrator {
+            None => filter.differentiate(t, [x, dx], [u_ref, du_ref], change),
+            Some(integrator) => integrator.differentiate(filter, (t, hold), [x, dx], [u_ref, du_ref], change),
+        };
         if rising {
             self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
         }
@@ -151,11 +179,14 @@ impl Block for FilterBlock {
             derivative[at..][..6].copy_from_slice(&reals);
             at += BARRIER_OUTPUTS;
         }
+        if let Some(integrator) = &self.integrator {
+            derivative[at] = 2.0 * self.change.u[integrator.input()];
+        }
         Ok(())
     }
 
-    fn step(&mut self, t: f64, _h: f64, values: &mut Values) -> Result<(), String> {
-        self.sample(t, true, values)
+    fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
+        self.sample(t, Some(h), values)
     }
 
     fn save(&self, state: &mut BlockState) {
@@ -163,6 +194,7 @@ impl Block for FilterBlock {
         let Self {
             rearm_seen: now,
             filter: memory,
+            integrator,
             configuration: _,
             parameters: _,
             layout: _,
@@ -170,23 +202,28 @@ impl Block for FilterBlock {
             u: _,
             change: _,
         } = self;
+        let value = integrator.as_ref().map_or(0.0, Integrator::value);
         match state {
-            BlockState::Filter { rearm_seen, filter } => {
-                *rearm_seen = *now;
+            BlockState::Filter { rearm_seen, filter, integrated } => {
+                (*rearm_seen, *integrated) = (*now, value);
                 filter.clone_from(memory.state());
             }
             _ => {
-                *state = BlockState::Filter { rearm_seen: *now, filter: memory.state().clone() };
+                let filter = memory.state().clone();
+                *state = BlockState::Filter { rearm_seen: *now, filter, integrated: value };
             }
         }
     }
 
     fn restore(&mut self, state: &BlockState) -> Result<(), String> {
-        let BlockState::Filter { rearm_seen, filter } = state else {
+        let BlockState::Filter { rearm_seen, filter, integrated } = state else {
             return Err(state.mismatch("filter"));
         };
         self.filter.restore(filter).map_err(|e| e.to_string())?;
         self.rearm_seen = *rearm_seen;
+        if let Some(integrator) = &mut self.integrator {
+            integrator.set_value(*integrated);
+        }
         Ok(())
     }
 
@@ -204,7 +241,10 @@ impl Block for FilterBlock {
             let name = self.configuration.plant.input_name(i);
             let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
             // Not `clamp`, which panics where the bounds contradict each other.
-            values.reals[outputs + i] = 0.0_f64.max(min).min(max);
+            values.reals[outputs + i] = match &self.integrator {
+                Some(integrator) if integrator.input() == i => integrator.value(),
+                _ => 0.0_f64.max(min).min(max),
+            };
         }
         values.integers[outputs + inputs] = Status::InvalidInput as i32;
     }

@@ -57,6 +57,8 @@ pub enum BlockState {
         rearm_seen: bool,
         /// The promises.
         filter: FilterState,
+        /// What it has integrated; 0 without an integrator.
+        integrated: f64,
     },
     /// Of a plant.
     Plant {

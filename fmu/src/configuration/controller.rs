@@ -49,7 +49,8 @@ fn turns(controller: ControllerName, model: ModelName) -> bool {
 }
 
 fn slips(controller: ControllerName, model: ModelName) -> bool {
-    drives(controller, model) && matches!(model, ModelName::Bicycle | ModelName::BicycleSmallSlip)
+    drives(controller, model)
+        && matches!(model, ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip)
 }
 
 /// Default of the gain of the damping in 1/s.
@@ -212,7 +213,12 @@ impl ControllerConfiguration {
         let refuse = |field: &str, message: String| Err(ConfigurationError::new(field, message));
         let name = controller.name();
         if drives(controller, model)
-            && matches!(model, ModelName::BicycleSmallSlipRate | ModelName::BicycleKinematic)
+            && matches!(
+                model,
+                ModelName::BicycleSmallSlipRate
+                    | ModelName::BicycleKinematic
+                    | ModelName::BicycleKinematicAngle
+            )
         {
             let message = format!("is {name:?}, which {} has none of; must be \"damping\"", model.name());
             return refuse("controller", message);
@@ -304,7 +310,11 @@ impl ControllerConfiguration {
     pub fn damped(&self) -> &'static [(usize, usize)] {
         match self.plant.model {
             ModelName::PointMass => &[(2, 0), (3, 1)],
-            ModelName::Unicycle | ModelName::Bicycle | ModelName::BicycleSmallSlip => &[(3, 0)],
+            ModelName::Unicycle
+            | ModelName::Bicycle
+            | ModelName::BicycleSmallSlip
+            | ModelName::BicycleKinematicAngle
+            | ModelName::BicycleKinematicSlip => &[(3, 0)],
             ModelName::BicycleSmallSlipRate | ModelName::BicycleKinematic => &[(3, 0), (4, 1)],
         }
     }

@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};
 use super::{
-    BarrierInput, ConfigurationError, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
-    Range, ReferenceSection, ShapeName, check_identifier,
+    BarrierInput, ConfigurationError, ExperimentSection, IntegratorSection, ModelName, Parameter,
+    PlantSection, PluginLoader, Range, ReferenceSection, ShapeName, VariableSection, check_identifier,
 };
 
 /// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
@@ -67,8 +67,29 @@ impl Visitor for Adding<'_> {
             ModelName::BicycleKinematic => {
                 c.add_along::<_, _, 5, 9>(builder, at, model.kinematic()?, barrier)
             }
+            ModelName::BicycleKinematicAngle | ModelName::BicycleKinematicSlip => {
+                Err(not_affine(model.model))
+            }
         }
     }
+}
+
+/// Why a filter cannot have `model`, which is not affine in its inputs.
+fn not_affine(model: ModelName) -> ConfigurationError {
+    let (angle, advice) = match model {
+        ModelName::BicycleKinematicAngle => {
+            ("delta", "take the model bicycle_kinematic with `[integrator] state = \"delta\"`")
+        }
+        _ => (
+            "beta",
+            "take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which nearly are it",
+        ),
+    };
+    let message = format!(
+        "is {:?}, which is a plant only: {angle} does not enter linearly, as a filter needs it; {advice}",
+        model.name()
+    );
+    ConfigurationError::new("plant.model", message)
 }
 
 /// Which barrier, and the first of the filter's states that say where its point is, if it follows one.
@@ -110,11 +131,18 @@ pub struct FilterConfiguration {
     pub correction_limit: f64,
     /// The plant that the filter is for.
     pub plant: PlantSection,
+    /// Which state of it the filter commands and integrates itself. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integrator: Option<IntegratorSection>,
     /// The safe sets, at least one.
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input. Default: none (±1e30).
     #[serde(default)]
     pub bounds: BTreeMap<String, [f64; 2]>,
+    /// Bounds on the errors of the measured states, by name, in their units; ≥ 0. The promises then hold for the true
+    /// state. Default: none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measurement_errors: BTreeMap<String, f64>,
     /// The run it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
@@ -135,6 +163,12 @@ impl FilterConfiguration {
         }
         check_identifier("name", &self.name)?;
         self.plant.complete(loader)?;
+        if let Some(model) = self.plant.model.filter(|model| !model.is_affine()) {
+            return Err(not_affine(model));
+        }
+        if let Some(integrator) = &self.integrator {
+            integrator.place(&self.plant)?;
+        }
         if self.barrier.is_empty() {
             return Err(ConfigurationError::new("barrier", "is empty, must have at least 1"));
         }
@@ -147,8 +181,20 @@ impl FilterConfiguration {
             self.barrier[i].complete(&format!("barrier[{i}]"), &self.plant)?;
             let name = self.barrier[i].name.clone();
             // A barrier's variables must not fall among the filter's own.
-            let reserved =
-                ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "l_r", "l_f"].contains(&&*name);
+            let reserved = [
+                "x",
+                "u",
+                "u_ref",
+                "u_min",
+                "u_max",
+                "status",
+                "rearm",
+                "l_r",
+                "l_f",
+                "integrator",
+                "measurement_error",
+            ];
+            let reserved = reserved.contains(&&*name);
             let reserved = reserved || self.plant.parameters.iter().any(|p| p.name == name);
             if reserved || self.barrier[..i].iter().any(|b| b.name == name) {
                 let message = format!("is {name:?}, which is already the name of something else");
@@ -173,12 +219,18 @@ impl FilterConfiguration {
                 *max = UNBOUNDED;
             }
         }
+        let states = self.measured_states();
+        if let Some(unknown) = self.measurement_errors.keys().find(|k| states.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
+            let message = format!("unknown measured state, must be one of {}", names.join(", "));
+            return Err(ConfigurationError::new(format!("measurement_errors.{unknown}"), message));
+        }
         self.experiment.check()?;
         for parameter in self.parameters() {
             parameter.check(&mut self)?;
         }
         // Whatever the ranges of single numbers cannot say.
-        self.build()?;
+        self.build_integrator(&self.build()?)?;
         Ok(self)
     }
 
@@ -195,6 +247,20 @@ impl FilterConfiguration {
                 }));
             }
         }
+        let erroneous = |state: &VariableSection| self.measurement_errors.contains_key(&state.name);
+        for state in self.measured_states().into_iter().filter(erroneous) {
+            let names =
+                (format!("measurement_error.{}", state.name), format!("measurement_errors.{}", state.name));
+            let description = format!("largest error of the measured {}", state.description);
+            rows.push(Parameter::new(
+                names,
+                state.unit,
+                Range::NON_NEGATIVE,
+                description,
+                move |c: &mut Self| c.measurement_errors.entry(state.name.clone()).or_default(),
+            ));
+        }
+        rows.extend(self.integrator.iter().flat_map(|i| i.parameters(&self.plant)));
         // Only a disturbance has a unit that depends on them.
         let disturbed = self.barrier.iter().any(|b| b.disturbance != 0.0);
         let degrees = if disturbed { self.relative_degrees() } else { Vec::new() };
@@ -278,11 +344,16 @@ impl FilterConfiguration {
             min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });
             max.push(if high >= UNBOUNDED { f64::INFINITY } else { high });
         }
+        let mut errors = vec![0.0; states + self.barrier_inputs().len()];
+        for (error, state) in errors.iter_mut().zip(self.plant.states()) {
+            *error = self.measurement_errors.get(&state.name).copied().unwrap_or(0.0);
+        }
         builder
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
             .and_then(|b| b.actuation_delay(self.actuation_delay))
             .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
+            .and_then(|b| b.measurement_errors(&errors))
             .and_then(FilterBuilder::build)
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
@@ -407,7 +478,7 @@ impl FilterConfiguration {
             let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
             let advice = match (self.plant.model, found) {
                 (Some(ModelName::BicycleSmallSlip), _) => {
-                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic"
+                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself"
                 }
                 (None, RelativeDegree::Mixed(_)) => {
                     "; one constraint cannot use both, so make the input that enters first a state whose derivative is the new input"

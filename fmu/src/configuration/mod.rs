@@ -8,6 +8,7 @@ mod barrier;
 mod controller;
 mod external;
 mod filter;
+mod integrator;
 mod model;
 mod parameter;
 mod plant;
@@ -20,6 +21,7 @@ pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, Shape
 pub use controller::{ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
+pub use integrator::IntegratorSection;
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};

@@ -14,7 +14,19 @@ use super::{
 };
 
 /// Names that parameters of a model must leave to the FMU.
-const RESERVED: [&str; 9] = ["x", "u", "u_ref", "u_min", "u_max", "status", "rearm", "x0", "inner_step"];
+const RESERVED: [&str; 11] = [
+    "x",
+    "u",
+    "u_ref",
+    "u_min",
+    "u_max",
+    "status",
+    "rearm",
+    "x0",
+    "inner_step",
+    "integrator",
+    "measurement_error",
+];
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -274,13 +286,19 @@ impl PlantSection {
         let lengths = [("l_r", self.l_r), ("l_f", self.l_f)];
         let lengths = lengths.into_iter().filter_map(|(name, value)| Some((name, value?)));
         let own = self.parameters.iter().map(|p| (p.name.as_str(), p.start));
-        let derivatives: Vec<&str> = match self.reference() {
-            Some(reference) => reference.derivatives().to_vec(),
-            None => states.iter().map(|s| self.derivatives.get(s).map_or("", String::as_str)).collect(),
-        };
+        let derivatives = self.derivatives();
         let parameters: Vec<_> = lengths.chain(own).collect();
         Model::new(&texts(&states), &texts(&inputs), &parameters, &derivatives)
             .map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
+    }
+
+    /// The expressions for the derivatives of its states, in order.
+    pub(super) fn derivatives(&self) -> Vec<&str> {
+        let own = |s: &VariableSection| self.derivatives.get(&s.name).map_or("", String::as_str);
+        match self.reference() {
+            Some(reference) => reference.derivatives().to_vec(),
+            None => self.states.iter().map(own).collect(),
+        }
     }
 
     /// The parameters of the model, reached through `section` in a configuration of type `C`.

@@ -3,7 +3,7 @@
 use punctual_core::dynamics::{DynPlant, Erased};
 use punctual_core::plants::{
     Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
-    Unicycle,
+    SteeredBicycle, Steering, Unicycle,
 };
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,10 @@ pub enum ModelName {
     BicycleSmallSlipRate,
     /// [`KinematicBicycle`], steered by the rate of its front wheel.
     BicycleKinematic,
+    /// The same, steered by the angle of its front wheel: as a plant only, since that does not enter linearly.
+    BicycleKinematicAngle,
+    /// The same, steered by its slip angle as the simplified and the small-slip bicycle are: as a plant only.
+    BicycleKinematicSlip,
 }
 
 impl ModelName {
@@ -37,6 +41,7 @@ impl ModelName {
             Self::BicycleSmallSlip => SmallSlipBicycle::STATES,
             Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::STATES,
             Self::BicycleKinematic => KinematicBicycle::STATES,
+            Self::BicycleKinematicAngle | Self::BicycleKinematicSlip => SteeredBicycle::STATES,
         }
     }
 
@@ -49,6 +54,8 @@ impl ModelName {
             Self::BicycleSmallSlip => SmallSlipBicycle::INPUTS,
             Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::INPUTS,
             Self::BicycleKinematic => KinematicBicycle::INPUTS,
+            Self::BicycleKinematicAngle => Steering::Angle.inputs(),
+            Self::BicycleKinematicSlip => Steering::SlipAngle.inputs(),
         }
     }
 
@@ -61,6 +68,8 @@ impl ModelName {
             Self::BicycleSmallSlip => "bicycle with small slip angle",
             Self::BicycleSmallSlipRate => "bicycle with small slip angle, steered by its rate",
             Self::BicycleKinematic => "kinematic bicycle, steered by the rate of its front wheel",
+            Self::BicycleKinematicAngle => "kinematic bicycle, steered by the angle of its front wheel",
+            Self::BicycleKinematicSlip => "kinematic bicycle, steered by its slip angle",
         }
     }
 
@@ -73,6 +82,8 @@ impl ModelName {
             Self::BicycleSmallSlip => "bicycle_small_slip",
             Self::BicycleSmallSlipRate => "bicycle_small_slip_rate",
             Self::BicycleKinematic => "bicycle_kinematic",
+            Self::BicycleKinematicAngle => "bicycle_kinematic_angle",
+            Self::BicycleKinematicSlip => "bicycle_kinematic_slip",
         }
     }
 
@@ -81,7 +92,12 @@ impl ModelName {
     }
 
     fn has_l_f(self) -> bool {
-        self == Self::BicycleKinematic
+        matches!(self, Self::BicycleKinematic | Self::BicycleKinematicAngle)
+    }
+
+    /// Whether it is affine in its inputs, as the model of a filter has to be.
+    pub fn is_affine(self) -> bool {
+        !matches!(self, Self::BicycleKinematicAngle | Self::BicycleKinematicSlip)
     }
 }
 
@@ -94,7 +110,7 @@ pub struct ReferenceSection {
     /// Bicycles only: distance from the rear axle to the centre of mass in m, > 0. Default 10.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub l_r: Option<f64>,
-    /// `bicycle_kinematic` only: distance from the centre of mass to the front axle in m, > 0.
+    /// `bicycle_kinematic` and `bicycle_kinematic_angle` only: distance from the centre of mass to the front axle in m, > 0.
     /// Default 10.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub l_f: Option<f64>,
@@ -167,6 +183,15 @@ impl ReferenceSection {
                 "a",
                 "delta_rate",
             ],
+            ModelName::BicycleKinematicAngle => &[
+                "v*cos(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                "v*sin(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                "v*sin(atan(tan(delta)*(l_r/(l_f + l_r))))/l_r",
+                "a",
+            ],
+            ModelName::BicycleKinematicSlip => {
+                &["v*cos(theta + beta)", "v*sin(theta + beta)", "v*sin(beta)/l_r", "a"]
+            }
         }
     }
 
@@ -202,6 +227,8 @@ impl ReferenceSection {
             ModelName::BicycleSmallSlip => Box::new(Erased(self.small_slip()?)),
             ModelName::BicycleSmallSlipRate => Box::new(Erased(self.small_slip()?.with_rate())),
             ModelName::BicycleKinematic => Box::new(Erased(self.kinematic()?)),
+            ModelName::BicycleKinematicAngle => Box::new(self.kinematic()?.steered(Steering::Angle)),
+            ModelName::BicycleKinematicSlip => Box::new(self.kinematic()?.steered(Steering::SlipAngle)),
         })
     }
 }

@@ -23,6 +23,18 @@ x0 = { v = 1.5 }
 inner_step = 0.01
 "#;
 
+const STEERED: &str = r#"
+kind = "filter"
+plant = { model = "bicycle_small_slip_rate", l_r = 1.5 }
+integrator = { state = "beta", gain = 4.0, min = -0.5, max = 0.5 }
+bounds = { beta_rate = [-4.0, 4.0] }
+[[barrier]]
+name = "goal"
+centre = [45.0, 44.0]
+radius = 2.0
+deadline = 10.0
+"#;
+
 const HEADING: &str = r#"
 kind = "controller"
 controller = "heading"
@@ -68,6 +80,22 @@ defects! {
         "barrier[0].margin: is -0.1, must be finite and >= 0";
     negative_disturbance: FILTER, "radius = 2.0" => "radius = 2.0\ndisturbance = -0.1",
         "barrier[0].disturbance: is -0.1, must be finite and >= 0";
+    negative_measurement_error: FILTER, "bounds =" => "measurement_errors = { v = -0.1 }\nbounds =",
+        "measurement_errors.v: is -0.1, must be finite and >= 0";
+    measurement_error_of_no_state: FILTER, "bounds =" => "measurement_errors = { w = 0.1 }\nbounds =",
+        "measurement_errors.w: unknown measured state, must be one of x_p, y_p, theta, v";
+    measurement_error_of_an_integrated_state: STEERED, "bounds =" => "measurement_errors = { beta = 0.1 }\nbounds =",
+        "measurement_errors.beta: unknown measured state, must be one of x_p, y_p, theta, v";
+    measurement_error_of_a_pointwise_row: FILTER,
+        "bounds =" => "sampling = \"pointwise\"\nmeasurement_errors = { v = 0.1 }\nbounds =",
+        "measurement_errors: needs the prediction over the period, the sampling is pointwise";
+    measurement_error_of_the_repeated_root: FILTER,
+        "bounds = { a = [-9.0, 8.0] }\n[[barrier]]" =>
+        "measurement_errors = { v = 0.1 }\n[[barrier]]\nmethod = \"repeated_root\"",
+        "goal.measurement_errors: needs the reference profile";
+    measurement_error_of_a_delayed_filter: FILTER,
+        "bounds =" => "actuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
+        "measurement_errors: needs an actuation_delay of 0, it is 0.001";
     disturbance_of_no_input: PLANT, "[integration]" => "[disturbance]\ninputs = { omega = 1.0 }\n[integration]",
         "disturbance.inputs.omega: unknown input, must be one of a, beta";
     disturbance_of_no_state: PLANT, "[integration]" => "[disturbance]\nmeasurements = { w = 1.0 }\n[integration]",
@@ -92,7 +120,30 @@ defects! {
     mixed_relative_degree: FILTER, "model = \"unicycle\"" => "model = \"bicycle_small_slip\"",
         "barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, a enters \
          derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
-         bicycle_kinematic";
+         bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself";
+    a_filter_that_is_not_affine_in_the_steering_angle: FILTER, "model = \"unicycle\"" => "model = \"bicycle_kinematic_angle\"",
+        "plant.model: is \"bicycle_kinematic_angle\", which is a plant only: delta does not enter linearly, as a \
+         filter needs it; take the model bicycle_kinematic with `[integrator] state = \"delta\"`";
+    a_filter_that_is_not_affine_in_the_slip_angle: FILTER, "model = \"unicycle\"" => "model = \"bicycle_kinematic_slip\"",
+        "plant.model: is \"bicycle_kinematic_slip\", which is a plant only: beta does not enter linearly, as a \
+         filter needs it; take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which \
+         nearly are it";
+    front_length_of_a_slip_angle: PLANT, "\"bicycle\", l_r = 3.0" => "\"bicycle_kinematic_slip\", l_f = 3.0",
+        "plant.l_f: is a constant of bicycle_kinematic; this model has none";
+    integrator_of_no_state: STEERED, "state = \"beta\"" => "state = \"v_x\"",
+        "integrator.state: is \"v_x\", must be a state whose derivative is an input that moves nothing else: v, beta";
+    integrator_of_a_state_that_is_no_integral: STEERED, "state = \"beta\"" => "state = \"theta\"",
+        "integrator.state: is \"theta\", must be a state whose derivative is an input that moves nothing else: v, beta";
+    gain_of_an_integrator: STEERED, "gain = 4.0" => "gain = 0.0",
+        "integrator.gain: is 0, must be finite and >= 1e-9";
+    limits_of_an_integrator: STEERED, "min = -0.5" => "min = 0.6",
+        "integrator.min, integrator.max: is [0.6, 0.5], must be [min, max] with min <= max";
+    limit_that_is_no_number: STEERED, "min = -0.5" => "min = nan",
+        "integrator.min: is NaN, must be finite and >= -1e30 and <= 1e30";
+    rates_without_zero: STEERED, "[-4.0, 4.0]" => "[1.0, 4.0]",
+        "bounds: is [1, 4] for the rate, must contain 0";
+    integrator_of_a_delayed_filter: STEERED, "kind" => "actuation_delay = 0.001\nkind",
+        "actuation_delay: is 0.001, must be 0 with an integrator";
     front_length_of_another_model: PLANT, "l_r = 3.0" => "l_f = 3.0",
         "plant.l_f: is a constant of bicycle_kinematic; this model has none";
     infinite_centre: FILTER, "[45.0, 44.0]" => "[45.0, inf]", "barrier[0].centre[2]: is inf, must be finite";
@@ -229,24 +280,28 @@ fn unknown_and_missing_keys_and_wrong_types() {
 }
 
 /// Every model.
-const MODELS: [&str; 6] = [
+const MODELS: [&str; 8] = [
     "point_mass",
     "unicycle",
     "bicycle",
     "bicycle_small_slip",
     "bicycle_small_slip_rate",
     "bicycle_kinematic",
+    "bicycle_kinematic_angle",
+    "bicycle_kinematic_slip",
 ];
 
 /// Valid configurations of every kind: models × shapes × methods, and some with everything stated.
 fn every_kind() -> Vec<String> {
     let mut texts = vec![FILTER.to_owned(), PLANT.to_owned(), HEADING.to_owned(), WAYPOINTS.to_owned()];
+    texts.push(STEERED.to_owned());
+    texts.push(FILTER.replace("bounds =", "measurement_errors = { y_p = 0.1, v = 0.2 }\nbounds ="));
     texts.push(format!("{FILTER}disturbance = 0.5\n"));
     texts.push(format!("{PLANT}[disturbance]\nseed = 3\ninputs = {{ a = 0.5 }}\nmeasurements.v = 0.1\n"));
     for model in MODELS {
         texts.push(format!("kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"{model}\""));
         texts.push(format!("kind = \"plant\"\nname = \"p\"\nplant.model = \"{model}\"\nx0.x_p = 1e-300"));
-        if model == "bicycle_small_slip" {
+        if ["bicycle_small_slip", "bicycle_kinematic_angle", "bicycle_kinematic_slip"].contains(&model) {
             continue;
         }
         for shape in ["disc", "quadratic_disc", "obstacle"] {

@@ -8,6 +8,10 @@ use super::*;
 
 const BARRIER: &str = "[[barrier]]\nname = \"goal\"\ncentre = [45.0, 44.0]\nradius = 2.0\ndeadline = 10.0\n";
 
+/// A filter that integrates the steering angle itself.
+const STEERED: &str = "kind = \"filter\"\nplant.model = \"bicycle_kinematic\"\nintegrator.state = \"delta\"\n\
+                       [[barrier]]\nname = \"goal\"\ncentre = [45.0, 44.0]\nradius = 2.0\ndeadline = 10.0\n";
+
 fn product(text: &str) -> Product {
     let configuration = Configuration::parse(text).unwrap_or_else(|e| panic!("{e} in {text}"));
     Product::new(configuration).unwrap()
@@ -16,7 +20,10 @@ fn product(text: &str) -> Product {
 /// Every model, as plant and as filter with either shape, method and feedthrough.
 fn every_product() -> Vec<Product> {
     let mut products = Vec::new();
-    products.push(product("kind = \"plant\"\nplant.model = \"bicycle_small_slip\""));
+    for model in ["bicycle_small_slip", "bicycle_kinematic_angle", "bicycle_kinematic_slip"] {
+        products.push(product(&format!("kind = \"plant\"\nplant.model = \"{model}\"")));
+    }
+    products.push(product(STEERED));
     products.push(product(include_str!("../../../examples/models/external-filter.toml")));
     for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip_rate", "bicycle_kinematic"] {
         products.push(product(&format!("kind = \"plant\"\nplant.model = \"{model}\"")));
@@ -39,7 +46,7 @@ fn every_product() -> Vec<Product> {
 /// Every controller along every model that has it.
 fn controllers() -> Vec<String> {
     let mut texts = Vec::new();
-    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip"] {
+    for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip", "bicycle_kinematic_slip"] {
         for rest in [
             "controller = \"damping\"",
             "controller = \"heading\"\ngoal = [4.0, -3.0]",
@@ -50,7 +57,7 @@ fn controllers() -> Vec<String> {
             texts.push(format!("kind = \"controller\"\nplant.model = \"{model}\"\n{rest}\n"));
         }
     }
-    for model in ["bicycle_small_slip_rate", "bicycle_kinematic"] {
+    for model in ["bicycle_small_slip_rate", "bicycle_kinematic", "bicycle_kinematic_angle"] {
         texts.push(format!("kind = \"controller\"\nplant.model = \"{model}\"\ncontroller = \"damping\"\n"));
     }
     texts
@@ -284,5 +291,21 @@ fn the_guid_does_not_depend_on_the_spelling() {
 fn no_variable_is_called_time() {
     for product in every_product() {
         assert!(product.variables.iter().all(|v| !v.name.eq_ignore_ascii_case("time")));
+    }
+}
+
+/// The integrated state is no input, and stands where its rate would.
+#[test]
+fn an_integrated_state_is_commanded_and_not_measured() {
+    let product = product(STEERED);
+    let names: Vec<_> = product.variables.iter().map(|v| v.name.as_str()).collect();
+    let wanted =
+        ["x.x_p", "x.y_p", "x.theta", "x.v", "u_ref.a", "u_ref.delta", "rearm", "u.a", "u.delta", "status"];
+    assert_eq!(names[..wanted.len()], wanted);
+    assert_eq!(names[product.layout.parameters - 1], "integrator.delta");
+    let parameters = &names[product.layout.parameters..];
+    for parameter in ["u_min.delta", "u_max.delta", "u_min.delta_rate", "u_max.delta_rate", "integrator.gain"]
+    {
+        assert!(parameters.contains(&parameter), "{parameter} in {parameters:?}");
     }
 }

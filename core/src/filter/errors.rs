@@ -1,0 +1,142 @@
+//! Bounded errors of the measured state: what they can do to the derivatives of h and to a sampled row.
+//!
+//! Everything is a smooth function F of the state, and to first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
+//! derivatives at the measured state. For a sampled row these depend on u, so that it is no longer affine: it is
+//! linearised with the rest of the row.
+
+use super::{Channel, Method, Sampling};
+use crate::convergence::sampled::SampledDemand;
+use crate::error::{Error, ErrorKind};
+use crate::lie::{Ahead, DerivativeSource};
+use crate::scalar::all_finite;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+
+/// The derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along one error.
+pub(super) type Slopes = [f64; MAX_RELATIVE_DEGREE];
+
+/// The largest errors as directions of the state.
+pub(super) struct MeasurementErrors {
+    state_dim: usize,
+    /// One after the other, ε_i along axis i; only those that are not 0.
+    directions: Vec<f64>,
+}
+
+/// By how much a row may be off, and the derivative of that by u.
+pub(super) struct Uncertainty {
+    pub(super) size: f64,
+    pub(super) gradient: [f64; MAX_INPUTS],
+}
+
+impl MeasurementErrors {
+    pub(super) fn new(errors: &[f64]) -> Self {
+        let state_dim = errors.len().max(1);
+        let mut directions = Vec::new();
+        for (i, error) in errors.iter().enumerate().filter(|(_, error)| **error > 0.0) {
+            directions.extend((0..state_dim).map(|k| if k == i { *error } else { 0.0 }));
+        }
+        Self { state_dim, directions }
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_exact(&self) -> bool {
+        self.directions.is_empty()
+    }
+
+    /// How many states have one.
+    pub(super) fn count(&self) -> usize {
+        self.directions.len() / self.state_dim
+    }
+
+    /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at `t` and `x`; their parts along each error to `slopes`. Not finite where
+    /// the derivatives are not.
+    pub(super) fn of_derivatives(
+        &self,
+        source: &dyn DerivativeSource,
+        t: f64,
+        x: &[f64],
+        inputs: usize,
+        slopes: &mut [Slopes],
+    ) -> Slopes {
+        let zeros = [0.0; MAX_INPUTS];
+        let zeros = &zeros[..inputs];
+        let (mut change, mut sum) = (Ahead::ZERO, [0.0; MAX_RELATIVE_DEGREE]);
+        for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
+            // Below n no input is in them.
+            let known = source.ahead_along(t, [x, direction], [zeros, zeros], 0.0, &mut change);
+            for k in 0..source.relative_degree() {
+                slopes[k] = if known { change.value[k] } else { f64::INFINITY };
+                sum[k] += slopes[k].abs();
+            }
+        }
+        sum
+    }
+
+    /// By how much the sampled row of `demand` may be off, where `held` is t, x, u and the period. `None` where that is
+    /// not finite.
+    pub(super) fn of_row(
+        &self,
+        source: &dyn DerivativeSource,
+        (t, x, u, period): (f64, &[f64], &[f64], f64),
+        demand: &SampledDemand,
+        slopes: &[Slopes],
+    ) -> Option<Uncertainty> {
+        let zeros = [0.0; MAX_INPUTS];
+        let mut change = Ahead::ZERO;
+        let mut sum = Uncertainty { size: 0.0, gradient: [0.0; MAX_INPUTS] };
+        for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
+            if !source.ahead_along(t, [x, direction], [u, &zeros[..u.len()]], period, &mut change) {
+                return None;
+            }
+            let (mut along, mut gradient) = (0.0, [0.0; MAX_INPUTS]);
+            for k in 0..source.relative_degree() {
+                let weight = demand.weights[k] / period;
+                along += weight * (change.value[k] - demand.decay * slopes[k]);
+                for (g, d) in gradient.iter_mut().zip(&change.gradient[k]) {
+                    *g += weight * d;
+                }
+            }
+            sum.size += along.abs();
+            for (s, g) in sum.gradient.iter_mut().zip(&gradient) {
+                *s += along.signum() * g;
+            }
+        }
+        (sum.size.is_finite() && all_finite(&sum.gradient)).then_some(sum)
+    }
+}
+
+/// Whether `source` gives derivatives along a direction, a moment ahead too.
+pub(super) fn check(source: &dyn DerivativeSource, inputs: usize) -> Result<(), Error> {
+    let zeros = vec![0.0; source.state_dim()];
+    let u = [0.0; MAX_INPUTS];
+    let (u, mut change) = (&u[..inputs], Ahead::ZERO);
+    if source.ahead_along(0.0, [&zeros, &zeros], [u, u], 1e-3, &mut change) {
+        return Ok(());
+    }
+    let message = "the barrier's source gives no derivatives along a direction";
+    Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message))
+}
+
+/// Whether a filter with these barriers can allow for errors, and tells the barriers.
+pub(super) fn check_all(
+    channels: &mut [Channel],
+    sampling: Sampling,
+    delay: f64,
+    inputs: usize,
+) -> Result<(), Error> {
+    let refuse = |message: String| Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message));
+    if sampling == Sampling::Pointwise {
+        return refuse("needs the prediction over the period, the sampling is pointwise".into());
+    }
+    if delay > 0.0 {
+        return refuse(format!("needs an actuation_delay of 0, it is {delay}"));
+    }
+    for channel in channels {
+        let named = |e: Error| e.within(&channel.name);
+        if channel.promise.settings().method != Method::ReferenceProfile {
+            return refuse("needs the reference profile".into()).map_err(named);
+        }
+        check(&*channel.source, inputs).map_err(named)?;
+        channel.exact = false;
+    }
+    Ok(())
+}

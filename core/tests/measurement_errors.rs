@@ -1,0 +1,128 @@
+//! Filters that allow for errors of the measured state.
+
+mod support;
+
+use punctual_core::Error;
+use punctual_core::barriers::StateBound;
+use punctual_core::filter::{
+    BarrierSettings, FilterBuilder, Method, NoDerivative, SafetyFilter, SampleDerivative, Sampling,
+};
+use punctual_core::lie;
+use punctual_core::plants::{PointMass, Unicycle};
+use support::distance_disc;
+
+const PERIOD: f64 = 0.01;
+
+/// The deadline is 10 s, the rates 2/s.
+fn settings() -> BarrierSettings {
+    BarrierSettings { rate: Some(2.0), stay_rate: Some(2.0), margin: 0.1, ..BarrierSettings::within(10.0) }
+}
+
+fn unicycle(errors: &[f64]) -> SafetyFilter {
+    SafetyFilter::builder(4, 2)
+        .barrier("goal", Unicycle, distance_disc(), settings())
+        .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+        .and_then(|b| b.measurement_errors(errors))
+        .and_then(|b| b.build())
+        .expect("a valid filter")
+}
+
+/// x_p − 30 ≥ 0 of a point mass: every derivative is linear in the state, so that the bounds are exact, and the input
+/// is that of an exact filter at the worst of the states that may be measured as 0.
+#[test]
+fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
+    let line = || StateBound::at_least(0, 30.0).expect("a valid barrier");
+    let filter = |errors: &[f64]| {
+        SafetyFilter::builder(4, 2)
+            .barrier("line", PointMass, line(), settings())
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(|b| b.measurement_errors(errors))
+            .and_then(|b| b.build())
+            .expect("a valid filter")
+    };
+    let (mut robust, mut exact) = (filter(&[0.3, 0.0, 0.2, 0.0]), filter(&[0.0; 4]));
+    for (k, (x, v)) in
+        [(0.0, 0.0), (0.01, 0.1), (-0.05, 0.2), (29.9, 0.5), (30.5, 0.1)].into_iter().enumerate()
+    {
+        let t = k as f64 * PERIOD;
+        let [mut u, mut wanted] = [[0.0; 2]; 2];
+        let report = robust.step(t, &[x, 0.0, v, 0.0], &[-5000.0, 0.0], &mut u).expect("a valid sample");
+        assert!(report.barriers[0].guaranteed && !report.barriers[0].late_certain);
+        exact.step(t, &[x - 0.3, 0.0, v - 0.2, 0.0], &[-5000.0, 0.0], &mut wanted).expect("a valid sample");
+        // The same row, with other roundings.
+        assert!((u[0] - wanted[0]).abs() <= 1e-9 * wanted[0].abs(), "{u:?} for {wanted:?}");
+        assert_eq!(u[1], 0.0);
+    }
+}
+
+/// Bit for bit that of a filter without.
+#[test]
+fn errors_of_zero_are_none() {
+    let mut filters = [unicycle(&[0.0; 4]), {
+        SafetyFilter::builder(4, 2)
+            .barrier("goal", Unicycle, distance_disc(), settings())
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(|b| b.build())
+            .expect("a valid filter")
+    }];
+    let mut x = [1.0, 2.0, 0.3, 4.0];
+    for k in 0..50 {
+        let t = f64::from(k) * PERIOD;
+        let [a, b] = filters.each_mut().map(|filter| {
+            let mut u = [0.0; 2];
+            filter.step(t, &x, &[-1.0, 0.2], &mut u).expect("a valid sample");
+            u.map(f64::to_bits)
+        });
+        assert_eq!(a, b);
+        let u = a.map(f64::from_bits);
+        lie::along(Unicycle, distance_disc(), 2).expect("in range").predict(&mut x, &u, PERIOD);
+    }
+}
+
+#[test]
+fn there_is_no_derivative_with_errors() {
+    let mut filter = unicycle(&[0.1, 0.1, 0.01, 0.0]);
+    let mut out = SampleDerivative::default();
+    let unknown =
+        filter.differentiate(0.0, [&[1.0, 2.0, 0.3, 4.0], &[1.0; 4]], [&[0.0; 2], &[0.0; 2]], &mut out);
+    assert_eq!(unknown.expect("valid directions"), Some(NoDerivative::MeasurementErrors));
+    assert_eq!(NoDerivative::MeasurementErrors.to_string(), "not with measurement errors");
+}
+
+#[test]
+fn what_is_refused() {
+    let builder = |settings| {
+        SafetyFilter::builder(4, 2)
+            .barrier("goal", Unicycle, distance_disc(), settings)
+            .expect("a valid barrier")
+    };
+    let refused = |message: &str, done: Result<SafetyFilter, Error>| {
+        assert_eq!(done.err().map(|e| e.to_string()).as_deref(), Some(message));
+    };
+    let errors = [0.1, 0.0, 0.0, 0.0];
+    let given = |errors: &[f64]| builder(settings()).measurement_errors(errors).and_then(|b| b.build());
+    refused("measurement_errors: has 3 components, must have 4", given(&[0.1; 3]));
+    refused("measurement_errors[2]: is -0.5, must be finite and >= 0", given(&[0.1, -0.5, 0.0, 0.0]));
+    refused("measurement_errors[1]: is inf, must be finite and >= 0", given(&[f64::INFINITY, 0.0, 0.0, 0.0]));
+    type Change = fn(FilterBuilder) -> Result<FilterBuilder, Error>;
+    let with = |change: Change| {
+        builder(settings()).measurement_errors(&errors).and_then(change).and_then(FilterBuilder::build)
+    };
+    refused(
+        "measurement_errors: needs the prediction over the period, the sampling is pointwise",
+        with(|b| b.sampling(Sampling::Pointwise)),
+    );
+    refused(
+        "measurement_errors: needs an actuation_delay of 0, it is 0.01",
+        with(|b| b.actuation_delay(0.01)),
+    );
+    let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
+    let done = builder(root).measurement_errors(&errors).and_then(|b| b.build());
+    refused("goal.measurement_errors: needs the reference profile", done);
+    // h and the two parts of its row.
+    let done = SafetyFilter::builder(4, 2)
+        .source("goal", lie::external(1, 2).expect("in range"), settings())
+        .and_then(|b| b.measurement_errors(&errors))
+        .and_then(FilterBuilder::build);
+    refused("goal.measurement_errors: the barrier's source gives no derivatives along a direction", done);
+}

@@ -1,0 +1,127 @@
+//! `[integrator]` of a filter: a state of its model that is commanded and not measured.
+
+use punctual_core::filter::{Integrator, SafetyFilter};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, UNBOUNDED, VariableSection,
+};
+
+/// `[integrator]`: dynamic extension inside the filter. The plant outside has this state of the filter's model for its
+/// input; the filter solves for its rate and integrates that itself ([`Integrator`]).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntegratorSection {
+    /// Which state: one whose derivative is an input alone, such as `beta` of `bicycle_small_slip_rate`. Bounds of that
+    /// input bound the rate.
+    pub state: String,
+    /// How fast it follows `u_ref.<state>` in 1/s, > 0, where nothing is in the way. Default 2.
+    #[serde(default = "gain")]
+    pub gain: f64,
+    /// Its smallest value, in its unit. Default: none (-1e30).
+    #[serde(default = "none_below")]
+    pub min: f64,
+    /// Its largest value. Default: none (1e30).
+    #[serde(default = "none_above")]
+    pub max: f64,
+}
+
+fn gain() -> f64 {
+    2.0
+}
+
+fn none_below() -> f64 {
+    -UNBOUNDED
+}
+
+fn none_above() -> f64 {
+    UNBOUNDED
+}
+
+impl IntegratorSection {
+    /// The number of the state and of the input that is its rate.
+    pub(super) fn place(&self, plant: &PlantSection) -> Result<(usize, usize), ConfigurationError> {
+        let (states, inputs, derivatives) = (plant.states(), plant.inputs(), plant.derivatives());
+        let rate = |i: usize| {
+            let input = inputs.iter().position(|input| input.name == derivatives[i].trim())?;
+            let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            let moves = |text: &str| text.split(|c| !word(c)).any(|name| name == inputs[input].name);
+            let alone = derivatives.iter().enumerate().all(|(k, text)| k == i || !moves(text));
+            alone.then_some(input)
+        };
+        let rates: Vec<_> = (0..derivatives.len()).filter_map(|i| Some((i, rate(i)?))).collect();
+        if let Some(place) = rates.iter().find(|(i, _)| states[*i].name == self.state) {
+            return Ok(*place);
+        }
+        let names: Vec<_> = rates.iter().map(|(i, _)| states[*i].name.as_str()).collect();
+        let known = if names.is_empty() { "none here".to_owned() } else { names.join(", ") };
+        let message = format!(
+            "is {:?}, must be a state whose derivative is an input that moves nothing else: {known}",
+            self.state
+        );
+        Err(ConfigurationError::new("integrator.state", message))
+    }
+
+    pub(super) fn parameters(&self, plant: &PlantSection) -> Vec<Parameter<FilterConfiguration>> {
+        let state = plant.states().into_iter().find(|s| s.name == self.state);
+        let (unit, description) = state.map_or_else(Default::default, |s| (s.unit, s.description));
+        type Access = fn(&mut IntegratorSection) -> &mut f64;
+        let row = |name: String, field: &str, unit: String, range, meaning: String, access: Access| {
+            let given = self.clone();
+            Parameter::new(
+                (name, format!("integrator.{field}")),
+                unit,
+                range,
+                meaning,
+                move |c: &mut FilterConfiguration| access(c.integrator.get_or_insert_with(|| given.clone())),
+            )
+        };
+        let bounded = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
+        let (least, largest) = (format!("u_min.{}", self.state), format!("u_max.{}", self.state));
+        let limit = |word: &str| format!("{word} {description} (no bound: {UNBOUNDED:e} in size)");
+        let follows = format!("how fast the filter's {} follows what is wanted", self.state);
+        vec![
+            row(least, "min", unit.clone(), bounded, limit("smallest"), |i| &mut i.min),
+            row(largest, "max", unit, bounded, limit("largest"), |i| &mut i.max),
+            row("integrator.gain".into(), "gain", "1/s".into(), Range::POSITIVE, follows, |i| &mut i.gain),
+        ]
+    }
+}
+
+impl FilterConfiguration {
+    /// The states that are measured: those of the plant but the integrated one.
+    pub fn measured_states(&self) -> Vec<VariableSection> {
+        let integrated = |s: &VariableSection| self.integrator.as_ref().is_some_and(|i| i.state == s.name);
+        self.plant.states().into_iter().filter(|s| !integrated(s)).collect()
+    }
+
+    /// What the filter hands out and is asked for: the inputs of the plant, the integrated state in place of its rate.
+    pub fn commanded(&self) -> Vec<VariableSection> {
+        let mut inputs = self.plant.inputs();
+        if let Some((state, input)) = self.integrator.as_ref().and_then(|i| i.place(&self.plant).ok()) {
+            inputs[input] = self.plant.states().swap_remove(state);
+        }
+        inputs
+    }
+
+    /// The integrator of `filter`, which was built from this.
+    ///
+    /// # Errors
+    ///
+    /// A number out of range, or numbers that contradict each other.
+    pub fn build_integrator(&self, filter: &SafetyFilter) -> Result<Option<Integrator>, ConfigurationError> {
+        let Some(section) = &self.integrator else { return Ok(None) };
+        let end = |value: f64| if value.abs() >= UNBOUNDED { value.signum() * f64::INFINITY } else { value };
+        let limits = [section.min, section.max].map(end);
+        let refused = |e: punctual_core::Error| {
+            let field = match e.field() {
+                "limits" => "integrator.min, integrator.max",
+                "gain" => "integrator.gain",
+                other => other,
+            };
+            ConfigurationError::new(field, e.message())
+        };
+        let place = section.place(&self.plant)?;
+        Integrator::new(filter, place, limits, section.gain).map(Some).map_err(refused)
+    }
+}
