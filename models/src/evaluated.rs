@@ -201,6 +201,9 @@ impl CodeBarrier {
 /// Registers between those of the inputs and the first result: time, zero, one, not a number.
 const RESERVED: usize = 4;
 
+/// How many operations ago a sine may have been computed for its cosine to be taken from there.
+const RECENT: usize = 16;
+
 /// Why what code asked for could not be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
@@ -350,11 +353,12 @@ impl<C: Scalar> Record for Work<'_, C> {
         if self.fault.is_some() {
             return self.not_a_number();
         }
-        // Sine and cosine are computed together, and mostly asked for one after the other.
-        if let (Operation::SinCos(_), Some(last)) = (operation, self.position.checked_sub(1))
-            && self.steps.get(last).is_some_and(|step| step.operation == operation)
-        {
-            return self.steps[last].to;
+        // Sine and cosine are computed together, and mostly asked for near each other.
+        if matches!(operation, Operation::SinCos(_)) {
+            let recent = self.steps[..self.position].iter().rev().take(RECENT);
+            if let Some(done) = recent.into_iter().find(|step| step.operation == operation) {
+                return done.to;
+            }
         }
         let to = self.next;
         let step = Step { operation, to };

@@ -28,7 +28,7 @@ fn an_unknown_key() {
         "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
          13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
          unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `centre_input`, `radius`, `smoothing`, \
-         `half_axes`, `half_sides`, `angle`, `normal`, `state`, `bound`, `expression`, `unit`, `relative_degree`, \
+         `half_axes`, `half_sides`, `angle`, `normal`, `state`, `bound`, `expression`, `output`, `unit`, `relative_degree`, \
          `deadline`, `method`, `profile`, `when_infeasible`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`, \
          `disturbance`, `priority`, `penalty`, `begin`, \
          `after`, `end`, `until_arrival`",

@@ -150,7 +150,8 @@ fn defects() {
     );
     let error = Configuration::parse(&controller).expect_err("a controller").to_string();
     assert!(
-        error.starts_with("plant.") && error.contains("expected one of `model`, `l_r`, `l_f`"),
+        error.starts_with("plant.")
+            && error.contains("expected one of `model`, `plugin`, `plugin_digest`, `l_r`"),
         "{error}"
     );
     let outside = CAR_PLANT.replace("name = \"v\", unit", "name = \"v\", max = 5.0, unit");
