@@ -101,13 +101,20 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The same curve with about `limit` points; extremes stay.
+    /// The same curve with about `limit` points, in seven digits; extremes stay.
     pub fn thinned(mut self, limit: usize) -> Self {
-        let kept = decimate(&[&self.x, &self.y], limit);
-        self.x = kept.iter().map(|&k| self.x[k]).collect();
-        self.y = kept.iter().map(|&k| self.y[k]).collect();
+        // Over a rising x, such as time, only y has extremes.
+        let rising = self.x.is_sorted();
+        let kept = if rising { decimate(&[&self.y], limit) } else { decimate(&[&self.x, &self.y], limit) };
+        let rounded = |values: &[f64]| kept.iter().map(|&k| seven_digits(values[k])).collect();
+        (self.x, self.y) = (rounded(&self.x), rounded(&self.y));
         self
     }
+}
+
+/// `value` to seven significant digits: far more than a picture shows.
+fn seven_digits(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
 }
 
 impl Chart {

@@ -10,7 +10,7 @@ use punctual_core::lie::DerivativeSource;
 pub enum Contender {
     /// The paper's.
     RepeatedRoot,
-    /// Ours: the Hermite profile with its default rate, held inputs accounted for.
+    /// Ours: the Hermite profile with its default rate, held inputs accounted for, their period known from the start.
     Profile,
     /// The same, enforced at the samples only.
     ProfilePointwise,
@@ -84,7 +84,8 @@ impl Contender {
         let powers = |from: i32, to: i32| (from..=to).map(|e| 2_f64.powi(e));
         match self {
             Self::Exponential(_) => {
-                (-4..=10).map(|e| Self::Exponential(2_f64.powf(f64::from(e) / 2.0))).collect()
+                let rates = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
+                rates.map(Self::Exponential).into()
             }
             Self::HighOrder(_) => {
                 // The order of the two makes no difference.
@@ -142,7 +143,7 @@ impl Contender {
             None => builder,
         };
         let sampling = match self {
-            Self::Profile | Self::LowPeak => Sampling::default(),
+            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(setup.step) },
             _ => Sampling::Pointwise,
         };
         builder.sampling(sampling).and_then(FilterBuilder::build)

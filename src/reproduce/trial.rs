@@ -64,10 +64,20 @@ impl Vehicle {
         }
     }
 
-    fn damping(self, x: &SVector<f64, 4>) -> SVector<f64, 2> {
-        match self {
-            Self::PointMass => [-x[2], -x[3]].into(),
-            Self::Unicycle | Self::Bicycle => [-x[3], 0.0].into(),
+    fn reference(self, nominal: Nominal, x: &SVector<f64, 4>) -> SVector<f64, 2> {
+        let to = [CENTRE[0] - x[0], CENTRE[1] - x[1]];
+        match (nominal, self) {
+            (Nominal::Coast, _) => SVector::zeros(),
+            (Nominal::Damping, Self::PointMass) => [-x[2], -x[3]].into(),
+            (Nominal::Damping, _) => [-x[3], 0.0].into(),
+            (Nominal::Away(size), Self::PointMass) => {
+                let distance = to[0].hypot(to[1]).max(f64::MIN_POSITIVE);
+                to.map(|d| -size * d / distance).into()
+            }
+            (Nominal::Away(size), _) => {
+                let ahead = to[0] * x[2].cos() + to[1] * x[2].sin();
+                [if ahead < 0.0 { size } else { -size }, 0.0].into()
+            }
         }
     }
 
@@ -131,6 +141,17 @@ impl Shape {
     }
 }
 
+/// u_ref.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Nominal {
+    /// 0: the paper's.
+    Coast,
+    /// −v on the accelerations: ours.
+    Damping,
+    /// This acceleration (m/s²) away from the disc: the constraint alone leads there, and is active throughout.
+    Away(f64),
+}
+
 /// How the plant moves under a held input. Which one the paper uses it does not say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
@@ -183,8 +204,8 @@ impl Integrator {
 pub struct Setup {
     /// The barrier.
     pub shape: Shape,
-    /// Whether u_ref is damping (−v on the accelerations) in place of 0.
-    pub damped: bool,
+    /// u_ref.
+    pub nominal: Nominal,
     /// μ in the unit of h.
     pub margin: f64,
     /// T in s.
@@ -204,7 +225,7 @@ impl Setup {
     pub fn paper(deadline: f64, step: f64) -> Self {
         Self {
             shape: Shape::Quadratic,
-            damped: false,
+            nominal: Nominal::Coast,
             margin: 0.0,
             deadline,
             step,
@@ -216,12 +237,22 @@ impl Setup {
 
     /// As we advise: the distance-shaped disc, damping, a margin of 0.02 m, until 2T.
     pub fn advised(deadline: f64, step: f64) -> Self {
-        Self { shape: Shape::Distance, damped: true, margin: 0.02, ..Self::paper(deadline, step) }
+        Self {
+            shape: Shape::Distance,
+            nominal: Nominal::Damping,
+            margin: 0.02,
+            ..Self::paper(deadline, step)
+        }
+    }
+
+    /// Whether it has the barrier and the nominal controller that we advise.
+    pub fn is_advised(&self) -> bool {
+        self.shape == Shape::Distance && self.nominal == Nominal::Damping
     }
 
     /// Its name in tables.
     pub fn title(&self) -> &'static str {
-        if self.damped { "distance, damping" } else { "quadratic, u_ref = 0" }
+        if self.is_advised() { "distance, damping" } else { "quadratic, u_ref = 0" }
     }
 }
 
@@ -256,8 +287,11 @@ pub struct Outcome {
     pub whole_effort: f64,
     /// Largest |u_1| and |u_2| of the whole run.
     pub whole_peak: [f64; 2],
-    /// How far h fell below the bound that the constraint promises, up to the deadline, in the unit of h.
+    /// How far h fell below the bound that is promised, up to the deadline, in the unit of h: for ours r + μ
+    /// without what compensation adds to μ.
     pub shortfall: f64,
+    /// What compensation adds to the margin, in the unit of h.
+    pub added: f64,
     /// h at the start.
     pub first_h: f64,
     /// Samples whose constraint was not met.
@@ -304,10 +338,11 @@ pub fn observed(
         whole_effort: 0.0,
         whole_peak: [0.0; 2],
         shortfall: 0.0,
+        added: 0.0,
         first_h: f64::NAN,
         unmet: 0,
     };
-    let u_ref = |x: &SVector<f64, 4>| if setup.damped { vehicle.damping(x) } else { SVector::zeros() };
+    let u_ref = |x: &SVector<f64, 4>| vehicle.reference(setup.nominal, x);
     closed_loop_by(
         &mut filter,
         |x, u, dt| vehicle.advance(setup.integrator, x, u, dt),
@@ -339,8 +374,9 @@ pub fn observed(
                 out.least_depth =
                     if depth < out.least_depth || depth.is_nan() { depth } else { out.least_depth };
             }
+            out.added = b.margin - setup.margin;
             if t < setup.deadline + setup.step / 2.0 && b.profile.is_finite() {
-                out.shortfall = out.shortfall.max(b.profile - b.h);
+                out.shortfall = out.shortfall.max(b.profile - out.added - b.h);
             }
             observe(&Sample { t, x: (*x).into(), u_ref: u_ref(x).into(), u: (*u).into(), report });
         },

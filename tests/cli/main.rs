@@ -15,6 +15,7 @@ mod inspecting;
 mod misbehaving;
 mod models;
 mod packing;
+mod reproducing;
 mod running;
 mod surviving;
 mod table;
