@@ -12,7 +12,7 @@ const OPTIONS: Options = Options { finest: 1e-3, ..Options::QUICK };
 const PICTURES: [&str; 9] = [
     "trajectories-unicycle",
     "depth-point_mass",
-    "profile-unicycle",
+    "profile-point_mass",
     "inputs-unicycle-1",
     "inputs-unicycle-2",
     "phase-portrait",

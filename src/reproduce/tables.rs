@@ -57,7 +57,7 @@ fn fixed(setup: &Setup) -> Vec<Contender> {
     if setup.is_advised() {
         vec![Contender::RepeatedRoot, Contender::ProfilePointwise, Contender::Profile]
     } else {
-        vec![Contender::RepeatedRoot, Contender::Profile]
+        vec![Contender::RepeatedRoot, Contender::ProfilePointwise]
     }
 }
 
