@@ -55,7 +55,7 @@ impl Trace {
     }
 
     /// Only what is up to its arrival, where it has one.
-    fn to_arrival(mut self) -> Self {
+    fn cut_at_arrival(mut self) -> Self {
         if let Some(k) = self.arrival() {
             self.t.truncate(k + 1);
             self.x.truncate(k + 1);
@@ -126,7 +126,7 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
         Vehicle::Unicycle | Vehicle::Bicycle => [0.0, 0.0, 0.0, -20.0],
     };
     let trace = |contender, setup: Setup| Trace::new(vehicle, contender, &setup, x0);
-    let paper = trace(Contender::RepeatedRoot, Setup::paper(T, STEP))?.to_arrival();
+    let paper = trace(Contender::RepeatedRoot, Setup::paper(T, STEP))?.cut_at_arrival();
     let existing = trace(EXISTING, Setup::paper(T, STEP))?;
     let searched = trace(SEARCHED, Setup::advised(T, STEP))?;
     let ours = trace(Contender::Profile, Setup::advised(T, STEP))?;
@@ -288,7 +288,7 @@ fn phase_portrait() -> Result<Figure, Error> {
             let mut trace = Trace::new(Vehicle::PointMass, method, &setup, [10.0, 10.0, part, part])?;
             if method == Contender::RepeatedRoot {
                 // What follows would hide everything else.
-                trace = trace.to_arrival();
+                trace = trace.cut_at_arrival();
             }
             let slope = |k: usize| {
                 let last = trace.h.len() - 1;
@@ -349,6 +349,9 @@ fn lateness(trace: &Trace, deadline: f64) -> Option<f64> {
     let (before, after) = (trace.h.get(k.checked_sub(1)?)?, trace.h[k]);
     Some(trace.t[k - 1] + trace.period * before / (before - after) - deadline)
 }
+
+/// A start for each vehicle.
+type Start = fn(Vehicle) -> [f64; 4];
 
 /// Speed in m/s of [`moving`].
 const SPEED: f64 = 20.0;
@@ -428,7 +431,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     }
     let mut short = Vec::new();
     let origin = |_: Vehicle| [0.0; 4];
-    let starts: [(&str, fn(Vehicle) -> [f64; 4]); 2] = [("from rest", origin), ("moving", moving)];
+    let starts: [(&str, Start); 2] = [("from rest", origin), ("moving", moving)];
     for (vehicle, (start, x0)) in
         Vehicle::ALL.map(|vehicle| (vehicle, starts[0])).into_iter().chain([(Vehicle::PointMass, starts[1])])
     {

@@ -8,6 +8,8 @@ use crate::plot;
 
 /// What the guide's runs are: no random ones, and steps that a test has the time for.
 const OPTIONS: Options = Options { finest: 1e-3, ..Options::QUICK };
+/// The tables of the guide.
+const TABLES: [&str; 2] = ["discretisation", "step_size"];
 /// The pictures of the guide.
 const PICTURES: [&str; 9] = [
     "trajectories-unicycle",
@@ -30,6 +32,14 @@ const PICTURES: [&str; 9] = [
 pub fn update(folder: &Path) -> Result<(), Error> {
     let path = folder.join("guide.md");
     let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;
+    let key = |line: &str| {
+        let rest = line.strip_prefix("<!-- table ")?.strip_suffix(" -->")?;
+        Some(rest.to_owned())
+    };
+    if let Some(key) = text.lines().filter_map(key).find(|key| !TABLES.contains(&key.as_str())) {
+        let message = format!("is no table of the guide, must be {}", TABLES.join(" or "));
+        return Err(Error::configuration(key, message).in_file(&path));
+    }
     let (figures, steps) = figures::all(&OPTIONS)?;
     let tables = [tables::discretisation(&OPTIONS)?, steps];
     let mut out = String::new();
@@ -42,10 +52,8 @@ pub fn update(folder: &Path) -> Result<(), Error> {
             out += line;
             out.push('\n');
         }
-        if let Some(key) = line.strip_prefix("<!-- table ").and_then(|rest| rest.strip_suffix(" -->")) {
-            let table = tables.iter().find(|table| table.key == key);
-            let missing = || Error::configuration(key, "is no table of the guide").in_file(&path);
-            out += &format!("\n{}\n", table.ok_or_else(missing)?.markdown());
+        if let Some(table) = key(line).and_then(|key| tables.iter().find(|table| table.key == key)) {
+            out += &format!("\n{}\n", table.markdown());
             inside = true;
         }
     }

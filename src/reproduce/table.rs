@@ -1,19 +1,18 @@
 //! A table of words and numbers, for people, spreadsheets and programs.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::output;
 
 /// One cell.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
     /// A word.
     Text(String),
     /// A number, and how many digits people see after the point.
-    Number(f64, #[serde(skip)] usize),
+    Number(f64, usize),
     /// No number: what people see in its place.
-    Nothing(#[serde(skip)] &'static str),
+    Nothing(&'static str),
 }
 
 impl Cell {
@@ -46,6 +45,17 @@ impl Cell {
             Self::Text(text) => text.clone(),
             Self::Number(value, _) => value.to_string(),
             Self::Nothing(_) => String::new(),
+        }
+    }
+}
+
+/// A string, a number or null.
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Number(value, _) => serializer.serialize_f64(*value),
+            Self::Nothing(_) => serializer.serialize_none(),
         }
     }
 }

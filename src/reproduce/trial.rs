@@ -101,7 +101,7 @@ impl Vehicle {
             Self::Unicycle => shaped(Unicycle, shape),
             Self::Bicycle => Bicycle::new(REAR).and_then(|plant| shaped(plant, shape)),
         };
-        source.map_err(error)
+        source.map_err(Error::from)
     }
 
     fn advance(
@@ -310,10 +310,6 @@ impl Outcome {
     }
 }
 
-pub(super) fn error(e: punctual_core::Error) -> Error {
-    Error::configuration(e.field(), e.message())
-}
-
 /// Runs `vehicle` with `contender` from `x0`; `observe` sees every sample.
 ///
 /// # Errors
@@ -326,7 +322,7 @@ pub fn observed(
     x0: [f64; 4],
     mut observe: impl FnMut(&Sample),
 ) -> Result<Outcome, Error> {
-    let mut filter = contender.filter(vehicle.source(setup.shape)?, setup).map_err(error)?;
+    let mut filter = contender.filter(vehicle.source(setup.shape)?, setup).map_err(Error::from)?;
     let schedule =
         Schedule { step: setup.step, steps: (setup.end / setup.step).round() as usize, substeps: 1 };
     let mut out = Outcome {
@@ -381,7 +377,7 @@ pub fn observed(
             observe(&Sample { t, x: (*x).into(), u_ref: u_ref(x).into(), u: (*u).into(), report });
         },
     )
-    .map_err(error)?;
+    .map_err(Error::from)?;
     Ok(out)
 }
 
@@ -412,11 +408,11 @@ pub fn seconds_per_step(
     let mut best = f64::INFINITY;
     for _ in 0..PASSES {
         let mut filter: SafetyFilter =
-            contender.filter(vehicle.source(setup.shape)?, &setup).map_err(error)?;
+            contender.filter(vehicle.source(setup.shape)?, &setup).map_err(Error::from)?;
         let mut u = [0.0; 2];
         let begin = Instant::now();
         for (t, x, u_ref) in &samples {
-            filter.step(*t, x, u_ref, &mut u).map_err(error)?;
+            filter.step(*t, x, u_ref, &mut u).map_err(Error::from)?;
         }
         std::hint::black_box(u);
         best = best.min(begin.elapsed().as_secs_f64() / samples.len() as f64);

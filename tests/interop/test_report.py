@@ -6,8 +6,6 @@ import subprocess
 
 import pytest
 
-from conftest import punctual
-
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
 
 # Uses the page as a hand would, and leaves what it saw as attributes of the document.
@@ -40,19 +38,12 @@ seen.shown = String(svg.querySelectorAll("g path").length);
 """
 
 
-@pytest.fixture(scope="session")
-def report(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("report")
-    punctual("reproduce", "--quick", "--untimed", "--out", folder)
-    return folder / "report.html"
-
-
 @pytest.mark.parametrize("width", [1200, 390])
-def test_the_page_works_in_a_browser(report, width, tmp_path):
+def test_the_page_works_in_a_browser(study, width, tmp_path):
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         pytest.skip(f"no browser to open the page with: none of {', '.join(BROWSERS)} is installed")
-    text = report.read_text()
+    text = (study[0] / "report.html").read_text()
     charts = len(re.findall(r'class="chart"', text))
     assert charts >= 18
     page = tmp_path / "page.html"
