@@ -231,6 +231,13 @@ impl From<ConfigurationError> for Error {
     }
 }
 
+/// Misuse of the core, in the words of the command line.
+impl From<punctual_core::Error> for Error {
+    fn from(error: punctual_core::Error) -> Self {
+        Self::configuration(error.field(), error.message())
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &*self.0 {

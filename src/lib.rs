@@ -15,6 +15,7 @@
 //! package              from a configuration to an .fmu file, from a system to an .ssp file
 //! demo                 the demonstration: three plants, two methods
 //! output               the one place that prints
+//! reproduce            the study: the paper's tables and figures beside ours and those of the literature
 //! command              one thin function per subcommand
 //! ```
 #![deny(unsafe_code)]
@@ -31,4 +32,5 @@ pub mod package;
 pub mod pictures;
 pub mod plot;
 pub mod recording;
+pub mod reproduce;
 pub mod validate;

@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, check, demo, inspect, run, validate};
+use punctual::command::{build, check, demo, inspect, reproduce, run, validate};
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
@@ -27,6 +27,8 @@ enum Command {
     Check(check::Arguments),
     /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
     Demo(demo::Arguments),
+    /// Show the paper's tables and figures beside ours and those of other methods; CSV, SVG and a page
+    Reproduce(reproduce::Arguments),
     /// Couple FMUs as a system file says; write CSV and pictures
     Run(run::Arguments),
     /// Show what an FMU offers
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Build(arguments) => build::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
+        Command::Reproduce(arguments) => reproduce::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),
         Command::Validate(arguments) => validate::execute(&arguments),

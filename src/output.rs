@@ -58,7 +58,14 @@ impl Progress {
     /// Says that `fraction` (0 to 1) is done. Cheap enough for every step.
     pub fn update(&mut self, fraction: f64) {
         self.calls += 1;
-        if !self.wanted || !self.calls.is_multiple_of(CALLS) {
+        if self.calls.is_multiple_of(CALLS) {
+            self.show(fraction);
+        }
+    }
+
+    /// The same, for calls that are far between.
+    pub fn show(&mut self, fraction: f64) {
+        if !self.wanted {
             return;
         }
         if self.bar.is_none() && self.begin.elapsed() > PATIENCE {

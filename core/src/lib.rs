@@ -46,8 +46,8 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
-//! bounded inputs can do); [`filter`]; [`plants`], [`barriers`], [`nominal`] and [`simulation`] are reference
-//! material beside it, and [`effort`] compares what filters need.
+//! bounded inputs can do); [`filter`]; [`plants`], [`barriers`], [`nominal`], [`baselines`] (constraints of the
+//! literature) and [`simulation`] are reference material beside it, and [`effort`] compares what filters need.
 //!
 //! # References
 //!
@@ -59,6 +59,7 @@
 
 pub mod barrier;
 pub mod barriers;
+pub mod baselines;
 pub mod convergence;
 pub mod dynamics;
 pub mod effort;

@@ -29,12 +29,29 @@ pub fn closed_loop<P, const NX: usize, const NU: usize>(
     plant: &P,
     x0: SVector<f64, NX>,
     schedule: Schedule,
-    mut nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
-    mut observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+    nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
+    observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
 ) -> Result<(), Error>
 where
     P: ControlAffine<NX, NU>,
 {
+    closed_loop_by(filter, |x, u, dt| rk4_step(plant, x, u, dt), x0, schedule, nominal, observe)
+}
+
+/// As [`closed_loop`], with a plant that moves by `advance(x, u, dt)` over `dt` seconds: for other ways to
+/// integrate.
+///
+/// # Errors
+///
+/// As for [`closed_loop`].
+pub fn closed_loop_by<const NX: usize, const NU: usize>(
+    filter: &mut SafetyFilter,
+    mut advance: impl FnMut(&SVector<f64, NX>, &SVector<f64, NU>, f64) -> SVector<f64, NX>,
+    x0: SVector<f64, NX>,
+    schedule: Schedule,
+    mut nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
+    mut observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+) -> Result<(), Error> {
     let step = positive("step", schedule.step)?;
     let substeps = schedule.substeps.max(1);
     let dt = step / substeps as f64;
@@ -47,7 +64,7 @@ where
         observe(t, &x, &u, report);
         if k < schedule.steps {
             for _ in 0..substeps {
-                x = rk4_step(plant, &x, &u, dt);
+                x = advance(&x, &u, dt);
             }
         }
     }

@@ -97,13 +97,7 @@ fn run(
             u_ref[0] = damping(x[3], DAMPING);
         }
     })
-    .map_err(error)
-}
-
-/// Misuse of the core in the words of the command line.
-#[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-fn error(e: punctual_core::Error) -> Error {
-    Error::configuration(e.field(), e.message())
+    .map_err(Error::from)
 }
 
 fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
@@ -116,7 +110,7 @@ pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result
     let (t, configured) = (c.experiment.start_time, deadlines(c));
     let deadline = configured[index];
     let horizon = HORIZON * deadline;
-    let soonest = filter.soonest(index, t, x0, horizon).map_err(error)?;
+    let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
         tried.barrier[index].deadline = deadline;
@@ -124,7 +118,7 @@ pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, x0, &deadlines(&tried))?.kept)
     };
-    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(error)?;
+    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     // Growing from what is not ruled out: the longest deadlines are the longest runs.
     let mut low = soonest.unwrap_or(0.0).max(1e-3 * deadline);
     let mut most = None;

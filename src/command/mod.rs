@@ -5,5 +5,6 @@ pub mod check;
 mod closed_loop;
 pub mod demo;
 pub mod inspect;
+pub mod reproduce;
 pub mod run;
 pub mod validate;

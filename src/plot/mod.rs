@@ -3,6 +3,7 @@
 
 mod axes;
 mod canvas;
+mod chart;
 mod decimate;
 mod legend;
 mod path;
@@ -11,8 +12,11 @@ mod time;
 
 use std::path::Path as File;
 
+use serde::Serialize;
+
 use crate::error::Error;
 use canvas::Canvas;
+pub use chart::{Chart, Curve, Scaling};
 
 /// Colours told apart by colour-blind readers too (Okabe and Ito 2008, without the yellow that
 /// vanishes on white), for series in this order.
@@ -60,7 +64,7 @@ pub struct Path {
 }
 
 /// A disc.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Disc {
     /// Legend entry; empty for none.
     pub label: String,
@@ -106,7 +110,8 @@ pub struct Series {
 }
 
 /// How a line is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Style {
     /// Without gaps.
     #[default]
@@ -118,7 +123,7 @@ pub enum Style {
 }
 
 /// A straight line across the picture.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Mark {
     /// What it is, written beside it; empty for nothing.
     pub label: String,
@@ -181,6 +186,17 @@ pub fn times(plots: &[TimePlot], file: &File) -> Result<(), Error> {
     let mut canvas = Canvas::new(time::WIDTH, time::height(plots.len()));
     time::draw(plots, &mut canvas).map_err(|message| Error::plot(file, message))?;
     canvas.save(file)
+}
+
+/// Draws a [`Chart`] as an SVG document; `name` is for messages.
+///
+/// # Errors
+///
+/// Nothing finite to draw.
+pub fn chart(chart: &Chart, name: &str) -> Result<String, Error> {
+    let mut canvas = Canvas::new(chart::WIDTH, chart.height());
+    chart::draw(chart, &mut canvas).map_err(|message| Error::plot(File::new(name), message))?;
+    Ok(canvas.document())
 }
 
 fn colour(index: usize) -> [u8; 3] {

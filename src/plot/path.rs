@@ -22,7 +22,12 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
     let title = if plot.title.is_empty() { 0.0 } else { 30.0 };
     let space = if legend.is_empty() { 20.0 } else { legend_width + 34.0 };
     let area = [84.0, 18.0 + title, canvas.width() - space, canvas.height() - 62.0];
-    let axes = equal_axes(plot, area)?;
+    let discs = |axis: usize| {
+        plot.discs.iter().flat_map(move |d| [d.centre[axis] - d.radius, d.centre[axis] + d.radius])
+    };
+    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)));
+    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)));
+    let axes = equal_axes([x, y], area)?;
     axes.frame(canvas, &plot.x_label, &plot.y_label, true);
     if !plot.title.is_empty() {
         canvas.text(&plot.title, ((area[0] + area[2]) / 2.0, 24.0), 16.0, Anchor::Middle, INK);
@@ -77,13 +82,8 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     entries
 }
 
-/// Axes over everything drawn, one pixel meaning the same length on both.
-fn equal_axes(plot: &PathPlot, area: [f64; 4]) -> Result<Axes, String> {
-    let discs = |axis: usize| {
-        plot.discs.iter().flat_map(move |d| [d.centre[axis] - d.radius, d.centre[axis] + d.radius])
-    };
-    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)));
-    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)));
+/// Axes over these extents of x and y, one pixel meaning the same length on both.
+pub(super) fn equal_axes([x, y]: [Option<(f64, f64)>; 2], area: [f64; 4]) -> Result<Axes, String> {
     let (Some(x), Some(y)) = (x, y) else { return Err("there is no finite point".to_owned()) };
     let (width, height) = (area[2] - area[0], area[3] - area[1]);
     let share = 1.0 - 2.0 * MARGIN;
@@ -105,16 +105,10 @@ fn equal_axes(plot: &PathPlot, area: [f64; 4]) -> Result<Axes, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Disc, Path};
 
     #[test]
     fn axes_are_equal_and_hold_everything() {
-        let plot = PathPlot {
-            paths: vec![Path { x: vec![0.0, 10.0], y: vec![0.0, f64::NAN], ..Path::default() }],
-            discs: vec![Disc { label: String::new(), centre: [45.0, 5.0], radius: 2.0 }],
-            ..PathPlot::default()
-        };
-        let axes = equal_axes(&plot, [0.0, 0.0, 600.0, 400.0]).unwrap();
+        let axes = equal_axes([Some((0.0, 47.0)), Some((0.0, 7.0))], [0.0, 0.0, 600.0, 400.0]).unwrap();
         let (x, y) = (
             axes.place(1.0, 0.0).0 - axes.place(0.0, 0.0).0,
             axes.place(0.0, 0.0).1 - axes.place(0.0, 1.0).1,

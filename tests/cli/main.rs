@@ -16,6 +16,7 @@ mod misbehaving;
 mod models;
 mod packing;
 mod plugins;
+mod reproducing;
 mod running;
 mod surviving;
 mod table;

@@ -35,3 +35,12 @@ def fmus(demo):
     found = sorted(folder.glob("*.fmu"))
     assert len(found) == len(MODELS) * (1 + len(METHODS))
     return found
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory):
+    """The folder that `punctual reproduce --quick` writes, and what it prints as JSON."""
+    folder = tmp_path_factory.mktemp("study")
+    done = punctual("reproduce", "--quick", "--untimed", "--out", folder, "--json")
+    assert done.stderr == ""
+    return folder, json.loads(done.stdout)

@@ -1,41 +1,27 @@
 //! Random initial conditions: the 100 of the documentation's tables and others.
 
+use punctual::reproduce::starts::{self, hundred};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Method};
 use punctual_core::plants::{PointMass, Unicycle};
 
 use super::{Nominal, Run, bicycle, coast, damp_speed, damp_velocity, distance, quadratic, run};
 
-/// Uniform in [0, 20] × [0, 20] × [−10, 10] × [−10, 10], in the order of each model's states.
-const STARTS: &str = include_str!("../data/starts100.csv");
-
 pub(super) const DEADLINE: f64 = 5.0;
 const STEP: f64 = 1e-3;
 
 pub(super) fn starts() -> Vec<[f64; 4]> {
-    let rows = STARTS.lines().skip(1).map(|line| {
-        let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
-        numbers.try_into().expect("four numbers")
-    });
-    rows.collect()
+    hundred(100)
 }
 
-/// Numbers in [0, 1): SplitMix64 (Steele, Lea and Flood, 2014), its upper 53 bits.
+/// Numbers in [0, 1), always the same.
 pub(super) fn uniform() -> impl FnMut() -> f64 {
-    let mut state = 2507_13888_u64;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
+    starts::uniform(2507_13888)
 }
 
 /// Starts from the same box, drawn here: the figures must not hang on one file.
 pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
-    let mut uniform = uniform();
-    let mut start = || [20.0, 20.0, 20.0, 20.0].map(|width| width * uniform());
-    (0..count).map(|_| start()).map(|[a, b, c, d]| [a, b, c - 10.0, d - 10.0]).collect()
+    starts::drawn(2507_13888, count)
 }
 
 /// The method of the documentation's table: a = 5, ε = 2, μ = 0.02, nominal damping.

@@ -251,6 +251,7 @@ fn each_dependency_is_named_in_one_place() {
         (&["roxmltree", ":", ":"], &["src/validate/", "src/host/description.rs"]),
         (&["plotters", ":", ":"], &["src/plot/"]),
         (&["indicatif", ":", ":"], &["src/output.rs"]),
+        (&["rayon", ":", ":"], &["src/reproduce/"]),
     ];
     for (tokens, owners) in owners {
         let mut named = false;

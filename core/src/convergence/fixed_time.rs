@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::comparison::{Stack, lower_bound, lower_terms};
+use super::condition::Condition;
 use super::hermite::HermiteProfile;
 use super::profile::{self, Derivatives, Hermite, LowPeak, Profile, ProfileError};
 use super::repeated_root::{self, NoAdmissibleRate};
@@ -151,13 +152,20 @@ pub struct FixedTime {
     pub(super) settings: FixedTimeSettings,
     /// A profile of one's own in place of [`Hermite`].
     own: Option<Arc<dyn Profile + Send + Sync>>,
+    /// A constraint of one's own in place of the settings' method.
+    condition: Option<Arc<dyn Condition + Send + Sync>>,
 }
 
 impl fmt::Debug for FixedTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { n, settings, own } = self;
-        let own = own.is_some();
-        f.debug_struct("FixedTime").field("n", n).field("settings", settings).field("own", &own).finish()
+        let Self { n, settings, own, condition } = self;
+        let (own, condition) = (own.is_some(), condition.is_some());
+        let mut text = f.debug_struct("FixedTime");
+        text.field("n", n)
+            .field("settings", settings)
+            .field("own", &own)
+            .field("condition", &condition)
+            .finish()
     }
 }
 
@@ -169,7 +177,7 @@ impl FixedTime {
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
     /// repeated root with n = 1, the first-order condition with n > 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
-        Ok(Self { n, settings: settings.validated(n)?, own: None })
+        Ok(Self { n, settings: settings.validated(n)?, own: None, condition: None })
     }
 
     /// The same promise along a profile of one's own. It is [checked](profile::check) at every anchor,
@@ -184,6 +192,34 @@ impl FixedTime {
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
         }
         Ok(Self { own: Some(Arc::new(profile)), ..self })
+    }
+
+    /// A constraint of one's own in place of the settings' method: of these only deadline, margin and
+    /// disturbance count. Nothing is guaranteed, the phases tell what is seen ([`Phase::Stay`]: h ≥ 0,
+    /// [`Phase::Left`]: outside again), and it is enforced at the samples only, whatever
+    /// [`Sampling`](crate::filter::Sampling) says.
+    ///
+    /// # Errors
+    ///
+    /// A method other than the default, a profile of one's own, or a recovery time.
+    pub fn with_condition(self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
+        let settings = &self.settings;
+        let message = if settings.method != Method::default() || self.own.is_some() {
+            Some(("method", "a constraint of one's own takes the place of method and profile"))
+        } else if settings.recovery.is_some() {
+            Some(("recovery", "a constraint of one's own knows no recovery"))
+        } else {
+            None
+        };
+        if let Some((field, message)) = message {
+            return Err(Error::new(ErrorKind::Unsupported, field, message));
+        }
+        Ok(Self { condition: Some(Arc::new(condition)), ..self })
+    }
+
+    /// Whether a constraint of one's own is in force ([`Self::with_condition`]).
+    pub fn has_condition(&self) -> bool {
+        self.condition.is_some()
     }
 
     /// The same promise with another deadline in s, for anchors to come.
@@ -246,6 +282,9 @@ impl FixedTime {
         if state.phase == Phase::Waiting {
             self.anchor(state, t, &lowest, self.settings.deadline, 0.0);
         }
+        if let Some(condition) = &self.condition {
+            return self.advance_condition(&**condition, state, t, h);
+        }
         if let Some(recovery) = self.settings.recovery
             && state.phase == Phase::Stay
             && is_outside
@@ -286,6 +325,34 @@ impl FixedTime {
         Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
     }
 
+    /// [`Self::advance`] under a constraint of one's own, after anchoring.
+    fn advance_condition(
+        &self,
+        condition: &dyn Condition,
+        state: &mut FixedTimeState,
+        t: f64,
+        h: &[f64],
+    ) -> Demand {
+        let (n, deadline, margin) = (self.n, state.deadline, state.margin);
+        let elapsed = (t - state.anchor_time).max(0.0);
+        state.phase = match state.arrival {
+            _ if h[0] >= 0.0 => Phase::Stay,
+            Some(_) => Phase::Left,
+            None if elapsed >= deadline => Phase::Late,
+            None => Phase::Approach,
+        };
+        if h[0] >= 0.0 && state.arrival.is_none() {
+            state.arrival = Some(t);
+        }
+        let mut e = [0.0; MAX_RELATIVE_DEGREE];
+        e[..n].copy_from_slice(&h[..n]);
+        e[0] -= margin;
+        let anchor = &state.anchor[..n];
+        let floor = condition.floor(anchor, deadline, elapsed, &e[..n]) + self.settings.disturbance;
+        let bound = condition.lower_bound(anchor, deadline, elapsed).unwrap_or(f64::NEG_INFINITY);
+        Demand { floor, profile: bound + margin, time_left: (deadline - elapsed).max(0.0) }
+    }
+
     /// Why the configured method is not the one in force since the anchor in `state`, if it is not:
     /// `None` too before the anchor. Computed anew: not for every step.
     pub fn refusal(&self, state: &FixedTimeState) -> Option<Refusal> {
@@ -320,8 +387,9 @@ impl FixedTime {
         anchor[..n].copy_from_slice(&h[..n]);
         let mut margin = settings.margin;
         let (mut rate, mut fallback) = (stay_rate, false);
-        let mut guaranteed = !past;
+        let mut guaranteed = !past && self.condition.is_none();
         match settings.method {
+            _ if self.condition.is_some() => {}
             Method::ReferenceProfile => {
                 rate = settings.rate.unwrap_or(default_rate);
                 if !past && period > 0.0 {
@@ -367,7 +435,7 @@ impl FixedTime {
     /// h − μ − r changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin; other methods
     /// take none.
     pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
-        if self.settings.method != Method::ReferenceProfile {
+        if self.settings.method != Method::ReferenceProfile || self.condition.is_some() {
             return;
         }
         let FixedTimeState { arrival, guaranteed, phase, .. } = *state;

@@ -12,11 +12,14 @@
 //! | [`first_order`] | h − μ | 1/((1 − p) T) at the anchor | h ≥ μ at T | n = 1 |
 //! | [`stay`] | h − μ | a ≥ [`stay::smallest_rate`] | h ≥ μ for ever | all c_k(a) ≥ 0 |
 //!
+//! A constraint that is none of these takes their place as a [`condition`].
+//!
 //! The promises hold for the continuous-time constraint. An input that is held between samples
 //! breaks the constraint by up to its change over one period, which the margin μ has to absorb;
 //! [`sampled`] is the form of the constraint for such an input, which loses far less.
 
 pub mod comparison;
+pub mod condition;
 pub mod first_order;
 mod fixed_time;
 pub mod hermite;

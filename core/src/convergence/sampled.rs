@@ -169,7 +169,8 @@ pub(super) fn attenuation_along(rate: f64, n: usize, time_left: f64) -> f64 {
 impl FixedTime {
     /// (S) from the sample at `t` (s), which `state` has been moved to with
     /// [`advance`](Self::advance) and where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds.
-    /// `None` on the approach of the first-order condition, which is not linear in e.
+    /// `None` on the approach of the first-order condition, which is not linear in e, and under a
+    /// [condition](super::condition) of one's own.
     pub fn over_period(
         &self,
         state: &FixedTimeState,
@@ -177,6 +178,9 @@ impl FixedTime {
         h: &[f64],
         period: f64,
     ) -> Option<SampledDemand> {
+        if self.has_condition() {
+            return None;
+        }
         let n = self.n;
         let (rate, rates, follows) = match state.phase {
             Phase::Stay | Phase::Left => (state.stay_rate, None, false),

@@ -49,7 +49,7 @@ impl FixedTime {
     /// anchored at this very sample, with a deadline that does not depend on h.
     ///
     /// `None` where it is not known: at the anchor of a profile of one's own that does not give its
-    /// [derivative](super::profile::Profile::along).
+    /// [derivative](super::profile::Profile::along), and under a [condition](super::condition) of one's own.
     pub fn differentiate(
         &self,
         state: &FixedTimeState,
@@ -58,6 +58,9 @@ impl FixedTime {
         [h, dh]: [&[f64]; 2],
         period: Option<f64>,
     ) -> Option<DemandDerivative> {
+        if self.has_condition() {
+            return None;
+        }
         let change = if anchors { self.anchor_along(state, h, dh)? } else { Change::default() };
         let n = self.n;
         let elapsed = (t - state.anchor_time).max(0.0);

@@ -7,6 +7,7 @@ use super::{
     BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Strictness, Workspace,
 };
 use crate::barrier::Barrier;
+use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
 use crate::convergence::sampled::SampledDemand;
 use crate::convergence::{FixedTime, FixedTimeState};
@@ -156,6 +157,32 @@ impl FilterBuilder {
         };
         let named = |e: Error| e.within(&channel.name);
         channel.promise = channel.promise.clone().with_profile(profile).map_err(named)?;
+        Ok(self)
+    }
+
+    /// Puts a constraint of one's own in the place of the last barrier's method
+    /// ([`FixedTime::with_condition`]), such as one of [`baselines`](crate::baselines).
+    ///
+    /// # Errors
+    ///
+    /// No barrier yet; settings that the constraint would take the place of.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// use punctual_core::baselines::Exponential;
+    ///
+    /// let filter = SafetyFilter::builder(4, 2)
+    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .condition(Exponential::repeated(2, 1.5)?)?
+    ///     .build()?;
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    pub fn condition(mut self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
+        let Some(channel) = self.channels.last_mut() else {
+            return Err(Error::new(ErrorKind::Dimension, "condition", "there is no barrier yet to have it"));
+        };
+        let named = |e: Error| e.within(&channel.name);
+        channel.promise = channel.promise.clone().with_condition(condition).map_err(named)?;
         Ok(self)
     }
 

@@ -66,6 +66,8 @@ pub enum NoDerivative {
     /// Its promise is anchored at this sample along a profile of one's own that does not give its
     /// [derivative](crate::convergence::profile::Profile::along).
     Profile(usize),
+    /// Its constraint is one of one's own ([`Condition`](crate::convergence::condition::Condition)).
+    Condition(usize),
     /// Its deadline is given up at this sample for a later one, which a search found.
     Postponed(usize),
     /// The search over the period ended more than 1e-3 of its size (1e-6 where the rows are not met) away from
@@ -83,6 +85,7 @@ impl fmt::Display for NoDerivative {
         match self {
             Self::Source(i) => write!(f, "the source of barrier {i} gives no derivatives along a direction"),
             Self::Profile(i) => write!(f, "the profile of barrier {i} gives no derivative by its anchor"),
+            Self::Condition(i) => write!(f, "the condition of barrier {i} gives no derivative"),
             Self::Postponed(i) => write!(f, "the deadline of barrier {i} is given up at this sample"),
             Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
             Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
@@ -340,7 +343,11 @@ impl SafetyFilter {
         let DemandDerivative { floor, profile, margin, sampled } = channel
             .promise
             .differentiate(promise, anchors, begin, stack, period)
-            .ok_or(NoDerivative::Profile(i))?;
+            .ok_or(if channel.promise.has_condition() {
+                NoDerivative::Condition(i)
+            } else {
+                NoDerivative::Profile(i)
+            })?;
         (derivative.profile, derivative.margin) = (profile, margin);
         let pointwise = change.value[n] - floor;
         let mut motion = Motion {

@@ -1,0 +1,151 @@
+//! What is compared: constraints with their parameters, and the settings they are run in.
+
+use punctual_core::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
+use punctual_core::convergence::first_order::Exponent;
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
+use punctual_core::lie::DerivativeSource;
+
+/// A constraint with its parameters, for relative degree 2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Contender {
+    /// The paper's.
+    RepeatedRoot,
+    /// Ours: the Hermite profile with its default rate, held inputs accounted for, their period known from the start.
+    Profile,
+    /// The same, enforced at the samples only.
+    ProfilePointwise,
+    /// The profile of least peak.
+    LowPeak,
+    /// Exponential, the same rate (1/s) twice.
+    Exponential(f64),
+    /// High-order with linear functions of these gains (1/s).
+    HighOrder([f64; 2]),
+    /// High-order with powers: both gains, and their common exponent.
+    FiniteTime([f64; 2], f64),
+    /// First-order fixed-time: exponent, and the rate (1/s) of the second order.
+    FirstOrder(f64, f64),
+    /// A tube: power of its schedule, and rate (1/s).
+    Tube(usize, f64),
+}
+
+impl Contender {
+    /// Its name in tables, without parameters.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::RepeatedRoot => "repeated root (the paper)",
+            Self::Profile => "reference profile (ours)",
+            Self::ProfilePointwise => "reference profile, pointwise",
+            Self::LowPeak => "low-peak profile (ours)",
+            Self::Exponential(_) => "exponential CBF",
+            Self::HighOrder(_) => "high-order CBF",
+            Self::FiniteTime(..) => "finite-time HOCBF (Xiao)",
+            Self::FirstOrder(..) => "first-order fixed-time CBF",
+            Self::Tube(..) => "constricting tube",
+        }
+    }
+
+    /// Its parameters, in words.
+    pub fn parameters(self) -> String {
+        match self {
+            Self::RepeatedRoot | Self::Profile | Self::ProfilePointwise | Self::LowPeak => "-".to_owned(),
+            Self::Exponential(a) => format!("a = {a}"),
+            Self::HighOrder([p, q]) => format!("p = {p}, {q}"),
+            Self::FiniteTime([p1, p2], q) => format!("p = {p1}, {p2}; q = {q}"),
+            Self::FirstOrder(p, k) => format!("p = {p}; k = {k}"),
+            Self::Tube(k, a) => format!("k = {k}; a = {a}"),
+        }
+    }
+
+    /// How many numbers have to be chosen.
+    pub fn parameter_count(self) -> usize {
+        match self {
+            Self::RepeatedRoot | Self::Profile | Self::ProfilePointwise | Self::LowPeak => 0,
+            Self::Exponential(_) => 1,
+            Self::HighOrder(_) | Self::FirstOrder(..) | Self::Tube(..) => 2,
+            Self::FiniteTime(..) => 3,
+        }
+    }
+
+    /// Each of the literature's with parameters that are ours: a = 20/T as in our own default where it is a rate
+    /// of errors against a moving bound, 1 for the gains of chains, 1/2 for exponents.
+    pub fn defaults(deadline: f64) -> [Self; 5] {
+        let rate = BarrierSettings::default_rate(deadline, 0.0);
+        [
+            Self::Exponential(1.0),
+            Self::HighOrder([1.0, 1.0]),
+            Self::FiniteTime([1.0, 1.0], 0.5),
+            Self::FirstOrder(0.5, rate),
+            Self::Tube(2, rate),
+        ]
+    }
+
+    /// What [`super::search`] looks through for the same method; nothing where there is nothing to choose.
+    pub fn candidates(self) -> Vec<Self> {
+        let powers = |from: i32, to: i32| (from..=to).map(|e| 2_f64.powi(e));
+        match self {
+            Self::Exponential(_) => {
+                let rates = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
+                rates.map(Self::Exponential).into()
+            }
+            Self::HighOrder(_) => {
+                // The order of the two makes no difference.
+                let pairs = powers(-2, 5).flat_map(|p| powers(-2, 5).map(move |q| [p, q]));
+                pairs.filter(|[p, q]| p <= q).map(Self::HighOrder).collect()
+            }
+            Self::FiniteTime(..) => {
+                let gains = powers(-1, 8).flat_map(|p| powers(-1, 6).map(move |q| [p, q]));
+                let all = gains.flat_map(|gains| [0.25, 0.5, 0.75, 0.9].map(|q| Self::FiniteTime(gains, q)));
+                all.collect()
+            }
+            Self::FirstOrder(..) => [0.25, 0.5, 0.75, 0.9]
+                .into_iter()
+                .flat_map(|p| powers(0, 5).map(move |k| Self::FirstOrder(p, k)))
+                .collect(),
+            Self::Tube(..) => {
+                let rates = [1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
+                (2..=4).flat_map(|k| rates.map(|a| Self::Tube(k, a))).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The filter with this constraint on `source`.
+    ///
+    /// # Errors
+    ///
+    /// A parameter out of range.
+    pub fn filter(
+        self,
+        source: Box<dyn DerivativeSource>,
+        setup: &super::Setup,
+    ) -> Result<SafetyFilter, punctual_core::Error> {
+        let mut settings =
+            BarrierSettings { margin: setup.margin, ..BarrierSettings::within(setup.deadline) };
+        match self {
+            Self::RepeatedRoot => settings.method = Method::RepeatedRoot,
+            Self::LowPeak => settings.profile = ProfileKind::LowPeak,
+            _ => {}
+        }
+        let builder = SafetyFilter::builder(source.state_dim(), source.input_dim());
+        let builder = builder.source("goal", source, settings)?;
+        let builder = match self {
+            Self::Exponential(a) => builder.condition(Exponential::repeated(2, a)?)?,
+            Self::HighOrder(gains) => builder.condition(Chain::linear(&gains)?)?,
+            Self::FiniteTime(gains, q) => builder.condition(Chain::finite_time(&gains, &[q, q])?)?,
+            Self::FirstOrder(p, k) => {
+                builder.condition(FirstOrderFixedTime::new(2, Exponent::new(p)?, k)?)?
+            }
+            Self::Tube(power, rate) => builder.condition(Tube::new(2, power, rate)?)?,
+            _ => builder,
+        };
+        let builder = match setup.bounds {
+            Some(bounds) => builder.bounds(&bounds.map(|b| -b), &bounds)?,
+            None => builder,
+        };
+        let sampling = match self {
+            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(setup.step) },
+            _ => Sampling::Pointwise,
+        };
+        builder.sampling(sampling).and_then(FilterBuilder::build)
+    }
+}

@@ -1,0 +1,67 @@
+//! Pictures and numbers of docs/guide.md: made by the program, checked in, and compared by a test.
+
+use std::path::Path;
+
+use super::{Options, figures, tables, write};
+use crate::error::Error;
+use crate::plot;
+
+/// What the guide's runs are: no random ones, and steps that a test has the time for.
+const OPTIONS: Options = Options { finest: 1e-3, ..Options::QUICK };
+/// The tables of the guide.
+const TABLES: [&str; 2] = ["discretisation", "step_size"];
+/// The pictures of the guide.
+const PICTURES: [&str; 9] = [
+    "trajectories-unicycle",
+    "depth-point_mass",
+    "profile-point_mass",
+    "inputs-unicycle-1",
+    "inputs-unicycle-2",
+    "phase-portrait",
+    "lateness",
+    "shortfall",
+    "deadlines",
+];
+
+/// Makes the pictures in `folder`/guide anew, and the tables of `folder`/guide.md: each stands between a line
+/// `<!-- table KEY -->` and a line `<!-- end -->`.
+///
+/// # Errors
+///
+/// No guide.md in the folder, or a table in it that there is not; a file that cannot be written.
+pub fn update(folder: &Path) -> Result<(), Error> {
+    let path = folder.join("guide.md");
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;
+    let key = |line: &str| {
+        let rest = line.strip_prefix("<!-- table ")?.strip_suffix(" -->")?;
+        Some(rest.to_owned())
+    };
+    if let Some(key) = text.lines().filter_map(key).find(|key| !TABLES.contains(&key.as_str())) {
+        let message = format!("is no table of the guide, must be {}", TABLES.join(" or "));
+        return Err(Error::configuration(key, message).in_file(&path));
+    }
+    let (figures, steps) = figures::all(&OPTIONS)?;
+    let tables = [tables::discretisation(&OPTIONS)?, steps];
+    let mut out = String::new();
+    let mut inside = false;
+    for line in text.lines() {
+        if line == "<!-- end -->" {
+            inside = false;
+        }
+        if !inside {
+            out += line;
+            out.push('\n');
+        }
+        if let Some(table) = key(line).and_then(|key| tables.iter().find(|table| table.key == key)) {
+            out += &format!("\n{}\n", table.markdown());
+            inside = true;
+        }
+    }
+    let pictures = folder.join("guide");
+    std::fs::create_dir_all(&pictures).map_err(|e| Error::io("create", &pictures, e))?;
+    for figure in figures.iter().filter(|figure| PICTURES.contains(&figure.key.as_str())) {
+        let svg = plot::chart(&figure.chart, &figure.key)?;
+        write(&pictures.join(format!("{}.svg", figure.key)), &svg)?;
+    }
+    write(&path, &out)
+}

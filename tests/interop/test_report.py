@@ -1,0 +1,62 @@
+"""The page of `punctual reproduce` in a real browser: it draws, reads off, zooms, and fits a phone."""
+
+import re
+import shutil
+import subprocess
+
+import pytest
+
+BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
+
+# Uses the page as a hand would, and leaves what it saw as attributes of the document.
+PROBE = """
+<script>
+const root = document.documentElement, seen = root.dataset;
+seen.overflow = String(root.scrollWidth - root.clientWidth);
+const svg = document.querySelector(".chart.live svg"), box = svg.getBoundingClientRect();
+const at = (type, x, y) => svg.dispatchEvent(new PointerEvent(type, { bubbles: true, pointerId: 1,
+  pointerType: "mouse", clientX: box.left + x * box.width, clientY: box.top + y * box.height }));
+svg.setPointerCapture = () => {};
+const curve = () => svg.querySelector("g path").getAttribute("d");
+const before = curve();
+// Where the first curve is.
+const [x, y] = before.slice(1).split("L")[0].split(" ").map(Number), view = svg.viewBox.baseVal;
+at("pointermove", x / view.width, y / view.height);
+seen.read = svg.parentNode.querySelector("output").textContent;
+at("pointerdown", 0.3, 0.3);
+at("pointermove", 0.6, 0.6);
+at("pointerup", 0.6, 0.6);
+seen.zoomed = String(curve() !== before);
+svg.dispatchEvent(new MouseEvent("dblclick", { bubbles: true }));
+seen.reset = String(curve() === before);
+const key = svg.parentNode.querySelector(".key");
+key.click();
+seen.hidden = String(svg.querySelectorAll("g path").length);
+key.click();
+seen.shown = String(svg.querySelectorAll("g path").length);
+</script>
+"""
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+def test_the_page_works_in_a_browser(study, width, tmp_path):
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        pytest.skip(f"no browser to open the page with: none of {', '.join(BROWSERS)} is installed")
+    text = (study[0] / "report.html").read_text()
+    charts = len(re.findall(r'class="chart"', text))
+    assert charts >= 18
+    page = tmp_path / "page.html"
+    page.write_text(text.replace("</body>", PROBE + "</body>"))
+    arguments = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
+    arguments += [f"--window-size={width},900", "--virtual-time-budget=5000", "--dump-dom", page.as_uri()]
+    done = subprocess.run([browser, *arguments], capture_output=True, text=True, timeout=120, check=True)
+    attributes = dict(re.findall(r'data-([a-z]+)="([^"]*)"', done.stdout.split(">", 2)[1]))
+    # Every chart is drawn by the script.
+    assert attributes["ready"] == "yes"
+    assert len(re.findall(r'data-drawn="[1-9]', done.stdout)) == charts
+    # Wide tables scroll in themselves: the page does not.
+    assert int(attributes["overflow"]) <= 0
+    assert re.search(r"x_p \(m\) = .*, y_p \(m\) = ", attributes["read"])
+    assert (attributes["zoomed"], attributes["reset"]) == ("true", "true")
+    assert int(attributes["hidden"]) < int(attributes["shown"])
