@@ -175,7 +175,8 @@ impl Campaign {
         };
         let configuration = |(i, component): (usize, &crate::coupling::Component)| {
             let name = system_path.with_file_name(&component.fmu);
-            configuration(&name, &format!("component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
+            let prefix = if system_text.is_none() { "system." } else { "" };
+            configuration(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
         };
         let configurations =
             system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
@@ -199,8 +200,11 @@ impl Campaign {
                 return Err(in_file(ConfigurationError::new("system", message)));
             }
         };
-        // Also what an inline system has not been checked for yet.
-        let system = system.timed(None, None).map_err(|e| Error::from(e).in_file(system_path))?;
+        // What is read as part of another file has not been checked yet.
+        let prefix = if source.system.is_none() { "system." } else { "" };
+        let system = system.timed(None, None).map_err(|e| {
+            in_file(ConfigurationError::new(format!("{prefix}{}", e.field()), e.message()))
+        })?;
         let section = file.campaign;
         let system = system.timed(section.stop_time, section.step).map_err(|e| {
             in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))

@@ -11,7 +11,7 @@ fn help_of_the_program() {
 #[test]
 fn help_of_every_command() {
     let workshop = Workshop::new();
-    for command in ["build", "check", "demo", "inspect", "run", "validate"] {
+    for command in ["build", "campaign", "check", "demo", "inspect", "replay", "run", "validate"] {
         assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
     }
 }

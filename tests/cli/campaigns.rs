@@ -1,0 +1,397 @@
+//! `punctual campaign` and `punctual replay`: rows against `punctual run`, interruption at any point, errors.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use punctual::campaign::{self, Campaign, Cell, Measures, Row};
+use serde_json::Value;
+
+use crate::table::Table;
+use crate::workshop::{Workshop, examples};
+
+/// Steps of the runs here, in s: coarse, for speed.
+const STEP: &str = "step = 0.05";
+
+/// The example's system in these steps.
+fn system() -> String {
+    crate::running::system(&[("step = 0.001", STEP), ("stop_time = 20.0", "stop_time = 12.0")])
+}
+
+/// A campaign of `runs` runs over starts and bounds: 1 m/s2 is too little, 20 is enough, and a lower bound
+/// above the upper one is refused.
+fn file(runs: u64, sampling: &str) -> String {
+    format!(
+        "system = \"system.toml\"\n[campaign]\nruns = {runs}\nseed = 7\nsampling = \"{sampling}\"\n\
+         [vary.\"plant.x0.x_p\"]\ndistribution = \"uniform\"\nmin = 0\nmax = 20\n\
+         [vary.\"plant.x0.v\"]\ndistribution = \"normal\"\nmean = 0\ndeviation = 2\n\
+         [vary.\"filter.u_min.a\"]\ndistribution = \"choice\"\nvalues = [-20, -20, -20, 30]\n\
+         [vary.\"filter.u_max.a\"]\ndistribution = \"choice\"\nvalues = [1, 20, 20]\n"
+    )
+}
+
+fn workshop(runs: u64, sampling: &str) -> Workshop {
+    let workshop = Workshop::with_fmus();
+    workshop.write("system.toml", system());
+    workshop.write("c.toml", file(runs, sampling));
+    workshop
+}
+
+/// All rows of a result, and the names of its columns.
+fn rows(path: &Path) -> (Vec<String>, Vec<Row>) {
+    let (reader, source) = campaign::recorded(path).expect("a result");
+    let measures = Measures::new(&Campaign::of(source, path, path).expect("its campaign"));
+    let rows = (0..reader.groups()).flat_map(|g| reader.group(g, measures.columns()).expect("a group"));
+    (measures.columns().iter().map(|c| c.name.clone()).collect(), rows.collect())
+}
+
+fn number(cell: &Cell) -> Option<f64> {
+    match cell {
+        Cell::Number(number) => *number,
+        Cell::Count(count) => Some(*count as f64),
+        Cell::Flag(flag) => Some(f64::from(u8::from(*flag))),
+        Cell::Text(_) => None,
+    }
+}
+
+/// What is in a row, against what `punctual run` finds with the library of an FMU from what `--list` says:
+/// every bit of every recorded signal, and each measure by its definition.
+#[test]
+fn a_row_is_what_a_run_of_the_fmus_finds() {
+    let workshop = workshop(12, "latin_hypercube");
+    workshop.punctual(["campaign", "c.toml"]).success();
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    assert_eq!(rows.len(), 12);
+    let listed: Value = serde_json::from_str(
+        &workshop.punctual(["campaign", "c.toml", "--list", "0..12", "--json"]).success(),
+    )
+    .expect("JSON");
+    let (mut successes, mut refused) = (0, 0);
+    for (k, row) in rows.iter().enumerate() {
+        let cell =
+            |name: &str| &row[names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no {name}"))];
+        let of = |name: &str| number(cell(name));
+        let drawn = &listed[k];
+        assert_eq!((drawn["run"].as_u64(), of("run")), (Some(k as u64), Some(k as f64)));
+        assert_eq!(drawn["seed"].as_u64().map(|seed| seed as f64), of("seed"));
+        let start = |component: &str| {
+            let values = drawn["values"].as_object().expect("a table");
+            let own = values.iter().filter_map(|(name, value)| {
+                assert_eq!(value.as_f64(), of(name), "{name}");
+                Some(format!("\"{}\" = {:?}", name.strip_prefix(&format!("{component}."))?, value.as_f64()?))
+            });
+            own.collect::<Vec<_>>().join(", ")
+        };
+        let mut text = system();
+        for component in ["filter", "plant"] {
+            let fmu = format!("fmu = \"{component}.fmu\"");
+            text = text.replace(&fmu, &format!("{fmu}\nstart = {{ {} }}", start(component)));
+        }
+        workshop.write("one.toml", text);
+        let done = workshop.punctual(["run", "one.toml", "--out", "one", "--json"]);
+        if of("filter.u_min.a") > of("filter.u_max.a") {
+            refused += 1;
+            assert_eq!(done.code, 1, "{done:?}");
+            let Cell::Text(Some(failure)) = cell("failure") else { panic!("run {k} did not fail") };
+            assert!(
+                failure.starts_with("fmi2ExitInitializationMode of filter at t = 0 s was refused: "),
+                "{failure}"
+            );
+            assert_eq!((of("success"), of("filter.status.filtered")), (Some(0.0), Some(0.0)));
+            continue;
+        }
+        let report: Value = serde_json::from_str(&done.success()).expect("JSON");
+        let run = k.to_string();
+        workshop.punctual(["replay", "c.parquet", "--run", &run, "--out", "again"]).success();
+        assert_eq!(workshop.text(&format!("again/c-{k}.csv")), workshop.text("one/one.csv"), "run {k}");
+
+        let table = Table::parse(&workshop.text("one/one.csv"));
+        let column = |name: &str| table.column(name);
+        let peak = |name: &str| column(name).iter().fold(0.0, |peak: f64, u| peak.max(u.abs()));
+        assert_eq!(of("filter.peak.a"), Some(peak("filter.u.a")));
+        assert_eq!(of("filter.peak.omega"), Some(peak("filter.u.omega")));
+        for (status, name) in [(0.0, "unchanged"), (1.0, "filtered"), (2.0, "infeasible")] {
+            let count = column("filter.status").iter().filter(|s| **s == status).count();
+            assert_eq!(of(&format!("filter.status.{name}")), Some(count as f64), "run {k}, {name}");
+        }
+        let (time, h) = (column("time"), column("filter.goal.h"));
+        let after = time.iter().zip(&h).filter(|(t, _)| **t >= 10.0 - 1e-9).map(|(_, h)| *h);
+        let least = after.fold(f64::INFINITY, f64::min);
+        assert_eq!(
+            (of("filter.goal.least_h"), of("filter.goal.inside")),
+            (Some(least), Some(f64::from(least >= 0.0)))
+        );
+        let promise = &report["promises"][0];
+        for (field, name) in
+            [("arrival", "arrival"), ("late", "late"), ("unmet", "unmet"), ("violation", "violation")]
+        {
+            assert_eq!(of(&format!("filter.goal.{name}")), promise[field].as_f64(), "run {k}, {field}");
+        }
+        let on_time = promise["arrival"].as_f64().is_some_and(|arrival| arrival <= 10.0 + 1e-9);
+        assert_eq!(of("filter.goal.on_time"), Some(f64::from(on_time)));
+        let kept = promise["late"].is_null() && promise["left"].is_null() && promise["unmet"] == 0;
+        assert_eq!((of("success"), of("filter.goal.kept")), (Some(f64::from(kept)), Some(f64::from(kept))));
+        successes += usize::from(kept);
+    }
+    assert!(
+        successes > 0 && refused > 0 && successes + refused < 12,
+        "{successes}, {refused}: all kinds are there"
+    );
+}
+
+/// Starts a campaign in the background.
+fn begin(workshop: &Workshop, more: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_punctual"))
+        .args(["campaign", "c.toml", "-o", "cut.parquet"])
+        .args(more)
+        .current_dir(workshop.path(""))
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary under test starts")
+}
+
+/// The runs that are kept in segments.
+fn kept(workshop: &Workshop) -> u64 {
+    let Ok(entries) = fs::read_dir(workshop.path("cut.parquet.parts")) else { return 0 };
+    let names = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned());
+    let next = |name: String| name.strip_suffix(".parquet")?.rsplit('-').next()?.parse().ok();
+    names.filter_map(next).max().unwrap_or(0)
+}
+
+/// Waits until more than `kept_before` runs are kept, and `more` after that.
+fn wait(workshop: &Workshop, child: &mut Child, kept_before: u64, more: Duration) {
+    let begin = Instant::now();
+    while kept(workshop) <= kept_before {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no segment in a minute");
+        assert!(child.try_wait().expect("a child").is_none(), "it was done before it could be ended");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(more);
+}
+
+/// Killed, interrupted, killed again, on one and on two threads: the same file.
+#[test]
+fn a_campaign_can_be_ended_at_any_point() {
+    // Long enough to be ended three times.
+    let workshop = workshop(4000, "random");
+    let mut before = 0;
+    // Anything from the middle of a segment to that of its file.
+    let moment = || Duration::from_micros(u64::from(Instant::now().elapsed().subsec_nanos()) % 20_000);
+    for (threads, ending) in [("1", "-KILL"), ("2", "-INT"), ("2", "-KILL")] {
+        let mut child = begin(&workshop, &["--threads", threads]);
+        wait(&workshop, &mut child, before, moment());
+        let sent = Command::new("kill").args([ending, &child.id().to_string()]).status().expect("kill");
+        assert!(sent.success());
+        let code = child.wait().expect("a child").code();
+        assert_eq!(code, (ending == "-INT").then_some(130));
+        before = kept(&workshop);
+        assert!(before > 0 && before < 4000, "{before}");
+    }
+    // Another campaign does not go on from there.
+    workshop.write("c.toml", file(4000, "random") + "# another\n");
+    let folder = "cut.parquet.parts";
+    let begin_of_message = format!("--output: {folder} is of another campaign (fingerprint ");
+    workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet"]).fails_like(
+        2,
+        &begin_of_message,
+        &["Remove it, or give another output"],
+    );
+    workshop.write("c.toml", file(4000, "random"));
+
+    let resumed = workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet", "--json"]);
+    assert_eq!(resumed.stderr, format!("note: {before} of 4000 runs were there already\n"));
+    let report: Value = serde_json::from_str(&resumed.success()).expect("JSON");
+    assert!(!workshop.path(folder).exists());
+    workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet", "--threads", "1"]).success();
+    assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+
+    // What is complete is not made again, and stays.
+    let again: Value = serde_json::from_str(
+        &workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet", "--json"]).success(),
+    )
+    .expect("JSON");
+    assert_eq!((&again["success"], &again["wall_time"]), (&report["success"], &0.0.into()));
+    workshop.write("c.toml", file(3000, "random"));
+    workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet"]).fails_like(
+        2,
+        "--output: cut.parquet is of another campaign",
+        &[],
+    );
+
+    // The summary, against the rows.
+    let (names, rows) = rows(&workshop.path("whole.parquet"));
+    let success = names.iter().position(|n| n == "success").expect("a column");
+    let count = rows.iter().filter(|row| matches!(row[success], Cell::Flag(true))).count();
+    assert_eq!(
+        (report["success"]["count"].as_u64(), report["runs"].as_u64()),
+        (Some(count as u64), Some(4000))
+    );
+    // A third of the bounds is too little, a quarter contradicts: half succeed, but for the starts that 1 m/s2
+    // is enough for. 1/√(4·4000) = 0.008; five of these.
+    let rate = count as f64 / 4000.0;
+    assert!((rate - 0.5).abs() < 0.04, "{rate}");
+    let worst = report["worst"].as_array().expect("a list");
+    assert_eq!((worst.len(), &worst[0]["success"]), (10, &false.into()));
+}
+
+/// A row that is not what the run gives is told, with the column.
+#[test]
+fn a_row_that_was_changed_is_told() {
+    let workshop = workshop(20, "sobol");
+    let text = workshop.punctual(["campaign", "c.toml", "--require-success", "--worst", "3"]);
+    assert_eq!(text.code, 1, "some fail");
+    assert!(text.stdout.starts_with("20 runs in "), "{}", text.stdout);
+    assert!(
+        text.stdout.contains("again, with pictures: punctual replay c.parquet --run "),
+        "{}",
+        text.stdout
+    );
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    let column = names.iter().position(|n| n == "plant.x0.x_p").expect("a column");
+    let value = number(&rows[5][column]).expect("a value");
+    let same = workshop.punctual(["replay", "c.parquet", "--run", "5", "--out", "out"]).success();
+    assert!(same.contains("the row is as recorded, bit for bit"), "{same}");
+    assert!(workshop.text("out/c-5-filter.goal.svg").trim_end().ends_with("</svg>"), "a picture of h");
+    // The last bit of the number.
+    let mut bytes = workshop.bytes("c.parquet");
+    let old = value.to_le_bytes();
+    let places: Vec<usize> = (0..bytes.len() - 8).filter(|&i| bytes[i..i + 8] == old).collect();
+    assert_eq!(places.len(), 1, "{value} in the file");
+    bytes[places[0]] ^= 1;
+    workshop.write("changed.parquet", bytes);
+    let done = workshop.punctual(["replay", "changed.parquet", "--run", "5", "--json"]);
+    assert_eq!(done.code, 1, "{done:?}");
+    let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+    let differences = report["differences"].as_array().expect("a list");
+    assert_eq!((&report["same"], differences.len()), (&false.into(), 1), "{report}");
+    assert_eq!(
+        (&differences[0]["column"], &differences[0]["found"]),
+        (&"plant.x0.x_p".into(), &value.to_string().into())
+    );
+    workshop.punctual(["replay", "c.parquet", "--run", "20"]).fails(2, "--run: is 20, must be from 0 to 19");
+    workshop.punctual(["replay", "filter.fmu", "--run", "0"]).fails_like(2, "cannot read filter.fmu: ", &[]);
+}
+
+/// What is drawn depends on the file and the number alone.
+#[test]
+fn runs_are_listed_as_they_are_drawn() {
+    for sampling in ["random", "latin_hypercube", "sobol"] {
+        let workshop = workshop(1 << 20, sampling);
+        let list = |range: &str| workshop.punctual(["campaign", "c.toml", "--list", range]).success();
+        let all = list("0..300");
+        let head = "run,seed,filter.u_max.a,filter.u_min.a,plant.x0.v,plant.x0.x_p\n0,";
+        assert!(all.starts_with(head), "{all}");
+        let line = all.lines().nth(1 + 250).expect("a line").to_owned();
+        assert_eq!(list("250..251").lines().nth(1), Some(line.as_str()));
+        assert!(list("1048575..1048576").lines().nth(1).is_some_and(|line| line.starts_with("1048575,")));
+    }
+    let workshop = workshop(10, "random");
+    let list = |range| workshop.punctual(["campaign", "c.toml", "--list", range]);
+    list("0..11").fails(2, "--list: ends at 11, must be at most 10, the number of runs");
+    list("5..5").fails_like(2, "invalid value '5..5' for '--list <FIRST..LAST>': ", &["has no run"]);
+    list("5").fails_like(2, "invalid value '5' for '--list <FIRST..LAST>': ", &["not of the form"]);
+}
+
+#[test]
+fn each_defect_is_told_with_its_field() {
+    let campaign = |from: &str, to: &str| {
+        let workshop = workshop(10, "random");
+        let text = file(10, "random");
+        assert!(text.contains(from), "{from}");
+        workshop.write("c.toml", text.replacen(from, to, 1));
+        workshop.punctual(["campaign", "c.toml"])
+    };
+    let fails = |from: &str, to: &str, message: &str| {
+        campaign(from, to).fails_like(2, &format!("c.toml: {message}"), &[]);
+    };
+    fails("runs = 10", "", "campaign: missing field `runs`");
+    fails("runs = 10", "runs = 0", "campaign.runs: is 0, must be from 1 to 9007199254740992");
+    fails("seed = 7", "seed = -7", "campaign.seed: ");
+    fails("seed = 7", "sead = 7", "campaign.sead: unknown field `sead`");
+    fails("\"random\"", "\"halton\"", "campaign.sampling: unknown variant `halton`");
+    fails("seed = 7", "step = nan", "campaign.step: is NaN; must be finite");
+    fails("seed = 7", "stop_time = -1.0", "campaign.stop_time: is -1 s; must be after start_time = 0 s");
+    fails("max = 20", "max = nan", "vary.\"plant.x0.x_p\".max: is NaN, must be finite");
+    fails("plant.x0.x_p", "plant.x0.q", "vary.\"plant.x0.q\": plant (plant.fmu) has no variable \"x0.q\"");
+    fails(
+        "plant.x0.x_p",
+        "plan.x0.x_p",
+        "vary.\"plan.x0.x_p\": no component \"plan\"; there are filter, plant",
+    );
+    fails("plant.x0.x_p", "filter.goal.h", "vary.\"filter.goal.h\": is a Real output; only Real parameters");
+    fails("plant.x0.x_p", "filter.rearm", "vary.\"filter.rearm\": is a Boolean input; only Real parameters");
+    fails("plant.x0.x_p", "filter.x.v", "vary.\"filter.x.v\": is a connected input");
+    fails(
+        "\"plant.x0.x_p\"]\ndistribution = \"uniform\"\nmin = 0",
+        "\"filter.goal.deadline\"]\ndistribution = \"uniform\"\nmin = 0",
+        "vary.\"filter.goal.deadline\".min: is 0, must be finite and >= 1e-9",
+    );
+    let missing = "cannot read nothing.toml: ";
+    campaign("\"system.toml\"", "\"nothing.toml\"").fails_like(2, missing, &[]);
+    fails("\"system.toml\"", "3", "system: invalid type: integer `3`, expected the name of a system file");
+    campaign("\"system.toml\"", "\"other.toml\"").fails_like(2, "cannot read other.toml", &[]);
+}
+
+/// An inline system, of configurations in place of FMUs, with a disturbance whose seed is the run's own.
+#[test]
+fn a_campaign_needs_no_fmus() {
+    let workshop = Workshop::new();
+    for name in ["unicycle-filter.toml", "unicycle-plant.toml"] {
+        workshop.write(name, fs::read(examples().join(name)).expect("an example"));
+    }
+    let plant = workshop.text("unicycle-plant.toml") + "[disturbance]\nperiod = 0.1\ninputs = { a = 0.1 }\n";
+    workshop.write("unicycle-plant.toml", plant);
+    let system =
+        system().replace("filter.fmu", "unicycle-filter.toml").replace("plant.fmu", "unicycle-plant.toml");
+    let inline = system
+        .replace("[experiment]", "[system.experiment]")
+        .replace("[[component]]", "[[system.component]]")
+        .replace("[[connection]]", "[[system.connection]]")
+        .replace("[[connect_by_name]]", "[[system.connect_by_name]]");
+    let file = inline
+        + "[campaign]\nruns = 3\nsuccess = \"on_time_and_inside\"\nstop_time = 11.0\n\
+           [vary.\"plant.disturbance.seed\"]\ndistribution = \"seed\"\n";
+    workshop.write("c.toml", &file);
+    let report: Value =
+        serde_json::from_str(&workshop.punctual(["campaign", "c.toml", "--json"]).success()).expect("JSON");
+    assert_eq!(report["success"]["count"], 3, "{report}");
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
+    let peaks: Vec<_> = rows.iter().map(|row| number(&row[column("filter.peak.a")])).collect();
+    assert!(peaks[0] != peaks[1] && peaks[1] != peaks[2], "each run is disturbed in its own way: {peaks:?}");
+    for row in &rows {
+        assert_eq!(number(&row[column("seed")]), number(&row[column("plant.disturbance.seed")]));
+    }
+    workshop.punctual(["replay", "c.parquet", "--run", "2"]).success();
+    workshop.write("c.toml", file.replace("step = 0.05", "step = -0.05"));
+    workshop
+        .punctual(["campaign", "c.toml"])
+        .fails(2, "c.toml: system.experiment.step: is -0.05 s; must be > 0");
+}
+
+/// Of an FMU that is not ours, and of one by another version, it is said that they cannot run in process.
+#[test]
+fn fmus_of_others_are_refused() {
+    let refused = |message: &str, edit: &dyn Fn(&str, Vec<u8>) -> Option<Vec<u8>>| {
+        let workshop = workshop(3, "random");
+        workshop.edit_fmu("plant.fmu", edit);
+        workshop.punctual(["campaign", "c.toml"]).fails_like(
+            2,
+            "system.toml: component[1].fmu: plant.fmu is ",
+            &[message],
+        );
+    };
+    refused("not an FMU of Punctual (it has no resources/configuration.toml)", &|name, bytes| {
+        (name != "resources/configuration.toml").then_some(bytes)
+    });
+    refused("the work of another version of Punctual", &|name, bytes| {
+        if name != "modelDescription.xml" {
+            return Some(bytes);
+        }
+        let text = String::from_utf8(bytes).expect("UTF-8");
+        Some(text.replace("guid=\"{", "guid=\"{0").into_bytes())
+    });
+}
