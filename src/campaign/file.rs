@@ -202,9 +202,9 @@ impl Campaign {
         };
         // What is read as part of another file has not been checked yet.
         let prefix = if source.system.is_none() { "system." } else { "" };
-        let system = system.timed(None, None).map_err(|e| {
-            in_file(ConfigurationError::new(format!("{prefix}{}", e.field()), e.message()))
-        })?;
+        let system = system
+            .timed(None, None)
+            .map_err(|e| in_file(ConfigurationError::new(format!("{prefix}{}", e.field()), e.message())))?;
         let section = file.campaign;
         let system = system.timed(section.stop_time, section.step).map_err(|e| {
             in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))

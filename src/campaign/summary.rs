@@ -222,7 +222,7 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// Values of R's `binom.wilson` and of R. G. Newcombe, Statist. Med. 17 (1998), table I: 81 of 263, 15 of
+    /// R. G. Newcombe, Statist. Med. 17 (1998), table I, score method without correction: 81 of 263, 15 of
     /// 148, 0 of 20, 1 of 29, to the four digits printed there.
     #[test]
     fn intervals_are_those_of_the_tables() {

@@ -15,6 +15,9 @@ use crate::output::{self, Counter, number};
 /// Exit code after Ctrl-C, as shells have it.
 const INTERRUPTED: u8 = 130;
 
+/// Lines of a list that are printed together.
+const AT_ONCE: usize = 1000;
+
 /// Arguments of `punctual campaign`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -34,11 +37,17 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Exit with code 1 unless every run succeeded
-    #[arg(long)]
-    require_success: bool,
+    #[arg(long, value_enum, value_name = "WHAT")]
+    require: Option<Requirement>,
     /// Run nothing: list what is drawn for the runs FIRST to LAST - 1, as CSV or JSON
     #[arg(long, value_name = "FIRST..LAST", value_parser = range)]
     list: Option<Range>,
+}
+
+/// What a campaign must come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Requirement {
+    Success,
 }
 
 /// Runs by number, the last one not among them.
@@ -139,7 +148,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return Ok(ExitCode::from(INTERRUPTED));
     }
     let failed = report.summary.is_some_and(|summary| summary.failure.count > 0);
-    Ok(if failed && arguments.require_success { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if failed && arguments.require == Some(Requirement::Success) {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
 }
 
 fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<ExitCode, Error> {
@@ -158,15 +171,18 @@ fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<Exit
         output::json(&runs.map(drawn).collect::<Vec<_>>());
         return Ok(ExitCode::SUCCESS);
     }
-    let mut lines = vec!["run,seed".to_owned()];
-    names().for_each(|name| lines[0] += &format!(",{}", crate::recording::quoted(name)));
-    lines.extend(runs.map(|run| {
+    let mut head = "run,seed".to_owned();
+    names().for_each(|name| head += &format!(",{}", crate::recording::quoted(name)));
+    output::result(&head);
+    let line = |run: u64| {
         let choice = campaign.choice(run);
-        let mut line = format!("{run},{}", choice.seed);
-        choice.values.iter().for_each(|value| line += &format!(",{value:?}"));
-        line
-    }));
-    output::result(&lines.join("\n"));
+        let values = choice.values.iter().map(|value| format!(",{value:?}"));
+        format!("{run},{}{}", choice.seed, values.collect::<String>())
+    };
+    for first in runs.clone().step_by(AT_ONCE) {
+        let last = runs.end.min(first + AT_ONCE as u64);
+        output::result(&(first..last).map(line).collect::<Vec<_>>().join("\n"));
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use punctual::campaign::{self, Campaign, Cell, Measures, Row};
 use serde_json::Value;
@@ -179,7 +179,10 @@ fn a_campaign_can_be_ended_at_any_point() {
     let workshop = workshop(4000, "random");
     let mut before = 0;
     // Anything from the middle of a segment to that of its file.
-    let moment = || Duration::from_micros(u64::from(Instant::now().elapsed().subsec_nanos()) % 20_000);
+    let moment = || {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970");
+        Duration::from_micros(u64::from(now.subsec_nanos()) % 20_000)
+    };
     for (threads, ending) in [("1", "-KILL"), ("2", "-INT"), ("2", "-KILL")] {
         let mut child = begin(&workshop, &["--threads", threads]);
         wait(&workshop, &mut child, before, moment());
@@ -241,7 +244,7 @@ fn a_campaign_can_be_ended_at_any_point() {
 #[test]
 fn a_row_that_was_changed_is_told() {
     let workshop = workshop(20, "sobol");
-    let text = workshop.punctual(["campaign", "c.toml", "--require-success", "--worst", "3"]);
+    let text = workshop.punctual(["campaign", "c.toml", "--require", "success", "--worst", "3"]);
     assert_eq!(text.code, 1, "some fail");
     assert!(text.stdout.starts_with("20 runs in "), "{}", text.stdout);
     assert!(
@@ -394,4 +397,27 @@ fn fmus_of_others_are_refused() {
         let text = String::from_utf8(bytes).expect("UTF-8");
         Some(text.replace("guid=\"{", "guid=\"{0").into_bytes())
     });
+}
+
+/// The example, with three runs in coarse steps.
+#[test]
+fn the_example_runs() {
+    let workshop = Workshop::with_library();
+    let folder = examples().join("../campaign");
+    for entry in fs::read_dir(&folder).expect("the examples").flatten() {
+        workshop.write(&entry.file_name().to_string_lossy(), fs::read(entry.path()).expect("an example"));
+    }
+    for name in ["unicycle-filter", "unicycle-plant"] {
+        let (from, to) = (format!("{name}.toml"), format!("{name}.fmu"));
+        workshop.punctual(["build", &from, "-o", &to]).success();
+    }
+    let text = workshop.text("unicycle.toml").replace("runs = 1000", "runs = 3\nstep = 0.01");
+    workshop.write("unicycle.toml", text);
+    let report = workshop.punctual(["campaign", "unicycle.toml", "--json"]).success();
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!((&report["runs"], &report["success"]["count"]), (&3.into(), &3.into()), "{report}");
+    workshop.punctual(["replay", "unicycle.parquet", "--run", "1", "--out", "out"]).success();
+    for picture in ["path", "h", "input"] {
+        assert!(workshop.text(&format!("out/unicycle-1-{picture}.svg")).trim_end().ends_with("</svg>"));
+    }
 }
