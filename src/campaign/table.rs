@@ -348,8 +348,8 @@ mod tests {
                 2 => Some(f64::from_bits(0x7ff8_0000_0000_0001)),
                 _ => Some((k as f64).sqrt()),
             };
-            let text = (k % 3 == 0).then(|| format!("r {k}"));
-            vec![Cell::Count(k), Cell::Number(number), Cell::Flag(k % 2 == 0), Cell::Text(text)]
+            let text = k.is_multiple_of(3).then(|| format!("r {k}"));
+            vec![Cell::Count(k), Cell::Number(number), Cell::Flag(k.is_multiple_of(2)), Cell::Text(text)]
         };
         let count = GROUP as u64 + 100;
         let write = |name: &str| {

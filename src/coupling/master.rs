@@ -134,7 +134,7 @@ impl Simulation<Slave> {
             opened.push((path, Rc::clone(&fmu)));
             fmus.push(fmu);
         }
-        Self::with_fmus(system, fmus)
+        Self::with_fmus(system, &fmus)
     }
 
     /// Instantiates `fmus`, one for each component of `system`, in order; the paths in the system
@@ -143,7 +143,7 @@ impl Simulation<Slave> {
     /// # Errors
     ///
     /// As for [`Simulation::new`]; or not one FMU for each component.
-    pub fn with_fmus(system: &System, fmus: Vec<Rc<Fmu>>) -> Result<Self, Error> {
+    pub fn with_fmus(system: &System, fmus: &[Rc<Fmu>]) -> Result<Self, Error> {
         let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
         let slave = |c: usize| instantiate(Rc::clone(&fmus[c]), &system.components()[c].name);
         Self::assembled(system, &descriptions, slave)
@@ -367,10 +367,10 @@ impl<P: Participant> Simulation<P> {
                 match *start {
                     Start::Real(reference, value) => member.participant.set_real(&[reference], &[value])?,
                     Start::Integer(reference, value) => {
-                        member.participant.set_integer(&[reference], &[value])?
+                        member.participant.set_integer(&[reference], &[value])?;
                     }
                     Start::Boolean(reference, value) => {
-                        member.participant.set_boolean(&[reference], &[value])?
+                        member.participant.set_boolean(&[reference], &[value])?;
                     }
                 }
             }
