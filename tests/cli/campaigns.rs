@@ -390,10 +390,13 @@ fn a_campaign_needs_no_fmus() {
         .fails(2, "c.toml: system.experiment.step: is -0.05 s; must be > 0");
 }
 
+/// An entry of an archive, by name, to what it becomes.
+type Edit = fn(&str, Vec<u8>) -> Option<Vec<u8>>;
+
 /// Of an FMU that is not ours, and of one by another version, it is said that they cannot run in process.
 #[test]
 fn fmus_of_others_are_refused() {
-    let refused = |message: &str, edit: &dyn Fn(&str, Vec<u8>) -> Option<Vec<u8>>| {
+    let refused = |message: &str, edit: Edit| {
         let workshop = with_fmus(3, "random");
         workshop.edit_fmu("plant.fmu", edit);
         workshop.punctual(["campaign", "c.toml"]).fails_like(
@@ -402,10 +405,10 @@ fn fmus_of_others_are_refused() {
             &[message],
         );
     };
-    refused("not an FMU of Punctual (it has no resources/configuration.toml)", &|name, bytes| {
+    refused("not an FMU of Punctual (it has no resources/configuration.toml)", |name, bytes| {
         (name != "resources/configuration.toml").then_some(bytes)
     });
-    refused("the work of another version of Punctual", &|name, bytes| {
+    refused("the work of another version of Punctual", |name, bytes| {
         if name != "modelDescription.xml" {
             return Some(bytes);
         }
