@@ -14,12 +14,14 @@
 //! pictures             from a system file's plots and a recording to pictures
 //! package              from a configuration to an .fmu file, from a system to an .ssp file
 //! demo                 the demonstration: three plants, two methods
+//! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! output               the one place that prints
 //! reproduce            the study: the paper's tables and figures beside ours and those of the literature
 //! command              one thin function per subcommand
 //! ```
 #![deny(unsafe_code)]
 
+pub mod campaign;
 pub mod command;
 pub mod coupling;
 pub mod demo;

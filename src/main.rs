@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, check, demo, inspect, reproduce, run, validate};
+use punctual::command::{build, campaign, check, demo, inspect, replay, reproduce, run, validate};
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
@@ -31,6 +31,10 @@ enum Command {
     Reproduce(reproduce::Arguments),
     /// Couple FMUs as a system file says; write CSV and pictures
     Run(run::Arguments),
+    /// Run a system from many drawn starts, parameters and disturbances; write a Parquet file
+    Campaign(campaign::Arguments),
+    /// Make one run of a campaign again, with CSV and pictures; check that it is the same
+    Replay(replay::Arguments),
     /// Show what an FMU offers
     Inspect(inspect::Arguments),
     /// Say what is wrong with an FMU, ours or another's, before a master stumbles over it
@@ -46,9 +50,11 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Build(arguments) => build::execute(&arguments),
+        Command::Campaign(arguments) => campaign::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Reproduce(arguments) => reproduce::execute(&arguments),
+        Command::Replay(arguments) => replay::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),
         Command::Validate(arguments) => validate::execute(&arguments),

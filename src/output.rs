@@ -83,6 +83,38 @@ impl Progress {
     }
 }
 
+/// A counter of things done on stderr, with their rate and the time left; on a terminal only. Several threads
+/// may tell it.
+#[derive(Debug)]
+pub struct Counter(ProgressBar);
+
+impl Counter {
+    /// Counts `all` of the things named `what`, of which `done` are done.
+    pub fn new(what: &str, done: u64, all: u64) -> Self {
+        let bar = ProgressBar::new(all).with_message(what.to_owned());
+        // As above.
+        if let Ok(style) = ProgressStyle::with_template(
+            "{human_pos} of {human_len} {msg} {wide_bar} {per_sec}  {elapsed} gone, {eta} left",
+        ) {
+            bar.set_style(style);
+        }
+        bar.set_position(done);
+        bar.reset_eta();
+        Self(bar)
+    }
+
+    /// Says that `done` are done.
+    pub fn update(&self, done: u64) {
+        self.0.set_position(done);
+    }
+}
+
+impl Drop for Counter {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {

@@ -151,7 +151,7 @@ fn write_number(out: &mut impl Write, value: f64) -> io::Result<()> {
 }
 
 /// A CSV field, in quotes where it needs them.
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

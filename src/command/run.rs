@@ -8,12 +8,13 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use crate::coupling::{Order, Outcome, Promise, Simulation, System};
+use crate::coupling::{Order, Outcome, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
 use crate::output::{self, Progress};
-use crate::{pictures, recording};
+use crate::pictures;
+use crate::recording::{self, Recording};
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -171,7 +172,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         return Err(failure);
     }
     let files = match &arguments.out {
-        Some(folder) => write_files(&system, path, folder, &outcome)?,
+        Some(folder) => write_files(system.pictures(), &stem(path), folder, &outcome.recording)?,
         None => Vec::new(),
     };
     let report = report(path, &system, &simulation, outcome, files);
@@ -188,7 +189,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
 }
 
 /// The name of a system file without its ending: the head of all names of files written.
-fn stem(path: &Path) -> String {
+pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned())
 }
 
@@ -196,16 +197,21 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.csv", stem(path)))
 }
 
-/// Writes the CSV file and the pictures into `folder`, which exists; returns their paths.
-fn write_files(system: &System, path: &Path, folder: &Path, outcome: &Outcome) -> Result<Vec<String>, Error> {
-    let stem = stem(path);
-    let csv = csv_file(path, folder);
-    outcome.recording.save_csv(&csv)?;
+/// Writes the CSV file and the `pictures` into `folder`, which exists, under names that begin with `stem`;
+/// returns their paths.
+pub(super) fn write_files(
+    pictures: &[Picture],
+    stem: &str,
+    folder: &Path,
+    recording: &Recording,
+) -> Result<Vec<String>, Error> {
+    let csv = folder.join(format!("{stem}.csv"));
+    recording.save_csv(&csv)?;
     let mut files = vec![csv];
-    for (i, picture) in system.pictures().iter().enumerate() {
+    for (i, picture) in pictures.iter().enumerate() {
         let name = picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
         let file = folder.join(format!("{stem}-{name}.svg"));
-        pictures::draw(picture, &outcome.recording, &file)?;
+        pictures::draw(picture, recording, &file)?;
         files.push(file);
     }
     Ok(files.iter().map(|file| file.display().to_string()).collect())
@@ -278,7 +284,7 @@ fn text(report: &Report) -> String {
 }
 
 /// A row for each promise and an empty line; nothing without one.
-fn promises_text(promises: &[Promise]) -> String {
+pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
         return String::new();
     }

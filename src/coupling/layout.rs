@@ -1,11 +1,9 @@
 //! Which signal has which slot, and how slots become recorded rows.
 
-use std::rc::Rc;
-
 use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
 use super::system::System;
-use crate::host::{Causality, Fmu, Kind};
+use crate::host::{Causality, Description, Kind};
 use crate::recording::{Column, Recording};
 
 /// Rows for which room is made before a run; longer recordings grow while running.
@@ -28,12 +26,11 @@ impl Layout {
     pub(super) fn add(
         &mut self,
         system: &System,
-        fmus: &[Rc<Fmu>],
+        description: &Description,
         component: usize,
         links: &[Link],
         read: &[Port],
     ) -> [Group; 3] {
-        let description = fmus[component].description();
         let mut parts: [Vec<(usize, u32, Kind)>; 3] = Default::default();
         for (position, variable) in description.variables.iter().enumerate() {
             let port = Port { component, variable: position };
@@ -81,21 +78,25 @@ pub(super) struct Recorder<'a> {
     slots: Vec<usize>,
     row: Vec<f64>,
     pub(super) recording: Recording,
+    keep: bool,
     observer: &'a mut dyn FnMut(f64, &[f64]),
 }
 
 impl<'a> Recorder<'a> {
-    /// Records `slots` as `columns`, every so many of `last` steps and at the last point.
+    /// Takes `slots` as `columns`, `every` so many of `last` steps and at the last point; only those that it
+    /// is to `keep` are recorded.
     pub(super) fn new(
         columns: &[Column],
         slots: &[usize],
-        every: u64,
-        last: u64,
+        (every, last): (u64, u64),
+        keep: bool,
         observer: &'a mut dyn FnMut(f64, &[f64]),
     ) -> Self {
         let mut recording = Recording::new(columns.to_vec());
         let rows = usize::try_from(last / every).unwrap_or(usize::MAX).saturating_add(2);
-        recording.reserve(rows.min(ROWS_RESERVED));
+        if keep {
+            recording.reserve(rows.min(ROWS_RESERVED));
+        }
         Self {
             every,
             last,
@@ -103,6 +104,7 @@ impl<'a> Recorder<'a> {
             row: vec![0.0; slots.len()],
             slots: slots.to_vec(),
             recording,
+            keep,
             observer,
         }
     }
@@ -116,7 +118,9 @@ impl<'a> Recorder<'a> {
         for (value, slot) in self.row.iter_mut().zip(&self.slots) {
             *value = values[*slot];
         }
-        self.recording.push(time, &self.row);
+        if self.keep {
+            self.recording.push(time, &self.row);
+        }
         (self.observer)(time, &self.row);
     }
 }

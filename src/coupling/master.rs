@@ -18,17 +18,18 @@ use std::time::{Duration, Instant};
 use super::grid::Grid;
 use super::layout::{Layout, Recorder};
 use super::network::{self, Network, Start};
+use super::participant::Participant;
 use super::ports::{Group, Source};
 use super::promises::{self, Promise, Watched};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
-use crate::host::{Fmu, Slave};
+use crate::host::{Description, Fmu, Slave};
 use crate::recording::{Column, Recording};
 
 /// A component while it runs.
 #[derive(Debug)]
-struct Member {
-    slave: Slave,
+struct Member<P> {
+    participant: P,
     starts: Vec<Start>,
     /// Outputs without feedthrough.
     states: Group,
@@ -38,10 +39,10 @@ struct Member {
     sources: Vec<Source>,
 }
 
-/// A coupled system, ready to run.
+/// A coupled system of FMUs or of other participants, ready to run.
 #[derive(Debug)]
-pub struct Simulation {
-    members: Vec<Member>,
+pub struct Simulation<P = Slave> {
+    members: Vec<Member<P>>,
     /// Components with direct feedthrough, in running order.
     direct: Vec<usize>,
     delayed: Vec<usize>,
@@ -104,7 +105,7 @@ fn instantiate(fmu: Rc<Fmu>, name: &str) -> Result<Slave, Error> {
     Slave::instantiate(fmu, name).map_err(|e| e.in_component(name))
 }
 
-impl Simulation {
+impl Simulation<Slave> {
     /// Opens the FMUs of `system`, found relative to the folder `base`, and instantiates them.
     ///
     /// # Errors
@@ -133,7 +134,7 @@ impl Simulation {
             opened.push((path, Rc::clone(&fmu)));
             fmus.push(fmu);
         }
-        Self::with_fmus(system, fmus)
+        Self::with_fmus(system, &fmus)
     }
 
     /// Instantiates `fmus`, one for each component of `system`, in order; the paths in the system
@@ -142,36 +143,58 @@ impl Simulation {
     /// # Errors
     ///
     /// As for [`Simulation::new`]; or not one FMU for each component.
-    pub fn with_fmus(system: &System, fmus: Vec<Rc<Fmu>>) -> Result<Self, Error> {
-        if fmus.len() != system.components().len() {
-            let message = format!("{} FMUs for {} components", fmus.len(), system.components().len());
+    pub fn with_fmus(system: &System, fmus: &[Rc<Fmu>]) -> Result<Self, Error> {
+        let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
+        let slave = |c: usize| instantiate(Rc::clone(&fmus[c]), &system.components()[c].name);
+        Self::assembled(system, &descriptions, slave)
+    }
+
+    /// Component names and their FMUs, in the system's order.
+    pub fn components(&self) -> impl Iterator<Item = (&str, &Rc<Fmu>)> {
+        self.members.iter().map(|member| (member.participant.name(), member.participant.fmu()))
+    }
+}
+
+impl<P: Participant> Simulation<P> {
+    /// Couples what `participant` makes for each component of `system`, by position; `descriptions` say what
+    /// they offer.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Simulation::new`]; or not one description for each component.
+    pub fn assembled(
+        system: &System,
+        descriptions: &[&Description],
+        mut participant: impl FnMut(usize) -> Result<P, Error>,
+    ) -> Result<Self, Error> {
+        if descriptions.len() != system.components().len() {
+            let message = format!("{} FMUs for {} components", descriptions.len(), system.components().len());
             return Err(Error::configuration("component", message));
         }
-        let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
         let Network { links, mut starts, recorded, direct, delayed, notes } =
-            network::resolve(system, &descriptions)?;
+            network::resolve(system, descriptions)?;
 
-        let watched = promises::ports(system, &descriptions);
+        let watched = promises::ports(system, descriptions);
         let mut read = recorded.clone();
         read.extend(watched.iter().flat_map(|(_, status, fields)| fields.iter().chain([status])));
         let mut layout = Layout::default();
         let mut groups = Vec::new();
-        for component in 0..fmus.len() {
-            groups.push(layout.add(system, &fmus, component, &links, &read));
+        for (component, description) in descriptions.iter().enumerate() {
+            groups.push(layout.add(system, description, component, &links, &read));
         }
         let slots = recorded.iter().filter_map(|port| layout.slot(*port)).collect();
         let columns = recorded
             .iter()
             .map(|port| {
-                let variable = &fmus[port.component].description().variables[port.variable];
+                let variable = &descriptions[port.component].variables[port.variable];
                 let component = &system.components()[port.component].name;
                 Column { name: format!("{component}.{}", variable.name), unit: variable.unit.clone() }
             })
             .collect();
         let mut members = Vec::new();
-        for (component, ([states, direct, inputs], fmu)) in groups.into_iter().zip(fmus).enumerate() {
+        for (component, [states, direct, inputs]) in groups.into_iter().enumerate() {
             members.push(Member {
-                slave: instantiate(fmu, &system.components()[component].name)?,
+                participant: participant(component)?,
                 starts: std::mem::take(&mut starts[component]),
                 states,
                 direct,
@@ -199,9 +222,19 @@ impl Simulation {
             standing_notes: 0,
             used: false,
         };
-        simulation.note_shortened_step();
+        simulation.note_shortened_step(descriptions);
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
+    }
+
+    /// Gives a Real parameter or input another start value, from the next run on.
+    pub fn set_start(&mut self, component: usize, reference: u32, value: f64) {
+        let starts = &mut self.members[component].starts;
+        let given = starts.iter_mut().find(|s| matches!(s, Start::Real(other, _) if *other == reference));
+        match given {
+            Some(start) => *start = Start::Real(reference, value),
+            None => starts.push(Start::Real(reference, value)),
+        }
     }
 
     /// The columns of a row, in order.
@@ -214,11 +247,6 @@ impl Simulation {
         &self.grid
     }
 
-    /// Component names and their FMUs, in the system's order.
-    pub fn components(&self) -> impl Iterator<Item = (&str, &Rc<Fmu>)> {
-        self.members.iter().map(|member| (member.slave.name(), member.slave.fmu()))
-    }
-
     /// Runs from start to stop and records. `observer` gets the time (s) and the values of each
     /// recorded row, in the order of [`Simulation::columns`]. Can be called again: instances are
     /// then reset first.
@@ -228,9 +256,22 @@ impl Simulation {
     /// An FMI call of the initialization that returns neither OK nor Warning. One of a later step ends
     /// the run: see [`Outcome::failure`].
     pub fn run(&mut self, mut observer: impl FnMut(f64, &[f64])) -> Result<Outcome, Error> {
+        self.run_as(true, &mut observer)
+    }
+
+    /// As [`Simulation::run`], for observers only: the recording stays empty.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    pub fn run_unrecorded(&mut self, mut observer: impl FnMut(f64, &[f64])) -> Result<Outcome, Error> {
+        self.run_as(false, &mut observer)
+    }
+
+    fn run_as(&mut self, keep: bool, observer: &mut dyn FnMut(f64, &[f64])) -> Result<Outcome, Error> {
         self.initialise()?;
-        let mut recorder =
-            Recorder::new(&self.columns, &self.slots, self.every, self.grid.steps(), &mut observer);
+        let rows = (self.every, self.grid.steps());
+        let mut recorder = Recorder::new(&self.columns, &self.slots, rows, keep, observer);
         let begin = Instant::now();
         let mut ran = match self.order {
             Order::GaussSeidel => self.run_gauss_seidel(&mut recorder),
@@ -240,12 +281,10 @@ impl Simulation {
         let (steps, recording) = (recorder.reached, recorder.recording);
         for member in &mut self.members {
             if ran.is_ok() {
-                ran = member.slave.terminate();
+                ran = member.participant.terminate();
             }
-            let count = member.slave.warnings();
-            if count > 0 {
-                let last = member.slave.log().last().map(|m| format!("; last: {m}")).unwrap_or_default();
-                self.notes.push(format!("{}: {count} calls returned fmi2Warning{last}", member.slave.name()));
+            if let Some(remark) = member.participant.remark() {
+                self.notes.push(format!("{}: {remark}", member.participant.name()));
             }
         }
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
@@ -259,7 +298,7 @@ impl Simulation {
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
                 self.set_inputs(c)?;
-                self.members[c].slave.do_step(time, step)?;
+                self.members[c].participant.do_step(time, step)?;
                 self.read_direct(c, time)?;
             }
             for i in 0..self.delayed.len() {
@@ -267,7 +306,7 @@ impl Simulation {
             }
             self.take(recorder, k, time);
             for i in 0..self.delayed.len() {
-                self.members[self.delayed[i]].slave.do_step(time, step)?;
+                self.members[self.delayed[i]].participant.do_step(time, step)?;
             }
             for c in 0..self.members.len() {
                 self.read_states(c, self.grid.time(k + 1))?;
@@ -298,7 +337,7 @@ impl Simulation {
             }
             self.take(recorder, k, time);
             for member in &mut self.members {
-                member.slave.do_step(time, step)?;
+                member.participant.do_step(time, step)?;
             }
             for c in 0..self.members.len() {
                 self.read_states(c, self.grid.time(k + 1))?;
@@ -318,31 +357,35 @@ impl Simulation {
         self.notes.truncate(self.standing_notes);
         self.reported.fill(false);
         self.promises.iter_mut().for_each(Watched::reset);
+        let used = std::mem::replace(&mut self.used, true);
         for member in &mut self.members {
-            if self.used {
-                member.slave.reset()?;
+            if used {
+                member.participant.reset()?;
             }
-            member.slave.setup_experiment(self.start_time, self.stop_time)?;
+            member.participant.setup_experiment(self.start_time, self.stop_time)?;
             for start in &member.starts {
                 match *start {
-                    Start::Real(reference, value) => member.slave.set_real(&[reference], &[value])?,
-                    Start::Integer(reference, value) => member.slave.set_integer(&[reference], &[value])?,
-                    Start::Boolean(reference, value) => member.slave.set_boolean(&[reference], &[value])?,
+                    Start::Real(reference, value) => member.participant.set_real(&[reference], &[value])?,
+                    Start::Integer(reference, value) => {
+                        member.participant.set_integer(&[reference], &[value])?;
+                    }
+                    Start::Boolean(reference, value) => {
+                        member.participant.set_boolean(&[reference], &[value])?;
+                    }
                 }
             }
-            member.slave.enter_initialization_mode()?;
+            member.participant.enter_initialization_mode()?;
         }
-        self.used = true;
         let mut before: Vec<f64> = Vec::new();
         for _ in 0..=self.members.len() {
             for member in &mut self.members {
-                member.states.read(&mut member.slave, &mut self.values)?;
+                member.states.read(&mut member.participant, &mut self.values)?;
             }
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
                 self.set_inputs(c)?;
                 let member = &mut self.members[c];
-                member.direct.read(&mut member.slave, &mut self.values)?;
+                member.direct.read(&mut member.participant, &mut self.values)?;
             }
             for i in 0..self.delayed.len() {
                 self.set_inputs(self.delayed[i])?;
@@ -355,7 +398,7 @@ impl Simulation {
             before.clone_from(&self.values);
         }
         for member in &mut self.members {
-            member.slave.exit_initialization_mode()?;
+            member.participant.exit_initialization_mode()?;
         }
         for c in 0..self.members.len() {
             self.read_states(c, self.start_time)?;
@@ -374,12 +417,12 @@ impl Simulation {
         for source in &member.sources {
             source.transfer(&mut self.values);
         }
-        member.inputs.write(&mut member.slave, &self.values)
+        member.inputs.write(&mut member.participant, &self.values)
     }
 
     fn read_states(&mut self, c: usize, time: f64) -> Result<(), Error> {
         let member = &mut self.members[c];
-        member.states.read(&mut member.slave, &mut self.values)?;
+        member.states.read(&mut member.participant, &mut self.values)?;
         let slots = member.states.real_slots();
         self.check_finite(slots, time);
         Ok(())
@@ -387,7 +430,7 @@ impl Simulation {
 
     fn read_direct(&mut self, c: usize, time: f64) -> Result<(), Error> {
         let member = &mut self.members[c];
-        member.direct.read(&mut member.slave, &mut self.values)?;
+        member.direct.read(&mut member.participant, &mut self.values)?;
         let slots = member.direct.real_slots();
         self.check_finite(slots, time);
         Ok(())
@@ -411,11 +454,11 @@ impl Simulation {
         }
     }
 
-    fn note_shortened_step(&mut self) {
+    fn note_shortened_step(&mut self, descriptions: &[&Description]) {
         let Some(last) = self.grid.shortened() else { return };
-        for member in &self.members {
-            if !member.slave.fmu().description().capabilities.can_handle_variable_communication_step_size {
-                let name = member.slave.name();
+        for (member, description) in self.members.iter().zip(descriptions) {
+            if !description.capabilities.can_handle_variable_communication_step_size {
+                let name = member.participant.name();
                 self.notes.push(format!(
                     "the last step is {last} s long, but the FMU of {name} does not say that it can handle steps \
                      of different length"

@@ -1,18 +1,20 @@
 //! Couples FMUs: a system file says which FMUs, how they are wired and for how long; a fixed-step
-//! master runs them and records. Knows FMUs only through [`crate::host`].
+//! master runs them and records. Knows FMUs only through [`crate::host`], and steps whatever is a [`Participant`].
 
 mod graph;
 mod grid;
 mod layout;
 mod master;
 mod network;
+mod participant;
 mod ports;
 mod promises;
 mod system;
 
 pub use grid::Grid;
 pub use master::{Outcome, Simulation, Statistics};
-pub use network::{Link, Port, links};
+pub use network::{Link, Port, links, port};
+pub use participant::Participant;
 pub use promises::Promise;
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,

@@ -73,6 +73,15 @@ pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>
     resolve(system, descriptions).map(|network| network.links)
 }
 
+/// The variable that `text`, `component.variable`, names; `field` is where it stands.
+///
+/// # Errors
+///
+/// A component or variable that there is not, with those that there are.
+pub fn port(system: &System, descriptions: &[&Description], field: &str, text: &str) -> Result<Port, Error> {
+    Resolver { system, descriptions }.port(field, text)
+}
+
 /// The inputs that `output` depends on at the same instant, as positions in the variables.
 fn direct_inputs(component: &Component, description: &Description, output: &Output) -> Vec<usize> {
     match output.dependencies {

@@ -1,8 +1,9 @@
 //! Where the values of a run live: one vector of doubles, in which every output and every
 //! connected input has a slot; and how they come from and go to instances without allocation.
 
+use super::participant::Participant;
 use crate::error::Error;
-use crate::host::{Kind, Slave};
+use crate::host::Kind;
 
 /// Variables of one component that are read or written together, real ones first, then integers
 /// and enumerations, then Booleans; their slots follow one another in this order.
@@ -37,12 +38,12 @@ impl Group {
     }
 
     /// Reads all variables of the group from the instance into their slots.
-    pub(super) fn read(&mut self, slave: &mut Slave, values: &mut [f64]) -> Result<(), Error> {
-        slave.get_real(&self.real, &mut values[self.first..self.first + self.real.len()])?;
+    pub(super) fn read<P: Participant>(&mut self, instance: &mut P, values: &mut [f64]) -> Result<(), Error> {
+        instance.get_real(&self.real, &mut values[self.first..self.first + self.real.len()])?;
         let mut slot = self.first + self.real.len();
         if !self.integer.is_empty() {
             let numbers = &mut self.scratch[..self.integer.len()];
-            slave.get_integer(&self.integer, numbers)?;
+            instance.get_integer(&self.integer, numbers)?;
             for number in numbers {
                 values[slot] = f64::from(*number);
                 slot += 1;
@@ -50,7 +51,7 @@ impl Group {
         }
         if !self.boolean.is_empty() {
             let numbers = &mut self.scratch[..self.boolean.len()];
-            slave.get_boolean(&self.boolean, numbers)?;
+            instance.get_boolean(&self.boolean, numbers)?;
             for number in numbers {
                 values[slot] = f64::from(u8::from(*number != 0));
                 slot += 1;
@@ -60,8 +61,8 @@ impl Group {
     }
 
     /// Writes all variables of the group from their slots to the instance.
-    pub(super) fn write(&mut self, slave: &mut Slave, values: &[f64]) -> Result<(), Error> {
-        slave.set_real(&self.real, &values[self.first..self.first + self.real.len()])?;
+    pub(super) fn write<P: Participant>(&mut self, instance: &mut P, values: &[f64]) -> Result<(), Error> {
+        instance.set_real(&self.real, &values[self.first..self.first + self.real.len()])?;
         let mut slot = self.first + self.real.len();
         // Slots of integers and Booleans only ever hold values read from integers and Booleans.
         for (references, boolean) in [(&self.integer, false), (&self.boolean, true)] {
@@ -74,9 +75,9 @@ impl Group {
                 slot += 1;
             }
             if boolean {
-                slave.set_boolean(references, numbers)?;
+                instance.set_boolean(references, numbers)?;
             } else {
-                slave.set_integer(references, numbers)?;
+                instance.set_integer(references, numbers)?;
             }
         }
         Ok(())

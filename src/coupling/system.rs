@@ -296,6 +296,26 @@ impl System {
         Self::parse(&text).map_err(|e| e.in_file(path))
     }
 
+    /// The same system, run to `stop_time` in steps of `step` (s), where these are given.
+    ///
+    /// # Errors
+    ///
+    /// Times that cannot be, as in a system file.
+    pub fn timed(mut self, stop_time: Option<f64>, step: Option<f64>) -> Result<Self, ConfigurationError> {
+        self.experiment.stop_time = stop_time.unwrap_or(self.experiment.stop_time);
+        self.experiment.step = step.unwrap_or(self.experiment.step);
+        self.check()?;
+        Ok(self)
+    }
+
+    /// The same system with `signals` recorded at every step, and no pictures.
+    #[must_use]
+    pub fn recording(mut self, signals: Vec<String>) -> Self {
+        self.record = Record { every: 1, signals: Some(signals) };
+        self.plot.clear();
+        self
+    }
+
     /// When, in which steps and in which order.
     pub fn experiment(&self) -> &Experiment {
         &self.experiment

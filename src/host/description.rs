@@ -150,7 +150,11 @@ pub struct Description {
 
 impl Description {
     /// Reads a model description from its text.
-    pub(super) fn parse(text: &str) -> Result<Self, FmuProblem> {
+    ///
+    /// # Errors
+    ///
+    /// Text that is no model description of FMI 2.0, or of one without a co-simulation interface.
+    pub fn parse(text: &str) -> Result<Self, FmuProblem> {
         let read =
             xml::ModelDescription::from_string(text).map_err(|e| FmuProblem::Description(e.to_string()))?;
         let problems = read.validate().into_iter().map(|problem| problem.message).collect();

@@ -142,6 +142,11 @@ impl Fmu {
         Ok([("fmi2GetVersion", &library.version), ("fmi2GetTypesPlatform", &library.types_platform)])
     }
 
+    /// The text of a file in its `resources/`; `None` where there is no such text.
+    pub fn resource(&self, name: &str) -> Option<String> {
+        std::fs::read_to_string(self.archive.path(&format!("resources/{name}"))).ok()
+    }
+
     fn resource_location(&self) -> String {
         self.archive.resource_location()
     }

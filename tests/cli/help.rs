@@ -11,7 +11,9 @@ fn help_of_the_program() {
 #[test]
 fn help_of_every_command() {
     let workshop = Workshop::new();
-    for command in ["build", "check", "demo", "inspect", "reproduce", "run", "validate"] {
+    let commands =
+        ["build", "campaign", "check", "demo", "inspect", "replay", "reproduce", "run", "validate"];
+    for command in commands {
         assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
     }
 }

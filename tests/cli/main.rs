@@ -6,6 +6,7 @@ mod bad_configurations;
 mod bad_fmus;
 mod bad_systems;
 mod building;
+mod campaigns;
 mod checking;
 mod demonstrating;
 mod help;

@@ -251,7 +251,11 @@ fn each_dependency_is_named_in_one_place() {
         (&["roxmltree", ":", ":"], &["src/validate/", "src/host/description.rs"]),
         (&["plotters", ":", ":"], &["src/plot/"]),
         (&["indicatif", ":", ":"], &["src/output.rs"]),
-        (&["rayon", ":", ":"], &["src/reproduce/"]),
+        (&["parquet", ":", ":"], &["src/campaign/table.rs"]),
+        (&["rand_chacha", ":", ":"], &["src/campaign/sampling.rs"]),
+        (&["rayon", ":", ":"], &["src/campaign/runner.rs", "src/reproduce/"]),
+        (&["statrs", ":", ":"], &["src/campaign/distribution.rs"]),
+        (&["ctrlc", ":", ":"], &["src/command/campaign.rs"]),
     ];
     for (tokens, owners) in owners {
         let mut named = false;

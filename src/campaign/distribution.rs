@@ -1,0 +1,254 @@
+//! `[vary]`: how one number is spread, as a function from (0, 1) to values.
+
+use punctual_fmu::configuration::{ConfigurationError, Range};
+use serde::Deserialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// `[vary."component.variable"]`: the keys that its `distribution` needs, and no other.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VarySection {
+    /// Which distribution.
+    distribution: DistributionName,
+    /// Least value, in the unit of the variable.
+    min: Option<f64>,
+    /// Greatest value, likewise.
+    max: Option<f64>,
+    /// Mean before it is cut off at `min` and `max`, likewise.
+    mean: Option<f64>,
+    /// Standard deviation before that, likewise, > 0.
+    deviation: Option<f64>,
+    /// The values to choose from, each as likely as the others.
+    values: Option<Vec<f64>>,
+}
+
+/// The words of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum DistributionName {
+    Uniform,
+    LogUniform,
+    Normal,
+    Choice,
+    Seed,
+}
+
+impl DistributionName {
+    /// Its name, the keys it must have and those it may have.
+    fn keys(self) -> (&'static str, &'static [&'static str], &'static [&'static str]) {
+        match self {
+            Self::Uniform => ("uniform", &["min", "max"], &[]),
+            Self::LogUniform => ("log_uniform", &["min", "max"], &[]),
+            Self::Normal => ("normal", &["mean", "deviation"], &["min", "max"]),
+            Self::Choice => ("choice", &["values"], &[]),
+            Self::Seed => ("seed", &[], &[]),
+        }
+    }
+}
+
+/// A checked distribution.
+#[derive(Clone, Debug)]
+pub enum Distribution {
+    /// Uniform in [min, max].
+    Uniform {
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// Its logarithm is uniform between those of two positive numbers.
+    LogUniform {
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// Normal, cut off outside [min, max].
+    Normal {
+        /// Before it is cut off.
+        normal: Normal,
+        /// Least value, may be −∞.
+        min: f64,
+        /// Greatest value, may be ∞.
+        max: f64,
+    },
+    /// One of these, each as likely as the others.
+    Choice(Vec<f64>),
+    /// The run's own seed.
+    Seed,
+}
+
+impl VarySection {
+    /// Checks the section, whose errors are about `field`, for a variable of this range.
+    pub(super) fn checked(&self, field: &str, range: Range) -> Result<Distribution, ConfigurationError> {
+        let wrong = |key: &str, message: String| ConfigurationError::new(format!("{field}.{key}"), message);
+        let (name, needed, allowed) = self.distribution.keys();
+        let numbers =
+            [("min", self.min), ("max", self.max), ("mean", self.mean), ("deviation", self.deviation)];
+        let present = numbers.iter().map(|(key, value)| (*key, value.is_some()));
+        for (key, is_there) in present.chain([("values", self.values.is_some())]) {
+            if needed.contains(&key) && !is_there {
+                return Err(wrong(
+                    key,
+                    format!("missing; distribution = {name:?} needs {}", needed.join(", ")),
+                ));
+            }
+            if is_there && !needed.contains(&key) && !allowed.contains(&key) {
+                let keys: Vec<_> = needed.iter().chain(allowed).copied().collect();
+                let keys = if keys.is_empty() { "no other key".to_owned() } else { keys.join(", ") };
+                return Err(wrong(key, format!("is not a key of distribution = {name:?}, which has {keys}")));
+            }
+        }
+        for (key, value) in numbers {
+            if let Some(value) = value {
+                Range::FINITE.check(&format!("{field}.{key}"), value)?;
+            }
+        }
+        let number = |value: Option<f64>| value.unwrap_or_default();
+        let within = |key: &str, value: f64| range.check(&format!("{field}.{key}"), value);
+        let (min, max) = (number(self.min), number(self.max));
+        if self.min.is_some() && self.max.is_some() && min > max {
+            return Err(wrong("max", format!("is {max}, must be >= min = {min}")));
+        }
+        self.min.map_or(Ok(()), |min| within("min", min))?;
+        self.max.map_or(Ok(()), |max| within("max", max))?;
+        match self.distribution {
+            DistributionName::Uniform => {
+                Range::FINITE.check(&format!("{field}.max - min"), max - min)?;
+                Ok(Distribution::Uniform { min, max })
+            }
+            DistributionName::LogUniform => {
+                Range::POSITIVE.check(&format!("{field}.min"), min)?;
+                Ok(Distribution::LogUniform { min, max })
+            }
+            DistributionName::Normal => self.normal(field, range),
+            DistributionName::Choice => {
+                let values = self.values.clone().unwrap_or_default();
+                if values.is_empty() {
+                    return Err(wrong("values", "is empty, must have at least one value".to_owned()));
+                }
+                for (i, value) in values.iter().enumerate() {
+                    within(&format!("values[{i}]"), *value)?;
+                }
+                Ok(Distribution::Choice(values))
+            }
+            // Of seeds the range is [0, 2^53), and a variable that is none is a mistake.
+            DistributionName::Seed if range.contains(-1.0) || range.max.is_some() => {
+                let message = "is \"seed\", which is for variables that may be any number >= 0".to_owned();
+                Err(wrong("distribution", message))
+            }
+            DistributionName::Seed => Ok(Distribution::Seed),
+        }
+    }
+
+    fn normal(&self, field: &str, range: Range) -> Result<Distribution, ConfigurationError> {
+        let wrong = |key: &str, message: String| ConfigurationError::new(format!("{field}.{key}"), message);
+        let (mean, deviation) = (self.mean.unwrap_or_default(), self.deviation.unwrap_or_default());
+        Range::POSITIVE.check(&format!("{field}.deviation"), deviation)?;
+        for (key, given, bound) in [("min", self.min, range.min), ("max", self.max, range.max)] {
+            if let (None, Some(bound)) = (given, bound) {
+                let message = format!("missing: the variable is {}, not beyond {bound}", range.describe());
+                return Err(wrong(key, message));
+            }
+        }
+        let normal = Normal::new(mean, deviation).map_err(|e| wrong("deviation", e.to_string()))?;
+        let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
+        // Beyond that the part between is lost in round-off.
+        if normal.cdf(max) - normal.cdf(min) < LEAST_PART {
+            let message =
+                format!("is {mean}: less than {LEAST_PART} of the distribution is from {min} to {max}");
+            return Err(wrong("mean", message));
+        }
+        Ok(Distribution::Normal { normal, min, max })
+    }
+}
+
+/// The least part of a normal distribution that may be left of it.
+const LEAST_PART: f64 = 1e-9;
+
+impl Distribution {
+    /// The value at `u` in (0, 1), rising with it, in a run whose own seed is `seed`.
+    pub fn value(&self, u: f64, seed: u64) -> f64 {
+        match self {
+            Self::Uniform { min, max } => (min + u * (max - min)).clamp(*min, *max),
+            Self::LogUniform { min, max } => (min.ln() + u * (max / min).ln()).exp().clamp(*min, *max),
+            Self::Normal { normal, min, max } => {
+                let (from, to) = (normal.cdf(*min), normal.cdf(*max));
+                normal.inverse_cdf(from + u * (to - from)).clamp(*min, *max)
+            }
+            Self::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
+            Self::Seed => seed as f64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(text: &str, range: Range) -> Result<Distribution, String> {
+        let section: VarySection = punctual_fmu::configuration::read_toml(text).map_err(|e| e.to_string())?;
+        section.checked("vary.x", range).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn quantiles() {
+        let at = |text: &str, u: f64| checked(text, Range::FINITE).unwrap().value(u, 7);
+        assert_eq!(at("distribution = \"uniform\"\nmin = -1\nmax = 3", 0.25), 0.0);
+        let decade = at("distribution = \"log_uniform\"\nmin = 0.01\nmax = 100", 0.5);
+        assert!((decade - 1.0).abs() < 1e-14, "{decade}");
+        let normal = "distribution = \"normal\"\nmean = 2\ndeviation = 3";
+        // Φ⁻¹(0.975), tables of the normal distribution; statrs gives 1e-9 of it.
+        assert!((at(normal, 0.975) - (2.0 + 3.0 * 1.959_963_984_540_054)).abs() < 1e-8);
+        assert!((at(&format!("{normal}\nmin = 2"), 0.5) - (2.0 + 3.0 * 0.674_489_750_196_082)).abs() < 1e-8);
+        assert_eq!(at("distribution = \"choice\"\nvalues = [1, 5]", 0.49), 1.0);
+        assert_eq!(at("distribution = \"choice\"\nvalues = [1, 5]", 0.51), 5.0);
+        assert_eq!(checked("distribution = \"seed\"", Range::NON_NEGATIVE).unwrap().value(0.5, 7), 7.0);
+        let least = at(normal, 0.5 / (1_u64 << 52) as f64);
+        assert!(least.is_finite(), "the least number drawn: {least}");
+    }
+
+    #[test]
+    fn each_defect_names_key_value_and_range() {
+        let defects = [
+            (
+                "distribution = \"uniform\"\nmin = 1",
+                "vary.x.max: missing; distribution = \"uniform\" needs min, max",
+            ),
+            ("distribution = \"uniform\"\nmin = 1\nmax = 0", "vary.x.max: is 0, must be >= min = 1"),
+            ("distribution = \"uniform\"\nmin = nan\nmax = 0", "vary.x.min: is NaN, must be finite"),
+            (
+                "distribution = \"uniform\"\nmin = -2\nmax = 0",
+                "vary.x.min: is -2, must be finite and >= -1 and <= 9",
+            ),
+            (
+                "distribution = \"uniform\"\nmin = 0\nmax = 1\nmean = 0",
+                "vary.x.mean: is not a key of distribution = \"uniform\", which has min, max",
+            ),
+            (
+                "distribution = \"log_uniform\"\nmin = 0\nmax = 1",
+                "vary.x.min: is 0, must be finite and >= 1e-9",
+            ),
+            (
+                "distribution = \"normal\"\nmean = 0\ndeviation = 1\nmax = 9",
+                "vary.x.min: missing: the variable is finite and >= -1 and <= 9, not beyond -1",
+            ),
+            (
+                "distribution = \"normal\"\nmean = 90\ndeviation = 1\nmin = 0\nmax = 9",
+                "vary.x.mean: is 90: less than 0.000000001 of the distribution is from 0 to 9",
+            ),
+            ("distribution = \"choice\"\nvalues = []", "vary.x.values: is empty"),
+            (
+                "distribution = \"choice\"\nvalues = [0, inf]",
+                "vary.x.values[1]: is inf, must be finite and >= -1",
+            ),
+            ("distribution = \"seed\"", "vary.x.distribution: is \"seed\", which is for variables that"),
+            ("distribution = \"cauchy\"", "unknown variant `cauchy`"),
+            ("mean = 0", "missing field `distribution`"),
+        ];
+        for (text, expected) in defects {
+            let message = checked(text, Range { min: Some(-1.0), max: Some(9.0) }).unwrap_err();
+            assert!(message.contains(expected), "{text}: {message}");
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! The campaign file: TOML text to a checked [`Campaign`], which needs no other file.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use punctual_fmu::configuration::{Configuration, ConfigurationError, RESOURCE, Range, read_toml};
+use punctual_fmu::product::Product;
+use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserializer, MapAccess, Visitor};
+use uuid::Uuid;
+
+use super::distribution::{Distribution, VarySection};
+use super::in_process::InProcess;
+use super::sampling::{MAX_RUNS, Sampler, Sampling};
+use crate::coupling::{Simulation, System, links, port};
+use crate::error::Error;
+use crate::host::{Causality, Description, Fmu, Kind};
+use crate::package;
+
+/// A campaign file as it is written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    system: SystemSource,
+    campaign: CampaignSection,
+    /// By `component.variable`.
+    #[serde(default)]
+    vary: BTreeMap<String, VarySection>,
+}
+
+/// `system`: the name of a system file, relative to the folder of the campaign file, or the same as a table.
+#[derive(Clone, Debug)]
+enum SystemSource {
+    File(PathBuf),
+    Inline(Box<System>),
+}
+
+impl<'de> Deserialize<'de> for SystemSource {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Expected;
+        impl<'de> Visitor<'de> for Expected {
+            type Value = SystemSource;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a system file or a table like one")
+            }
+            fn visit_str<E>(self, name: &str) -> Result<SystemSource, E> {
+                Ok(SystemSource::File(name.into()))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<SystemSource, A::Error> {
+                System::deserialize(MapAccessDeserializer::new(map))
+                    .map(|s| SystemSource::Inline(Box::new(s)))
+            }
+        }
+        deserializer.deserialize_any(Expected)
+    }
+}
+
+/// `[campaign]`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CampaignSection {
+    /// The number of runs, 1 to 2⁵³.
+    runs: u64,
+    /// Another number, another campaign; default 0.
+    #[serde(default)]
+    seed: u64,
+    /// How the variables are spread over their distributions; default random.
+    #[serde(default)]
+    sampling: Sampling,
+    /// What makes a run a success; default kept.
+    #[serde(default)]
+    success: Success,
+    /// In place of the system's, s.
+    stop_time: Option<f64>,
+    /// In place of the system's, s.
+    step: Option<f64>,
+}
+
+/// What makes a run a success.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Success {
+    /// Every promise is kept, as `punctual run --require kept` has it.
+    #[default]
+    Kept,
+    /// Every barrier has arrived by its deadline and is not left from then on, whatever its samples say.
+    OnTimeAndInside,
+}
+
+/// The texts that a campaign is made of: all that its rows depend on beside this program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// The campaign file.
+    pub file: String,
+    /// The system file, where the campaign file names one.
+    pub system: Option<String>,
+    /// The configuration of each component in turn, with every value stated.
+    pub configurations: Vec<String>,
+}
+
+impl Source {
+    /// A name-based UUID of all texts and the version of this program: campaigns with the same one have the
+    /// same rows.
+    pub fn fingerprint(&self) -> String {
+        let parts = [Some(&self.file), self.system.as_ref()];
+        let parts = parts.into_iter().flatten().chain(&self.configurations);
+        let mut text = format!("punctual {}", env!("CARGO_PKG_VERSION"));
+        parts.for_each(|part| text += &format!("\n{} {part}", part.len()));
+        Uuid::new_v5(&Uuid::NAMESPACE_OID, text.as_bytes()).to_string()
+    }
+}
+
+/// A variable that differs from run to run.
+#[derive(Clone, Debug)]
+pub struct Varied {
+    /// `component.variable`.
+    pub name: String,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// What it means.
+    pub description: String,
+    /// Position of the component.
+    pub component: usize,
+    /// Its value reference.
+    pub reference: u32,
+    /// How it is spread.
+    distribution: Distribution,
+}
+
+/// What is chosen for one run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choice {
+    /// The run's own seed, below 2⁵³.
+    pub seed: u64,
+    /// The values of the varied variables, in order.
+    pub values: Vec<f64>,
+}
+
+/// A campaign ready to run.
+pub struct Campaign {
+    source: Source,
+    system: System,
+    configurations: Vec<Configuration>,
+    guids: Vec<String>,
+    descriptions: Vec<Description>,
+    varied: Vec<Varied>,
+    sampler: Sampler,
+    runs: u64,
+    success: Success,
+}
+
+impl Campaign {
+    /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
+    /// components' FMUs of this program (or configurations that these are built from, `.toml`).
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read; a key or value that cannot be used; an FMU of another program.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = read(path)?;
+        let file: File = read_toml(&text).map_err(|e| Error::from(e).in_file(path))?;
+        let system_path = match &file.system {
+            SystemSource::File(name) => path.with_file_name(name),
+            SystemSource::Inline(_) => path.to_owned(),
+        };
+        let (system, system_text) = match file.system {
+            SystemSource::File(_) => {
+                let text = read(&system_path)?;
+                let system = System::parse(&text).map_err(|e| e.in_file(&system_path))?;
+                (system, Some(text))
+            }
+            SystemSource::Inline(system) => (*system, None),
+        };
+        let configuration = |(i, component): (usize, &crate::coupling::Component)| {
+            let name = system_path.with_file_name(&component.fmu);
+            let prefix = if system_text.is_none() { "system." } else { "" };
+            configuration(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
+        };
+        let configurations =
+            system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
+        let configurations = configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
+        Self::of(Source { file: text, system: system_text, configurations }, path, &system_path)
+    }
+
+    /// Checks a campaign whose texts are at hand; errors name `path` or `system_path`.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Campaign::read`].
+    pub fn of(source: Source, path: &Path, system_path: &Path) -> Result<Self, Error> {
+        let in_file = |e: ConfigurationError| Error::from(e).in_file(path);
+        let file: File = read_toml(&source.file).map_err(in_file)?;
+        let system = match (file.system, &source.system) {
+            (SystemSource::Inline(system), _) => *system,
+            (SystemSource::File(_), Some(text)) => System::parse(text).map_err(|e| e.in_file(system_path))?,
+            (SystemSource::File(name), None) => {
+                let message = format!("is {}, whose text is missing", name.display());
+                return Err(in_file(ConfigurationError::new("system", message)));
+            }
+        };
+        // What is read as part of another file has not been checked yet.
+        let prefix = if source.system.is_none() { "system." } else { "" };
+        let system = system
+            .timed(None, None)
+            .map_err(|e| in_file(ConfigurationError::new(format!("{prefix}{}", e.field()), e.message())))?;
+        let section = file.campaign;
+        let system = system.timed(section.stop_time, section.step).map_err(|e| {
+            in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))
+        })?;
+        let (mut configurations, mut guids, mut descriptions) = (Vec::new(), Vec::new(), Vec::new());
+        for text in &source.configurations {
+            let product = Configuration::parse(text).and_then(Product::new)?;
+            let xml = product.model_description().to_xml();
+            let xml = xml.map_err(|e| Error::configuration("", e.to_string()))?;
+            let name = Path::new(product.configuration.name());
+            descriptions.push(Description::parse(&xml).map_err(|problem| Error::fmu(name, problem))?);
+            guids.push(product.guid);
+            configurations.push(product.configuration);
+        }
+        let refer: Vec<_> = descriptions.iter().collect();
+        let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
+        let mut varied = Vec::new();
+        for (name, section) in &file.vary {
+            let field = format!("vary.{name:?}");
+            let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
+            let variable = &descriptions[port.component].variables[port.variable];
+            let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
+            if !settable || variable.kind != Kind::Real {
+                let (causality, kind) = (variable.causality.as_str(), variable.kind.name());
+                let message =
+                    format!("is a {kind} {causality}; only Real parameters and inputs can be varied");
+                return Err(in_file(ConfigurationError::new(field, message)));
+            }
+            if connected.iter().any(|link| link.to == port) {
+                let message = "is a connected input, whose values come from there";
+                return Err(in_file(ConfigurationError::new(field, message)));
+            }
+            let range = Range { min: variable.min, max: variable.max };
+            varied.push(Varied {
+                name: name.clone(),
+                unit: variable.unit.clone(),
+                description: variable.description.clone().unwrap_or_default(),
+                component: port.component,
+                reference: variable.value_reference,
+                distribution: section.checked(&field, range).map_err(in_file)?,
+            });
+        }
+        let CampaignSection { runs, seed, sampling, success, .. } = section;
+        let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
+        Ok(Self { source, system, configurations, guids, descriptions, varied, sampler, runs, success })
+    }
+
+    /// Its texts.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The coupled system, with the times of the campaign.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// What each component is.
+    pub fn configurations(&self) -> &[Configuration] {
+        &self.configurations
+    }
+
+    /// What each component offers.
+    pub fn descriptions(&self) -> &[Description] {
+        &self.descriptions
+    }
+
+    /// What differs from run to run, by name.
+    pub fn varied(&self) -> &[Varied] {
+        &self.varied
+    }
+
+    /// The number of runs.
+    pub fn runs(&self) -> u64 {
+        self.runs
+    }
+
+    /// What makes a run a success.
+    pub fn success(&self) -> Success {
+        self.success
+    }
+
+    /// What is chosen for run `number`: a function of the campaign's texts and the number alone.
+    pub fn choice(&self, number: u64) -> Choice {
+        let mut values = Vec::new();
+        let seed = self.sampler.draw(number, &mut values);
+        for (value, varied) in values.iter_mut().zip(&self.varied) {
+            *value = varied.distribution.value(*value, seed);
+        }
+        Choice { seed, values }
+    }
+
+    /// `system`, which is the campaign's but for what it records, with its components in process.
+    ///
+    /// # Errors
+    ///
+    /// A signal recorded or drawn that there is not.
+    pub fn simulation(&self, system: &System) -> Result<Simulation<InProcess>, Error> {
+        let descriptions: Vec<_> = self.descriptions.iter().collect();
+        let instance = |c: usize| {
+            InProcess::new(&system.components()[c].name, self.configurations[c].clone(), &self.guids[c])
+        };
+        Simulation::assembled(system, &descriptions, instance)
+    }
+
+    /// Gives `simulation` the start values of a run.
+    pub fn start(&self, simulation: &mut Simulation<InProcess>, choice: &Choice) {
+        for (varied, value) in self.varied.iter().zip(&choice.values) {
+            simulation.set_start(varied.component, varied.reference, *value);
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))
+}
+
+/// The configuration of the component at `path`: of an FMU what it carries with it.
+fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
+    if path.extension().is_some_and(|ending| ending == "toml") {
+        return package::read_configuration(path);
+    }
+    if !path.exists() {
+        let message = format!(
+            "there is no file {}; `punctual build` makes an FMU from a configuration",
+            path.display()
+        );
+        return Err(Error::configuration(field, message));
+    }
+    let fmu = Fmu::open(path)?;
+    let Some(text) = fmu.resource(RESOURCE) else {
+        let message = format!(
+            "{} is not an FMU of Punctual (it has no resources/{RESOURCE}), and only these run in process",
+            path.display()
+        );
+        return Err(Error::configuration(field, message));
+    };
+    let configuration = Configuration::parse(&text).map_err(|e| Error::from(e).in_file(path))?;
+    let product = Product::new(configuration)?;
+    if product.guid != fmu.description().guid {
+        let message = format!(
+            "{} is the work of another version of Punctual (its GUID is {}, must be {}); build it anew",
+            path.display(),
+            fmu.description().guid,
+            product.guid
+        );
+        return Err(Error::configuration(field, message));
+    }
+    Ok(product.configuration)
+}
+
+// Counts travel as 64-bit integers, seeds as doubles.
+const _: () = assert!(MAX_RUNS <= 1 << 53);

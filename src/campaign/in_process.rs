@@ -1,0 +1,76 @@
+//! One of our own blocks as a participant, without an archive, a library or C: the state machine is the one
+//! that the shared library runs, so the numbers are the same bit for bit.
+
+use punctual_fmu::configuration::Configuration;
+use punctual_fmu::instance::Instance;
+
+use crate::coupling::Participant;
+use crate::error::Error;
+
+/// An instance in this process.
+pub struct InProcess {
+    name: String,
+    instance: Instance,
+}
+
+impl InProcess {
+    /// An instance of `configuration`, whose GUID is `guid`.
+    ///
+    /// # Errors
+    ///
+    /// A GUID that is not the configuration's.
+    pub fn new(name: &str, configuration: Configuration, guid: &str) -> Result<Self, Error> {
+        let instance = Instance::new(configuration, guid).map_err(|e| Error::broken(name, e))?;
+        Ok(Self { name: name.to_owned(), instance })
+    }
+
+    /// What was refused, by whom and when.
+    #[cold]
+    fn refused(&self, call: &str, reason: &str) -> Error {
+        let time = crate::error::brief_time(self.instance.time());
+        Error::broken(format!("{call} of {} at t = {time} s", self.name), format!("was refused: {reason}"))
+    }
+}
+
+/// The calls that the instance answers under the same name.
+macro_rules! calls {
+    ($($method:ident($($argument:ident: $kind:ty),*) as $call:literal;)*) => {$(
+        fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
+            let done = self.instance.$method($($argument),*);
+            done.map_err(|reason| self.refused($call, &reason))
+        }
+    )*};
+}
+
+impl Participant for InProcess {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn reset(&mut self) -> Result<(), Error> {
+        self.instance.reset();
+        Ok(())
+    }
+
+    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error> {
+        let done = self.instance.setup_experiment(start_time, Some(stop_time));
+        done.map_err(|reason| self.refused("fmi2SetupExperiment", &reason))
+    }
+
+    calls! {
+        enter_initialization_mode() as "fmi2EnterInitializationMode";
+        exit_initialization_mode() as "fmi2ExitInitializationMode";
+        do_step(time: f64, step: f64) as "fmi2DoStep";
+        terminate() as "fmi2Terminate";
+        get_real(references: &[u32], values: &mut [f64]) as "fmi2GetReal";
+        get_integer(references: &[u32], values: &mut [i32]) as "fmi2GetInteger";
+        get_boolean(references: &[u32], values: &mut [i32]) as "fmi2GetBoolean";
+        set_real(references: &[u32], values: &[f64]) as "fmi2SetReal";
+        set_integer(references: &[u32], values: &[i32]) as "fmi2SetInteger";
+        set_boolean(references: &[u32], values: &[i32]) as "fmi2SetBoolean";
+    }
+
+    fn remark(&self) -> Option<String> {
+        None
+    }
+}

@@ -1,0 +1,24 @@
+//! Many runs of one system from drawn starts, parameters and disturbances, in process and on all cores.
+//!
+//! A run is a function of the campaign's texts and its number: which run follows which, on which thread, and
+//! where a campaign was interrupted do not show in its row. The blocks are those of the FMUs, coupled by the
+//! same master, so a row is what `punctual run` would find, bit for bit.
+
+mod distribution;
+mod file;
+mod in_process;
+mod measures;
+mod runner;
+mod sampling;
+mod sobol;
+mod summary;
+mod table;
+
+pub use distribution::{Distribution, VarySection};
+pub use file::{Campaign, Choice, Source, Success, Varied};
+pub use in_process::InProcess;
+pub use measures::Measures;
+pub use runner::{Options, Progress, recorded, run, version};
+pub use sampling::{Sampler, Sampling};
+pub use summary::{Case, Lack, Rate, Spread, Summary, summary};
+pub use table::{Cell, Column, GROUP, Kind, Reader, Row};

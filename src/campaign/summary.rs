@@ -1,0 +1,264 @@
+//! What the runs of a campaign come to: how many succeed, and which are the worst.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use serde::Serialize;
+
+use super::measures::Measures;
+use super::table::{Cell, Column, Kind, Reader};
+use crate::error::Error;
+
+/// The 0.975 quantile of the normal distribution: intervals hold with a confidence of 95 %.
+const Z: f64 = 1.959_963_984_540_054;
+
+/// A part of all runs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rate {
+    /// How many.
+    pub count: u64,
+    /// Their part of all.
+    pub rate: f64,
+    /// In which the part lies that infinitely many runs would have, with a confidence of 95 %: E. B. Wilson,
+    /// J. Amer. Statist. Assoc. 22 (1927), doi 10.1080/01621459.1927.10502953. It is for independent runs;
+    /// of spread ones it is wider than need be.
+    pub interval: [f64; 2],
+}
+
+impl Rate {
+    /// `count` of `all` ≥ 1.
+    pub fn of(count: u64, all: u64) -> Self {
+        let (n, p) = (all as f64, count as f64 / all as f64);
+        let middle = p + Z * Z / (2.0 * n);
+        let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+        let scale = 1.0 + Z * Z / n;
+        // The ends are exact there, round-off apart.
+        let low = if count == 0 { 0.0 } else { ((middle - half) / scale).max(0.0) };
+        let high = if count == all { 1.0 } else { ((middle + half) / scale).min(1.0) };
+        Self { count, rate: p, interval: [low, high] }
+    }
+}
+
+/// The numbers of a column.
+#[derive(Clone, Debug, Serialize)]
+pub struct Spread {
+    /// The column.
+    pub column: String,
+    /// Its unit.
+    pub unit: String,
+    /// How many runs have one.
+    pub count: u64,
+    /// The least.
+    pub min: f64,
+    /// Their mean.
+    pub mean: f64,
+    /// The greatest.
+    pub max: f64,
+}
+
+/// How many runs lack something that every run should have.
+#[derive(Clone, Debug, Serialize)]
+pub struct Lack {
+    /// The column that is false.
+    pub column: String,
+    /// In how many runs.
+    #[serde(flatten)]
+    pub rate: Rate,
+}
+
+/// A run to look at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Case {
+    /// Its number.
+    pub run: u64,
+    /// Whether it succeeded all the same.
+    pub success: bool,
+    /// Least h of all barriers from their deadlines on; `None` where one was never reached.
+    pub least_h: Option<f64>,
+    /// The call that ended it.
+    pub failure: Option<String>,
+}
+
+impl Case {
+    /// Greater is worse: first what failed, then what did not succeed, then the least h.
+    fn compare(&self, other: &Self) -> Ordering {
+        let key = |case: &Self| (case.failure.is_some(), !case.success);
+        let least = |case: &Self| case.least_h.unwrap_or(f64::NEG_INFINITY);
+        let worse = key(self).cmp(&key(other)).then(least(other).total_cmp(&least(self)));
+        worse.then(other.run.cmp(&self.run))
+    }
+}
+
+/// The same, with the least bad at the top of the heap.
+struct Kept(Case);
+
+impl Ord for Kept {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.0.compare(&self.0)
+    }
+}
+
+impl PartialOrd for Kept {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Eq for Kept {}
+
+impl PartialEq for Kept {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+/// What a campaign came to.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// How many runs there are.
+    pub runs: u64,
+    /// Those that succeeded.
+    pub success: Rate,
+    /// Those that did not.
+    pub failure: Rate,
+    /// What was not so in how many runs.
+    pub lacks: Vec<Lack>,
+    /// The numbers of the runs.
+    pub spreads: Vec<Spread>,
+    /// The worst runs, the worst first.
+    pub worst: Vec<Case>,
+}
+
+/// Goes through the rows in `reader` once; keeps the `worst` so many.
+///
+/// # Errors
+///
+/// A file that cannot be read or has no rows.
+pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Summary, Error> {
+    let columns = measures.columns();
+    let find = |name: &str| columns.iter().position(|column| column.name == name);
+    let least: Vec<usize> =
+        measures.barriers().filter_map(|barrier| find(&format!("{barrier}.least_h"))).collect();
+    let of_kind = |kind: Kind| (0..columns.len()).filter(move |&c| columns[c].kind == kind);
+    let flags: Vec<usize> = of_kind(Kind::Flag).filter(|&c| columns[c].name != "success").collect();
+    let numbers: Vec<usize> = of_kind(Kind::Number).collect();
+    let [Some(success), Some(failure)] = ["success", "failure"].map(find) else {
+        return Err(Error::configuration("", "a campaign without its columns"));
+    };
+    let (mut runs, mut succeeded) = (0_u64, 0_u64);
+    let mut lacking = vec![0_u64; flags.len()];
+    let mut spreads: Vec<Spread> = numbers.iter().map(|&c| Spread::nothing(&columns[c])).collect();
+    let mut heap: BinaryHeap<Kept> = BinaryHeap::new();
+    for group in 0..reader.groups() {
+        for row in reader.group(group, columns)? {
+            let good = matches!(row[success], Cell::Flag(true));
+            succeeded += u64::from(good);
+            for (count, &c) in lacking.iter_mut().zip(&flags) {
+                *count += u64::from(matches!(row[c], Cell::Flag(false)));
+            }
+            for (spread, &c) in spreads.iter_mut().zip(&numbers) {
+                if let Cell::Number(Some(value)) = row[c] {
+                    spread.take(value);
+                }
+            }
+            let h = |c: &usize| match row[*c] {
+                Cell::Number(h) => h,
+                _ => None,
+            };
+            let least_h = least.iter().map(h).collect::<Option<Vec<f64>>>();
+            let failed = match &row[failure] {
+                Cell::Text(text) => text.clone(),
+                _ => None,
+            };
+            heap.push(Kept(Case {
+                run: runs,
+                success: good,
+                least_h: least_h.and_then(|all| all.into_iter().reduce(f64::min)),
+                failure: failed,
+            }));
+            if heap.len() > worst {
+                heap.pop();
+            }
+            runs += 1;
+        }
+    }
+    if runs == 0 {
+        return Err(Error::configuration("", "a campaign without runs"));
+    }
+    let lacks = flags.iter().zip(lacking);
+    Ok(Summary {
+        runs,
+        success: Rate::of(succeeded, runs),
+        failure: Rate::of(runs - succeeded, runs),
+        lacks: lacks
+            .map(|(&c, count)| Lack { column: columns[c].name.clone(), rate: Rate::of(count, runs) })
+            .collect(),
+        spreads: spreads.into_iter().map(Spread::finished).collect(),
+        worst: heap.into_sorted_vec().into_iter().map(|kept| kept.0).collect(),
+    })
+}
+
+impl Spread {
+    fn nothing(column: &Column) -> Self {
+        let (column, unit) = (column.name.clone(), column.unit.clone());
+        Self { column, unit, count: 0, min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }
+    }
+
+    /// Until it is finished, the mean is the sum.
+    fn take(&mut self, value: f64) {
+        self.count += 1;
+        self.min = self.min.min(value);
+        self.mean += value;
+        self.max = self.max.max(value);
+    }
+
+    fn finished(mut self) -> Self {
+        self.mean /= self.count as f64;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// R. G. Newcombe, Statist. Med. 17 (1998), table I, score method without correction: 81 of 263, 15 of
+    /// 148, 0 of 20, 1 of 29, to the four digits printed there.
+    #[test]
+    fn intervals_are_those_of_the_tables() {
+        let cases = [
+            (81, 263, [0.2553, 0.3662]),
+            (15, 148, [0.0624, 0.1605]),
+            (0, 20, [0.0, 0.1611]),
+            (1, 29, [0.0061, 0.1718]),
+        ];
+        for (count, all, interval) in cases {
+            let found = Rate::of(count, all).interval;
+            for (found, expected) in found.iter().zip(interval) {
+                assert!((found - expected).abs() <= 5e-5, "{count} of {all}: {found}, wanted {expected}");
+            }
+        }
+        assert_eq!(Rate::of(7, 7).interval[1], 1.0);
+    }
+
+    #[test]
+    fn the_worst_come_first() {
+        let case = |run, success, least_h, failure: bool| Case {
+            run,
+            success,
+            least_h,
+            failure: failure.then(String::new),
+        };
+        let order = [
+            case(7, false, Some(1.0), true),
+            case(3, false, None, false),
+            case(1, false, Some(-1.0), false),
+            case(2, false, Some(0.5), false),
+            case(4, true, Some(0.1), false),
+            case(5, true, Some(0.1), false),
+        ];
+        let mut heap: Vec<Kept> = order.iter().rev().cloned().map(Kept).collect();
+        heap.sort();
+        assert_eq!(heap.into_iter().map(|kept| kept.0).collect::<Vec<_>>(), order);
+    }
+}

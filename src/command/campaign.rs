@@ -1,0 +1,226 @@
+//! `punctual campaign`: many runs of a system from what a campaign file draws.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+
+use crate::campaign::{self, Campaign, Measures, Options, Rate, Summary};
+use crate::error::Error;
+use crate::output::{self, Counter, number};
+
+/// Exit code after Ctrl-C, as shells have it.
+const INTERRUPTED: u8 = 130;
+
+/// Lines of a list that are printed together.
+const AT_ONCE: usize = 1000;
+
+/// Arguments of `punctual campaign`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The campaign file (TOML): a system, how many runs, what varies and how
+    campaign: PathBuf,
+    /// The Parquet file to write; a campaign that was interrupted goes on from FILE.parts [default: the
+    /// campaign file with the ending .parquet]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// How many runs are made at once [default: one for each core]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// How many of the worst runs are told
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    worst: usize,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+    /// Exit with code 1 unless every run succeeded
+    #[arg(long, value_enum, value_name = "WHAT")]
+    require: Option<Requirement>,
+    /// Run nothing: list what is drawn for the runs FIRST to LAST - 1, as CSV or JSON
+    #[arg(long, value_name = "FIRST..LAST", value_parser = range)]
+    list: Option<Range>,
+}
+
+/// What a campaign must come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Requirement {
+    Success,
+}
+
+/// Runs by number, the last one not among them.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    first: u64,
+    last: u64,
+}
+
+fn range(text: &str) -> Result<Range, String> {
+    let wrong = || format!("{text:?} is not of the form FIRST..LAST, such as 0..100");
+    let (first, last) = text.split_once("..").ok_or_else(wrong)?;
+    let number = |text: &str| text.parse::<u64>().map_err(|_| wrong());
+    let range = Range { first: number(first)?, last: number(last)? };
+    if range.first < range.last { Ok(range) } else { Err(format!("{text:?} has no run, must rise")) }
+}
+
+/// A run as `--list` shows it.
+#[derive(Serialize)]
+struct Drawn<'a> {
+    run: u64,
+    seed: u64,
+    values: std::collections::BTreeMap<&'a str, f64>,
+}
+
+/// What a campaign tells, as JSON.
+#[derive(Serialize)]
+struct Report {
+    campaign: String,
+    file: String,
+    complete: bool,
+    done: u64,
+    runs: u64,
+    wall_time: f64,
+    runs_per_second: f64,
+    #[serde(flatten)]
+    summary: Option<Summary>,
+}
+
+/// Makes the runs that are missing, and sums up.
+///
+/// # Errors
+///
+/// A campaign that cannot be used, files of another one in the way, a file that cannot be read or written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let campaign = Campaign::read(&arguments.campaign)?;
+    if let Some(range) = arguments.list {
+        return list(arguments, &campaign, range);
+    }
+    let output = arguments.output.clone();
+    let output = output.unwrap_or_else(|| arguments.campaign.with_extension("parquet"));
+    let stop = Arc::new(AtomicBool::new(false));
+    let handle = Arc::clone(&stop);
+    // The second time the program ends at once: what is kept is safe.
+    let handler = move || {
+        if handle.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+    };
+    ctrlc::set_handler(handler).map_err(|e| Error::broken("Ctrl-C", format!("cannot be caught: {e}")))?;
+    let options = Options { output: output.clone(), threads: arguments.threads };
+    let counter = Counter::new("runs", 0, campaign.runs());
+    let progress = campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?;
+    drop(counter);
+
+    let complete = progress.done == campaign.runs();
+    let summary = if complete {
+        let (reader, _) = campaign::recorded(&output)?;
+        Some(campaign::summary(&reader, &Measures::new(&campaign), arguments.worst)?)
+    } else {
+        None
+    };
+    let seconds = progress.wall_time.as_secs_f64();
+    let report = Report {
+        campaign: arguments.campaign.display().to_string(),
+        file: output.display().to_string(),
+        complete,
+        done: progress.done,
+        runs: campaign.runs(),
+        wall_time: seconds,
+        runs_per_second: (progress.done - progress.before) as f64 / seconds.max(1e-9),
+        summary,
+    };
+    if progress.before > 0 {
+        output::note(&format!("note: {} of {} runs were there already", progress.before, campaign.runs()));
+    }
+    if arguments.json {
+        output::json(&report);
+    } else if let Some(summary) = &report.summary {
+        output::result(&text(&report, summary));
+    }
+    if !complete {
+        output::note(&format!(
+            "interrupted with {} of {} runs kept; the same command goes on from there",
+            progress.done,
+            campaign.runs()
+        ));
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    let failed = report.summary.is_some_and(|summary| summary.failure.count > 0);
+    Ok(if failed && arguments.require == Some(Requirement::Success) {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<ExitCode, Error> {
+    if range.last > campaign.runs() {
+        let message =
+            format!("ends at {}, must be at most {}, the number of runs", range.last, campaign.runs());
+        return Err(Error::configuration("--list", message));
+    }
+    let names = || campaign.varied().iter().map(|varied| varied.name.as_str());
+    let runs = range.first..range.last;
+    if arguments.json {
+        let drawn = |run: u64| {
+            let choice = campaign.choice(run);
+            Drawn { run, seed: choice.seed, values: names().zip(choice.values).collect() }
+        };
+        output::json(&runs.map(drawn).collect::<Vec<_>>());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut head = "run,seed".to_owned();
+    names().for_each(|name| head += &format!(",{}", crate::recording::quoted(name)));
+    output::result(&head);
+    let line = |run: u64| {
+        let choice = campaign.choice(run);
+        let values = choice.values.iter().map(|value| format!(",{value:?}"));
+        format!("{run},{}{}", choice.seed, values.collect::<String>())
+    };
+    for first in runs.clone().step_by(AT_ONCE) {
+        let last = runs.end.min(first + AT_ONCE as u64);
+        output::result(&(first..last).map(line).collect::<Vec<_>>().join("\n"));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(report: &Report, summary: &Summary) -> String {
+    let part = |rate: &Rate| {
+        let [low, high] = rate.interval.map(|end| format!("{:.4}", 100.0 * end));
+        vec![rate.count.to_string(), format!("{:.4} %", 100.0 * rate.rate), format!("{low} to {high} %")]
+    };
+    let mut rows = vec![["of all runs", "count", "part", "95 % interval"].map(str::to_owned).to_vec()];
+    let mut add = |name: String, rate: &Rate| rows.push([vec![name], part(rate)].concat());
+    add("success".into(), &summary.success);
+    add("failure".into(), &summary.failure);
+    summary.lacks.iter().for_each(|lack| add(format!("not {}", lack.column), &lack.rate));
+    let parts = output::table(&rows, &[false, true, true, true]);
+
+    let mut rows = vec![["number", "unit", "runs", "min", "mean", "max"].map(str::to_owned).to_vec()];
+    rows.extend(summary.spreads.iter().filter(|spread| spread.count > 0).map(|s| {
+        let numbers = [number(s.min), number(s.mean), number(s.max)];
+        [vec![s.column.clone(), s.unit.clone(), s.count.to_string()], numbers.to_vec()].concat()
+    }));
+    let spreads = output::table(&rows, &[false, false, true, true, true, true]);
+
+    let mut rows = vec![["run", "least h after its deadline", ""].map(str::to_owned).to_vec()];
+    rows.extend(summary.worst.iter().map(|case| {
+        let verdict = if case.success { "success" } else { "failure" };
+        let verdict = case.failure.as_deref().map_or(verdict.to_owned(), |why| format!("{verdict}: {why}"));
+        vec![case.run.to_string(), case.least_h.map_or("-".to_owned(), number), verdict]
+    }));
+    let worst = output::table(&rows, &[true, true, false]);
+    let made = match report.wall_time {
+        0.0 => String::new(),
+        time => format!(" in {time:.3} s ({} runs/s)", number(report.runs_per_second)),
+    };
+    let again = summary.worst.first().map_or_else(String::new, |case| {
+        format!("\n\nagain, with pictures: punctual replay {} --run {} --out out", report.file, case.run)
+    });
+    format!(
+        "{} runs{made}\n\n{parts}\n\n{spreads}\n\nthe worst\n{worst}\n\nwritten: {}{again}",
+        summary.runs, report.file
+    )
+}

@@ -1,0 +1,184 @@
+//! `punctual replay`: one run of a campaign again, from its Parquet file alone.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use serde::Serialize;
+
+use super::run::{promises_text, stem, write_files};
+use crate::campaign::{self, Campaign, Choice, GROUP, Measures};
+use crate::coupling::{Picture, Promise, System, TimePicture, Variant};
+use crate::error::Error;
+use crate::output;
+use crate::recording::Recording;
+
+/// Arguments of `punctual replay`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The Parquet file that `punctual campaign` wrote
+    file: PathBuf,
+    /// The number of the run, from 0
+    #[arg(long, value_name = "N")]
+    run: u64,
+    /// Write the CSV file and the pictures into this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `replay` tells, as JSON.
+#[derive(Serialize)]
+struct Report {
+    run: u64,
+    seed: u64,
+    values: Vec<ValueReport>,
+    same: bool,
+    differences: Vec<Difference>,
+    promises: Vec<Promise>,
+    failure: Option<String>,
+    files: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct ValueReport {
+    name: String,
+    unit: String,
+    value: f64,
+}
+
+/// A cell of the row that is not as recorded.
+#[derive(Serialize)]
+struct Difference {
+    column: String,
+    recorded: String,
+    found: String,
+}
+
+/// Makes the run again and compares its row.
+///
+/// # Errors
+///
+/// A file that is no campaign's, a run that it does not have, a file that cannot be written.
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let (path, run) = (&arguments.file, arguments.run);
+    let (reader, source) = campaign::recorded(path)?;
+    let campaign = Campaign::of(source, path, path)?;
+    if run >= reader.rows() {
+        let message = format!("is {run}, must be from 0 to {}", reader.rows().saturating_sub(1));
+        return Err(Error::configuration("--run", message));
+    }
+    let measures = Measures::new(&campaign);
+    // Rows are in order, in groups of equal size.
+    let group = usize::try_from(run / GROUP as u64).unwrap_or(usize::MAX);
+    let recorded = reader.group(group, measures.columns())?.into_iter().nth((run % GROUP as u64) as usize);
+    let recorded = recorded.ok_or_else(|| Error::configuration("--run", "is not in the file"))?;
+
+    let mut simulation = campaign.simulation(&campaign.system().clone().recording(measures.signals()))?;
+    let found = measures.run(&campaign, &mut simulation, run);
+    let cells = recorded.iter().zip(&found).zip(measures.columns());
+    let differences: Vec<_> = cells
+        .filter(|((recorded, found), _)| !recorded.is(found))
+        .map(|((recorded, found), column)| Difference {
+            column: column.name.clone(),
+            recorded: recorded.to_string(),
+            found: found.to_string(),
+        })
+        .collect();
+
+    // Once more, with what the system records.
+    let choice = campaign.choice(run);
+    let mut simulation = campaign.simulation(campaign.system())?;
+    campaign.start(&mut simulation, &choice);
+    let (promises, failure, files) = match simulation.run(|_, _| {}) {
+        Ok(outcome) => {
+            let files = match &arguments.out {
+                Some(folder) => {
+                    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
+                    let pictures = pictures(campaign.system(), &measures, &outcome.recording);
+                    write_files(&pictures, &format!("{}-{run}", stem(path)), folder, &outcome.recording)?
+                }
+                None => Vec::new(),
+            };
+            (outcome.promises, outcome.failure, files)
+        }
+        Err(error) => (Vec::new(), Some(error), Vec::new()),
+    };
+    let report = Report {
+        run,
+        seed: choice.seed,
+        values: values(&campaign, &choice),
+        same: differences.is_empty(),
+        differences,
+        promises,
+        failure: failure.map(|e| e.to_string()),
+        files,
+    };
+    if arguments.json {
+        output::json(&report);
+    } else {
+        output::result(&text(&report));
+    }
+    if report.same {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (theirs, ours) = (campaign::version(&reader), env!("CARGO_PKG_VERSION"));
+    output::note(&format!("note: the row was recorded by version {theirs}, this is version {ours}"));
+    Ok(ExitCode::FAILURE)
+}
+
+fn values(campaign: &Campaign, choice: &Choice) -> Vec<ValueReport> {
+    let value = |(varied, value): (&campaign::Varied, &f64)| ValueReport {
+        name: varied.name.clone(),
+        unit: varied.unit.clone().unwrap_or_default(),
+        value: *value,
+    };
+    campaign.varied().iter().zip(&choice.values).map(value).collect()
+}
+
+/// The system's pictures; where it has none, h with its bound for each barrier whose signals are recorded.
+fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<Picture> {
+    if !system.pictures().is_empty() {
+        return system.pictures().to_vec();
+    }
+    let picture = |barrier: &str| {
+        Picture::Time(TimePicture {
+            name: Some(barrier.to_owned()),
+            title: None,
+            signals: vec![format!("{barrier}.h")],
+            dashed: vec![format!("{barrier}.profile")],
+            ylabel: None,
+            deadline: None,
+            bounds: vec![0.0],
+            scale: Variant::Linear,
+        })
+    };
+    let is_there = |signal: String| recording.index_of(&signal).is_some();
+    let drawn = |barrier: &&str| ["h", "profile"].iter().all(|field| is_there(format!("{barrier}.{field}")));
+    measures.barriers().filter(drawn).map(picture).collect()
+}
+
+fn text(report: &Report) -> String {
+    let mut rows = vec![["drawn", "value", "unit"].map(str::to_owned).to_vec()];
+    rows.push(vec!["seed".to_owned(), report.seed.to_string(), String::new()]);
+    rows.extend(report.values.iter().map(|v| vec![v.name.clone(), format!("{:?}", v.value), v.unit.clone()]));
+    let mut text = format!("run {}\n\n{}\n\n", report.run, output::table(&rows, &[false, true, false]));
+    text += &promises_text(&report.promises);
+    if let Some(failure) = &report.failure {
+        text += &format!("{failure}\n\n");
+    }
+    if report.same {
+        text += "the row is as recorded, bit for bit";
+    } else {
+        let mut rows = vec![["not as recorded", "recorded", "found"].map(str::to_owned).to_vec()];
+        rows.extend(
+            report.differences.iter().map(|d| vec![d.column.clone(), d.recorded.clone(), d.found.clone()]),
+        );
+        text += &output::table(&rows, &[false, true, true]);
+    }
+    if !report.files.is_empty() {
+        text += &format!("\n\nwritten: {}", report.files.join("\n         "));
+    }
+    text
+}

@@ -1,0 +1,133 @@
+//! What the master asks of a component: the calls of FMI 2.0 co-simulation, whoever answers them.
+
+use crate::error::Error;
+use crate::host::Slave;
+
+/// An instance that the master steps: an FMU's, or one of this program's own blocks in process.
+pub trait Participant {
+    /// The instance name: its component's.
+    fn name(&self) -> &str;
+
+    /// Back to the state after instantiation.
+    ///
+    /// # Errors
+    ///
+    /// The call is refused; so for every call below.
+    fn reset(&mut self) -> Result<(), Error>;
+
+    /// Says from when to when the run goes, in s.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error>;
+
+    /// Begins the initialisation.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn enter_initialization_mode(&mut self) -> Result<(), Error>;
+
+    /// Ends the initialisation.
+    ///
+    /// # Errors
+    ///
+    /// As above; also for parameters that contradict each other.
+    fn exit_initialization_mode(&mut self) -> Result<(), Error>;
+
+    /// The step from `time` by `step` (s).
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error>;
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn terminate(&mut self) -> Result<(), Error>;
+
+    /// Reads Real variables by their value references.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Error>;
+
+    /// Reads Integer and Enumeration variables.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), Error>;
+
+    /// Reads Boolean variables; 0 is false.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Result<(), Error>;
+
+    /// Writes Real variables.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), Error>;
+
+    /// Writes Integer and Enumeration variables.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Result<(), Error>;
+
+    /// Writes Boolean variables; 0 is false.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), Error>;
+
+    /// What it had to say in the course of a run that succeeded, if anything.
+    fn remark(&self) -> Option<String>;
+}
+
+/// The calls that a slave answers under the same name.
+macro_rules! calls {
+    ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
+        fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
+            Self::$method(self, $($argument),*)
+        }
+    )*};
+}
+
+impl Participant for Slave {
+    fn name(&self) -> &str {
+        Self::name(self)
+    }
+
+    calls! {
+        reset();
+        setup_experiment(start_time: f64, stop_time: f64);
+        enter_initialization_mode();
+        exit_initialization_mode();
+        do_step(time: f64, step: f64);
+        terminate();
+        get_real(references: &[u32], values: &mut [f64]);
+        get_integer(references: &[u32], values: &mut [i32]);
+        get_boolean(references: &[u32], values: &mut [i32]);
+        set_real(references: &[u32], values: &[f64]);
+        set_integer(references: &[u32], values: &[i32]);
+        set_boolean(references: &[u32], values: &[i32]);
+    }
+
+    fn remark(&self) -> Option<String> {
+        let count = self.warnings();
+        let last = || self.log().last().map(|m| format!("; last: {m}")).unwrap_or_default();
+        (count > 0).then(|| format!("{count} calls returned fmi2Warning{}", last()))
+    }
+}
