@@ -370,6 +370,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     const PUSH: f64 = 5.0;
     /// Period in s from which the order of the margin that compensation adds is fitted.
     const CLEAR: f64 = 5e-3;
+    const MARGIN: &str = "margin added (m), order from 5 ms";
     let all = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2];
     let periods: Vec<f64> = all.into_iter().filter(|p| *p >= options.finest).collect();
     let mut table = Table::new(
@@ -390,7 +391,10 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
                 Some(v) => format!("{v:.2e}").into(),
             }
         };
-        let fitted = order(&periods, values).filter(|_| values.iter().all(|v| *v > 0.0));
+        // Below that the margin is a part of h for round-off more than anything.
+        let from = if what == MARGIN { CLEAR } else { 0.0 };
+        let (x, y): (Vec<f64>, Vec<f64>) = periods.iter().zip(values).filter(|(p, _)| **p >= from).unzip();
+        let fitted = order(&x, &y).filter(|_| values.iter().all(|v| *v > 0.0));
         table.rows.push(vec![
             what.into(),
             vehicle.title().into(),
@@ -453,10 +457,9 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
                 short.push(curve(named("shortfall", &y), y, [1, 4, 0][i], style));
             }
             if vehicle == Vehicle::PointMass && method == Contender::Profile && start == starts[0].0 {
-                // Below, a part of h for round-off is most of it.
                 let clear: Vec<f64> =
                     added.iter().zip(&periods).map(|(m, p)| if *p < CLEAR { 0.0 } else { *m }).collect();
-                add("margin added (m)", vehicle, name, &added);
+                add(MARGIN, vehicle, name, &added);
                 let label = named("margin added", &clear);
                 short.push(curve(format!("{label} from {CLEAR} s on"), added, 2, style));
             }
