@@ -20,8 +20,8 @@
  *
  * RULES. What the functions write may depend on their arguments only: no memory of earlier calls, no clock, no random
  * numbers, since steps are repeated and taken back. At the same values they must ask for the same operations in the same
- * order. They may be called by several threads at the same time, must not allocate memory or wait where steps are to
- * be made in real time, and must not throw or longjmp out.
+ * order. They may be called by several threads at the same time, each with a calculator of its own, which is for the thread that
+ * called; they must not allocate memory or wait where steps are to be made in real time, and must not throw or longjmp out.
  *
  * BRANCHES AND TABLES. punctual_value gives the plain value of a number, to branch on; what is computed from plain
  * values has no derivatives. For a function that is not below, such as one that is interpolated in a table, look its
@@ -34,7 +34,7 @@
  *
  * TRIAL. When a model is loaded, its functions are run at sample states within the ranges of the states, and refused
  * if they use numbers that they were not given, ask for other operations when they are called again, for more than
- * 4096 in one call, or give derivatives that differences of the values contradict.
+ * 4096 in all (f, g and a barrier), or give first derivatives that differences of the values contradict.
  */
 #ifndef PUNCTUAL_MODEL_H
 #define PUNCTUAL_MODEL_H
@@ -92,8 +92,8 @@ typedef struct punctual_model_description {
     const punctual_variable *input;
     const punctual_variable *parameter; /* NULL where there are none */
     const punctual_variable *barrier;   /* NULL where there are none */
-    /* Called before the other functions whenever the library is loaded, maybe more than once; what is read or computed
-     * once goes here. Returns NULL, or why the model cannot be used. NULL: nothing is to be done. */
+    /* Called for every instance before the other functions: more than once, and while those of another instance run. What
+     * is read or computed once goes here, once (call_once, a flag under a lock). Returns NULL, or why the model cannot be used. NULL: nothing is to be done. */
     const char *(*initialize)(void);
     /* Writes f(x) to f[0 .. nx-1], and g(x) to g[i + j*nx] for state i and input j. Both come as zeros: write only what is
      * not. `parameters` has the values of the parameters in their order. */

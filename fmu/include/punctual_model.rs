@@ -204,7 +204,8 @@ pub trait Model {
     /// In the order of the index of [`Self::barrier`].
     const BARRIERS: &'static [Variable] = &[];
 
-    /// What is to be done once, before anything else.
+    /// What is to be done before anything else: called for every instance, also while others run, so what is to be
+    /// done once needs a `OnceLock` (`get_or_init`).
     ///
     /// # Errors
     ///

@@ -153,7 +153,8 @@ impl CodeModel {
         };
         trial::run(&mut equations, barriers, ranges)?;
         equations.growing = false;
-        equations.registers = (2 * equations.registers + 64).min(MAX_OPERATIONS + states + inputs + RESERVED);
+        equations.registers =
+            (2 * equations.registers + 64).min(2 * MAX_OPERATIONS + states + inputs + RESERVED);
         equations.steps = Vec::new();
         Ok(Self { equations, barriers })
     }

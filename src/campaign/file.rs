@@ -211,7 +211,7 @@ impl Campaign {
         })?;
         let (mut configurations, mut guids, mut descriptions) = (Vec::new(), Vec::new(), Vec::new());
         for text in &source.configurations {
-            let product = Configuration::parse(text).and_then(Product::new)?;
+            let product = parsed(text).and_then(Product::new)?;
             let xml = product.model_description().to_xml();
             let xml = xml.map_err(|e| Error::configuration("", e.to_string()))?;
             let name = Path::new(product.configuration.name());
@@ -342,7 +342,7 @@ fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
         );
         return Err(Error::configuration(field, message));
     };
-    let configuration = Configuration::parse(&text).map_err(|e| Error::from(e).in_file(path))?;
+    let configuration = parsed(&text).map_err(|e| Error::from(e).in_file(path))?;
     let product = Product::new(configuration)?;
     if product.guid != fmu.description().guid {
         let message = format!(
@@ -354,6 +354,17 @@ fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
         return Err(Error::configuration(field, message));
     }
     Ok(product.configuration)
+}
+
+/// What is configured, if it needs no library.
+fn parsed(text: &str) -> Result<Configuration, ConfigurationError> {
+    Configuration::parse(text).map_err(|e| match e.field() {
+        "plant.plugin" => ConfigurationError::new(
+            e.field(),
+            "is a shared library, which campaigns do not load; `punctual run` does",
+        ),
+        _ => e,
+    })
 }
 
 // Counts travel as 64-bit integers, seeds as doubles.

@@ -127,7 +127,7 @@ impl Measures {
         self.filters.iter().flat_map(|filter| &filter.barriers).map(|barrier| barrier.name.as_str())
     }
 
-    /// The signals that are looked at, in the order of [`Measures::see`].
+    /// The signals that are looked at, in the order of `Measures::see`.
     pub fn signals(&self) -> Vec<String> {
         let mut signals = Vec::new();
         for filter in &self.filters {
@@ -220,7 +220,7 @@ impl Measures {
                 let inside = barrier.reached && !barrier.outside;
                 let kept = failure.is_none() && promise.is_some_and(crate::coupling::Promise::kept);
                 success &= match self.success {
-                    Success::Kept => kept,
+                    Success::Kept => kept && barrier.reached,
                     Success::OnTimeAndInside => on_time && inside,
                 };
                 row.extend([

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
+use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -140,7 +141,11 @@ impl Parts {
             Ok(found) => return Err(other_campaign(&parts.folder, &found, &parts.fingerprint)),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                 let new = parts.unfinished();
-                fs::write(&new, &parts.fingerprint).map_err(|e| Error::io("write", &new, e))?;
+                let written = File::create(&new).and_then(|mut file| {
+                    file.write_all(parts.fingerprint.as_bytes())?;
+                    file.sync_all()
+                });
+                written.map_err(|e| Error::io("write", &new, e))?;
                 parts.settle(&new, &identity)?;
             }
             Err(e) => return Err(Error::io("read", &identity, e)),
@@ -188,7 +193,8 @@ impl Parts {
 
     /// Removes the folder with all that was put there.
     fn remove(self) -> Result<(), Error> {
-        for (_, path) in self.segments()?.values() {
+        // The last first: what is left of an interrupted removal has no gap.
+        for (_, path) in self.segments()?.values().rev() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
         }
         for name in ["unfinished", "fingerprint", "lock"] {

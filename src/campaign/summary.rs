@@ -165,17 +165,13 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
                 Cell::Number(h) => h,
                 _ => None,
             };
-            let least_h = least.iter().map(h).collect::<Option<Vec<f64>>>();
+            // A barrier that was let go before its deadline has none.
+            let least_h = least.iter().filter_map(h).reduce(f64::min);
             let failed = match &row[failure] {
                 Cell::Text(text) => text.clone(),
                 _ => None,
             };
-            heap.push(Kept(Case {
-                run: runs,
-                success: good,
-                least_h: least_h.and_then(|all| all.into_iter().reduce(f64::min)),
-                failure: failed,
-            }));
+            heap.push(Kept(Case { run: runs, success: good, least_h, failure: failed }));
             if heap.len() > worst {
                 heap.pop();
             }

@@ -221,7 +221,7 @@ fn write_group(
     Ok(())
 }
 
-/// Reads a file that [`Writer`] wrote.
+/// Reads a file that `Writer` wrote.
 pub struct Reader {
     path: PathBuf,
     inner: SerializedFileReader<File>,

@@ -132,7 +132,7 @@ pub(super) fn check_all(
     }
     for channel in channels {
         let named = |e: Error| e.within(&channel.name);
-        if channel.promise.settings().method != Method::ReferenceProfile {
+        if channel.promise.settings().method != Method::ReferenceProfile || channel.promise.has_condition() {
             return refuse("needs the reference profile".into()).map_err(named);
         }
         check(&*channel.source, inputs).map_err(named)?;

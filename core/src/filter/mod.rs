@@ -393,7 +393,8 @@ impl SafetyFilter {
     /// How far `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, is from satisfying the
     /// conditions of optimality of its programme: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
     /// the search stops where it looked over the period ([`Report::predicted`]; of the rows linearised at `u`).
-    /// `None` where no programme was solved. Costs another solve: a check, not for every step.
+    /// `None` where no programme was solved. Costs another solve: a check, not for every step. Behind an [`Integrator`]
+    /// u and u_ref are those of the rate.
     ///
     /// # Errors
     ///

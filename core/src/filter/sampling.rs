@@ -268,6 +268,7 @@ impl Held<'_> {
             }
             // Divided by the period, the row is one on h⁽ⁿ⁾ as the pointwise one.
             value /= self.period;
+            terms /= self.period;
             if !self.errors.is_exact() {
                 let slopes = &self.slopes[i * self.errors.count()..][..self.errors.count()];
                 let held = (self.t, x, u, self.period);
@@ -289,7 +290,7 @@ impl Held<'_> {
                 return None;
             }
             // Near a floor of 0 the ends are small differences of what the input moves.
-            let terms = terms / self.period + moved;
+            let terms = terms + moved;
             if value < -MET * terms {
                 *violation = -value / terms;
             }

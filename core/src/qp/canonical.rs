@@ -122,10 +122,10 @@ fn is_strict<const N: usize>(
     let dim = p.u_ref.len();
     let moved: f64 = (0..dim).map(|i| (u[i] - u_ref[i]) * (u[i] - u_ref[i])).sum();
     let length = moved.sqrt();
-    if !(SIZES.contains(&length) && length <= p.correction_limit) {
+    let size = u.iter().chain(u_ref).fold(0.0, |s: f64, v| s.max(v.abs()));
+    if !(SIZES.contains(&length) && length + STRICT * size <= (1.0 - STRICT) * p.correction_limit) {
         return false;
     }
-    let size = u.iter().chain(u_ref).fold(0.0, |s: f64, v| s.max(v.abs()));
     let pulls = multipliers.iter().zip(norms).take(active.len());
     let rows = p.rows.iter().enumerate().all(|(k, row)| {
         let Row { normal, floor } = row;

@@ -195,7 +195,13 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
         }
     }
     watch(path, "plant or barrier_value");
-    let code = LoadedCode { plant, barrier: raw.barrier_value, states: states.len(), _library: library };
+    let code = LoadedCode {
+        plant,
+        barrier: raw.barrier_value,
+        dimensions,
+        parameters: parameters.len(),
+        _library: library,
+    };
     Ok(Plugin {
         file: file.to_owned(),
         path: path.to_owned(),
@@ -273,9 +279,13 @@ fn text(field: &str, pointer: *const c_char) -> Result<Option<String>, String> {
 struct LoadedCode {
     plant: Plant,
     barrier: Option<Barrier>,
-    states: usize,
+    dimensions: Dimensions,
+    parameters: usize,
     _library: Library,
 }
+
+/// A number that nobody was given, and that is not `LITERAL`: whoever uses it is found out.
+const UNKNOWN: Number = Number::MAX - 1;
 
 /// The operation for the code behind `host`.
 extern "C" fn apply(host: *mut c_void, operation: u32, a: Number, b: Number, literal: f64) -> Number {
@@ -284,8 +294,7 @@ extern "C" fn apply(host: *mut c_void, operation: u32, a: Number, b: Number, lit
         let calculator = unsafe { &mut *host.cast::<&mut dyn Calculator>() };
         calculator.apply(operation, a, b, literal)
     });
-    // A number that nobody was given.
-    result.unwrap_or(Number::MAX)
+    result.unwrap_or(UNKNOWN)
 }
 
 /// The value for the code behind `host`.
@@ -313,7 +322,9 @@ impl Code for LoadedCode {
         f: &mut [Number],
         g: &mut [Number],
     ) {
-        debug_assert!(x.len() == self.states && f.len() == self.states);
+        let Dimensions { states, inputs, .. } = self.dimensions;
+        assert!(x.len() == states && f.len() == states && g.len() == states * inputs);
+        assert!(parameters.len() == self.parameters);
         // SAFETY: the arrays have the lengths that the header promises; what the code does in them is its own.
         called(c, |raw| unsafe {
             (self.plant)(raw, parameters.as_ptr(), x.as_ptr(), f.as_mut_ptr(), g.as_mut_ptr());
@@ -328,7 +339,9 @@ impl Code for LoadedCode {
         t: Number,
         x: &[Number],
     ) -> Number {
-        let Some(barrier) = self.barrier else { return Number::MAX };
+        let Some(barrier) = self.barrier else { return UNKNOWN };
+        let Dimensions { states, barriers, .. } = self.dimensions;
+        assert!(x.len() == states && index < barriers && parameters.len() == self.parameters);
         // SAFETY: as above.
         called(c, |raw| unsafe { barrier(raw, index as u32, parameters.as_ptr(), t, x.as_ptr()) })
     }

@@ -140,7 +140,7 @@ pub struct FilterConfiguration {
     #[serde(default)]
     pub bounds: BTreeMap<String, [f64; 2]>,
     /// Bounds on the errors of the measured states, by name, in their units; ≥ 0. The promises then hold for the true
-    /// state. Default: none.
+    /// state, to first order in them. Default: none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub measurement_errors: BTreeMap<String, f64>,
     /// The run it is meant for.

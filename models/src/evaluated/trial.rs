@@ -61,7 +61,7 @@ pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]
                 Some(i) => format!("barrier[{}]", i - states * inputs),
             };
             let message = format!(
-                "has a derivative along a direction of {} at most samples: something was computed from plain values",
+                "has a derivative along a direction of {} at more than half of the samples: probably something was computed from plain values",
                 wrong[i].1
             );
             Err(Error::new(place, message))
