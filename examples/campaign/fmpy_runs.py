@@ -1,0 +1,308 @@
+"""Runs of a campaign with its FMUs under FMPy: the calls of `punctual run` and the rows of `punctual campaign`.
+
+For any pool of processes; ../campaign_dask.py uses it on a cluster.
+"""
+
+import ctypes
+import math
+import tomllib
+from pathlib import Path
+
+from fmpy import extract, fmi2, read_model_description
+
+KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+BARRIER = ["h", "phase", "unmet_steps", "slack", "arrived", "late_certain"]
+SAME_TIME = 1e-9  # s: times that differ by no more are the same communication point
+WHOLE = 1e-6  # steps by which an experiment may differ from a whole number of them
+
+
+class Refused(Exception):
+    """A call that returned neither OK nor Warning."""
+
+
+class Group:
+    """Variables of a block that are read or written by one call for each type, through arrays made once."""
+
+    def __init__(self, block, names):
+        self.block, self.parts, self.slots = block, [], {}
+        for kind in dict.fromkeys(KINDS.values()):
+            chosen = [n for n in block.variables if n in names and KINDS.get(block.variables[n].type) == kind]
+            values = ((ctypes.c_double if kind == "Real" else ctypes.c_int) * len(chosen))()
+            references = (ctypes.c_uint * len(chosen))(*(block.variables[n].valueReference for n in chosen))
+            if chosen:
+                self.parts.append((f"fmi2Get{kind}", f"fmi2Set{kind}", references, len(chosen), values))
+            self.slots |= {name: (values, i) for i, name in enumerate(chosen)}
+
+    def read(self):
+        for get, _, references, n, values in self.parts:
+            self.block.call(get, references, n, values)
+
+    def write(self):
+        for _, set_, references, n, values in self.parts:
+            self.block.call(set_, references, n, values)
+
+
+class Block:
+    """An instance of the FMU at `path` with the links of the system."""
+
+    def __init__(self, component, path, links):
+        self.name, self.start, self.said, self.time = component["name"], component.get("start", {}), "", 0.0
+        description = read_model_description(path)
+        self.variables = {v.name: v for v in description.modelVariables}
+        self.fmu = fmi2.FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=extract(path, f"{path}.folder"),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=self.name,
+        )
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self.log)
+        self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        self.barriers = [n.removesuffix(".unmet_steps") for n in self.variables if n.endswith(".unmet_steps")]
+        self.efforts = [n for n in self.variables if n.startswith("u.") and self.barriers]
+        read = {f"{b}.{field}" for b in self.barriers for field in BARRIER} | set(self.efforts) | {"status"}
+        read |= {link["from"][1] for link in links if link["from"][0] == self.name}
+        outputs = {n for n in read if n in self.variables and self.variables[n].causality == "output"}
+        direct = feedthrough(description)
+        self.states, self.direct = Group(self, outputs - direct), Group(self, outputs & direct)
+        self.inputs = Group(self, {link["to"][1] for link in links if link["to"][0] == self.name})
+        self.outputs = self.states.slots | self.direct.slots
+        self.is_direct = bool(direct)
+
+    def log(self, _, name, status, category, message):
+        if status > 1:
+            self.said = message.decode()
+
+    def call(self, name, *arguments):
+        # The library's function itself, since FMPy's methods make lists.
+        if getattr(self.fmu.dll, name)(self.fmu.component, *arguments) > 1:
+            reason = self.said.removeprefix(f"{name}: ")
+            raise Refused(f"{name} of {self.name} at t = {round(self.time, 9):g} s was refused: {reason}")
+
+    def connect(self, blocks, links):
+        self.sources = [
+            (*self.inputs.slots[to], *blocks[giver].outputs[output], link.get("factor", 1.0), link.get("offset", 0.0))
+            for link in links
+            for (giver, output), (reader, to) in [(link["from"], link["to"])]
+            if reader == self.name
+        ]
+
+    def take_inputs(self):
+        for to, i, values, j, factor, offset in self.sources:
+            value = values[j] if factor == 1.0 else factor * values[j]
+            to[i] = value if offset == 0.0 else value + offset
+        self.inputs.write()
+
+    def step(self, time, step):
+        self.time = time
+        self.call("fmi2DoStep", time, step, 1)
+
+    def begin(self, start, stop, values):
+        self.time = start
+        self.call("fmi2Reset")
+        self.call("fmi2SetupExperiment", 0, 0.0, start, 1, stop)
+        for name, value in (self.start | values).items():
+            group = Group(self, {name})
+            group.slots[name][0][0] = value
+            group.write()
+        self.call("fmi2EnterInitializationMode")
+
+
+class Filter:
+    """What is kept of a filter in a run, as docs/campaign.md says under "The rows"."""
+
+    def __init__(self, block, values, start):
+        self.block, self.start = block, start
+        self.statuses = items(block, "status")
+        self.counts = dict.fromkeys(self.statuses.values(), 0)
+        self.peaks = dict.fromkeys(block.efforts, 0.0)
+        self.barriers = {}
+        for name in block.barriers:
+            key = f"{name}.deadline"
+            own = block.variables[key].start if key in block.variables else math.inf
+            kept = dict(arrival=None, least_h=None, late=None, left=None, unmet=0, longest=0, violation=0.0)
+            kept |= dict(deadline=float((block.start | values).get(key, own)), reached=False, outside=False, row=0)
+            slots = [block.outputs[f"{name}.{field}"] for field in BARRIER]
+            self.barriers[name] = (kept, slots, items(block, f"{name}.phase"))
+
+    def see(self, time):
+        outputs = self.block.outputs
+        array, i = outputs["status"]
+        status = array[i]
+        self.counts[status] += 1
+        for name, peak in self.peaks.items():
+            array, i = outputs[name]
+            if abs(array[i]) > peak:
+                self.peaks[name] = abs(array[i])
+        for kept, slots, phases in self.barriers.values():
+            h, phase, unmet, slack, arrived, late = [array[i] for array, i in slots]
+            if time - self.start >= kept["deadline"] - SAME_TIME:
+                kept["reached"] = True
+                if phase != phases["released"]:
+                    least = kept["least_h"]
+                    if least is None or h < least or least != least:
+                        kept["least_h"] = h
+                    kept["outside"] |= not h >= 0.0
+            if arrived and kept["arrival"] is None:
+                kept["arrival"] = time
+            if (late or phase == phases["late"]) and kept["late"] is None:
+                kept["late"] = time
+            if phase == phases["left"] and kept["left"] is None:
+                kept["left"] = time
+            if unmet > 0 or status >= self.statuses["invalid_input"]:
+                kept["unmet"] += 1
+                kept["row"] += 1
+                kept["longest"] = max(kept["longest"], kept["row"])
+                kept["violation"] = max(kept["violation"], -slack)
+            else:
+                kept["row"] = 0
+
+    def cells(self, begun, failure):
+        """The filter's part of the row, and by barrier what `campaign.success` may ask for."""
+        block = self.block.name
+        cells = {f"{block}.status.{name}": self.counts[number] for name, number in self.statuses.items()}
+        cells |= {f"{block}.peak.{name.removeprefix('u.')}": peak for name, peak in self.peaks.items()}
+        verdicts = []
+        for name, (kept, _, _) in self.barriers.items():
+            deadline, inside = self.start + kept["deadline"], kept["reached"] and not kept["outside"]
+            on_time = kept["arrival"] is not None and kept["arrival"] <= deadline + SAME_TIME
+            missed = kept["late"] is not None or kept["left"] is not None or kept["unmet"] > 0
+            own = dict(arrival=kept["arrival"], on_time=on_time, least_h=kept["least_h"], inside=inside)
+            own |= {field: kept[field] for field in ["late", "left", "unmet", "longest"]}
+            own |= dict(violation=kept["violation"] if begun else None, kept=not missed and failure is None)
+            cells |= {f"{block}.{name}.{field}": value for field, value in own.items()}
+            verdicts.append({"kept": own["kept"] and kept["reached"], "on_time_and_inside": on_time and inside})
+        return cells, verdicts
+
+
+class Simulation:
+    """The coupled system in one process: `punctual run` in Gauss-Seidel order, call by call."""
+
+    def __init__(self, system, links, fmus, folder):
+        self.experiment, self.success = system["experiment"], system["success"]
+        self.blocks = {}
+        for component, fmu in zip(system["component"], fmus):
+            path = Path(folder) / f"{component['name']}.fmu"
+            path.write_bytes(fmu)
+            self.blocks[component["name"]] = Block(component, str(path), links)
+        for block in self.blocks.values():
+            block.connect(self.blocks, links)
+
+    def run(self, drawn):
+        """The row of a run, by column."""
+        start, stop, step = (self.experiment.get(key, 0.0) for key in ["start_time", "stop_time", "step"])
+        values = {name: {} for name in self.blocks}
+        for name, value in drawn["values"].items():
+            component, variable = name.split(".", 1)
+            values[component][variable] = value
+        filters = [Filter(b, values[b.name], start) for b in self.blocks.values() if b.barriers]
+        begun, failure = False, None
+        try:
+            self.begin(start, stop, values)
+            begun = True
+            self.steps(start, stop, step, filters)
+        except Refused as refused:
+            failure = str(refused)
+        row, success = {}, failure is None
+        for kept in filters:
+            cells, verdicts = kept.cells(begun, failure)
+            row |= cells
+            success = success and all(verdict[self.success] for verdict in verdicts)
+        front = {"run": drawn["run"], "seed": drawn["seed"]} | drawn["values"]
+        return front | {"success": success, "failure": failure} | row
+
+    def begin(self, start, stop, values):
+        blocks, before = self.blocks.values(), None
+        for block in blocks:
+            block.begin(start, stop, values[block.name])
+        for _ in range(len(blocks) + 1):
+            self.exchange(states=True)
+            now = [bytes(part[-1]) for b in blocks for g in [b.states, b.direct, b.inputs] for part in g.parts]
+            if now == before:
+                break
+            before = now
+        for block in blocks:
+            block.call("fmi2ExitInitializationMode")
+        for block in blocks:
+            block.states.read()
+
+    def exchange(self, states=False):
+        """All outputs and inputs, without a step."""
+        for block in self.blocks.values() if states else []:
+            block.states.read()
+        for block in self.blocks.values():
+            if block.is_direct:
+                block.take_inputs()
+                block.direct.read()
+        for block in self.blocks.values():
+            if not block.is_direct:
+                block.take_inputs()
+
+    def steps(self, start, stop, step, filters):
+        blocks = list(self.blocks.values())
+        direct, delayed = [b for b in blocks if b.is_direct], [b for b in blocks if not b.is_direct]
+        ratio = (stop - start) / step
+        whole = round(ratio) >= 1 and abs(ratio - round(ratio)) <= WHOLE
+        n = round(ratio) if whole else max(math.ceil(ratio), 1)
+        for k in range(n):
+            t = start + k * step
+            h = step if whole or k < n - 1 else stop - t
+            for block in direct:
+                block.take_inputs()
+                block.step(t, h)
+                block.direct.read()
+            for block in delayed:
+                block.take_inputs()
+            for kept in filters:
+                kept.see(t)
+            for block in delayed:
+                block.step(t, h)
+            for block in blocks:
+                block.states.read()
+        self.exchange()
+        for kept in filters:
+            kept.see(stop)
+        for block in blocks:
+            block.call("fmi2Terminate")
+
+
+def items(block, variable):
+    """The items of an enumeration, by name."""
+    return {item.name: int(item.value) for item in block.variables[variable].declaredType.items}
+
+
+def feedthrough(description):
+    """The outputs that depend on an input at the same instant; one that declares nothing depends on all."""
+    depends = {o.variable.name: o.dependencies for o in description.outputs}
+    return {n for n, on in depends.items() if on is None or any(v.causality == "input" for v in on)}
+
+
+def read(path):
+    """System, links and FMUs of the campaign file, which `punctual campaign --list` has checked."""
+    campaign = tomllib.loads(path.read_text())
+    system, section = campaign["system"], campaign["campaign"]
+    folder = path.parent if isinstance(system, dict) else (path.parent / system).parent
+    if isinstance(system, str):
+        system = tomllib.loads((path.parent / system).read_text())
+    system["success"] = section.get("success", "kept")
+    system["experiment"] |= {key: section[key] for key in ["stop_time", "step"] if key in section}
+    if system["experiment"].get("order", "gauss-seidel") != "gauss-seidel":
+        raise SystemExit(f"{path}: experiment.order: only gauss-seidel is made here")
+    paths = {c["name"]: folder / c["fmu"] for c in system["component"]}
+    for name, fmu in paths.items():
+        if fmu.suffix != ".fmu":
+            raise SystemExit(f"{path}: {name}: {fmu} is not an FMU; `punctual build` makes one of it")
+    described = {name: read_model_description(str(fmu)) for name, fmu in paths.items()}
+    links = [link | {end: link[end].split(".", 1) for end in ["from", "to"]} for link in system.get("connection", [])]
+    for a, b in (pair["components"] for pair in system.get("connect_by_name", [])):
+        for giver, reader in [(a, b), (b, a)]:
+            inputs = {v.name for v in described[reader].modelVariables if v.causality == "input"}
+            free = inputs - {link["to"][1] for link in links if link["to"][0] == reader}
+            outputs = [o.variable.name for o in described[giver].outputs]
+            links += [{"from": [giver, n], "to": [reader, n]} for n in outputs if n in free]
+    direct = {name: feedthrough(description) for name, description in described.items()}
+    places = [name for name in paths if direct[name]]
+    for (giver, output), (reader, _) in ((link["from"], link["to"]) for link in links):
+        if output in direct[giver] and reader in places and places.index(reader) <= places.index(giver):
+            raise SystemExit(f"{path}: {giver}.{output} feeds through to {reader}: it must stand before {reader}")
+    return system, links, [fmu.read_bytes() for fmu in paths.values()]
