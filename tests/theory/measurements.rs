@@ -95,6 +95,9 @@ fn table(count: usize, allowed: bool, noise: Noise) -> [Failures; 2] {
     [point_mass, failures(car, errors, noise, &places, |_| [1.0; 3], |_| vector![-20.0])]
 }
 
+/// Steps that are not met in the thousand runs of the documentation: a defect that is known, not one that is allowed to grow.
+const UNMET: usize = 43;
+
 /// A row of the documentation: none late or outside where the settings allow for the errors. Some rows of the point
 /// mass are not met by the search, at kinks of the bound: of a thousand runs 43 steps.
 #[allow(clippy::print_stdout, reason = "the figures of the documentation")]
@@ -104,7 +107,8 @@ fn check(noise: Noise, least_lost: impl Fn(usize) -> usize) {
     println!("of {count}, {noise:?}, point mass and jerk car: allowed for {allowed:?}, not {plain:?}");
     for kept in allowed {
         assert_eq!((kept.late, kept.outside), (0, 0), "{noise:?}, {kept:?} of {count}");
-        assert!(kept.unmet < count, "{noise:?}, {kept:?} of {count}");
+        let known = if count < 1000 { 0 } else { UNMET };
+        assert!(kept.unmet <= known, "{noise:?}, {kept:?} of {count}");
     }
     for lost in plain {
         assert!(lost.outside >= least_lost(count), "{noise:?}, {lost:?} of {count}: the errors do nothing");
