@@ -1,11 +1,9 @@
 //! Plants and barriers that somebody else's code computes, such as a plug-in's: it is given numbers that it cannot
 //! look into, asks for operations on them, and these are done on Taylor coefficients.
 //!
-//! The code is run once for each order: the first call does its operations on the coefficients of order 0, the next
-//! one continues them to order 1, and so on, so that an operation costs what it costs in an expression. For this the
-//! code has to ask for the same operations whenever it is called at the same state; it may look at the values
-//! ([`Calculator::value`]), branch on them and look things up. What it asks for is written down at order 0 and
-//! compared afterwards.
+//! The code is run once: it does its operations on the coefficients of order 0, and what it asks for is written down and
+//! continued to the orders above as an expression is. It may look at the values ([`Calculator::value`]), branch on them
+//! and look things up: a state has one order 0.
 
 mod trial;
 
@@ -244,7 +242,7 @@ struct Evaluated {
     f: Vec<Number>,
     g: Vec<Number>,
     derivatives: Vec<Register>,
-    /// What was done at order 0.
+    /// What the code asked for.
     steps: Vec<Step>,
     /// How many of them belong to the plant.
     plant_steps: usize,
@@ -275,18 +273,24 @@ impl Evaluated {
     fn time(&self) -> Register {
         self.states + self.inputs
     }
+
+    /// What the last call asked for, and what it gave.
+    fn asked(&self) -> (Vec<Step>, Vec<Number>) {
+        (self.steps.clone(), [&self.f[..], &self.g].concat())
+    }
 }
 
 /// One call of the code.
 struct Work<'a, C> {
     series: &'a mut Series<C>,
     steps: &'a mut Vec<Step>,
-    /// Which of the steps is next.
-    position: usize,
+    /// How many of the steps are those of another call.
+    others: usize,
     next: Register,
-    orders: Range<usize>,
-    /// Registers that the code is not given.
-    hidden: Range<Register>,
+    /// Registers that the code is not given: inputs, and what another call has computed.
+    hidden: [Range<Register>; 2],
+    /// The first input.
+    inputs: Register,
     /// The reserved registers from this one on: zero, one, not a number.
     zero: Register,
     growing: bool,
@@ -304,12 +308,14 @@ impl<C: Scalar> Work<'_, C> {
     }
 
     #[inline]
+    fn is_given(&self, register: Register) -> bool {
+        register < self.next && !self.hidden.iter().any(|range| range.contains(&register))
+    }
+
+    #[inline]
     fn checked(&mut self, number: Number) -> Register {
         let register = number as Register;
-        if register < self.next && !self.hidden.contains(&register) {
-            return register;
-        }
-        self.fail(Fault::Number(number))
+        if self.is_given(register) { register } else { self.fail(Fault::Number(number)) }
     }
 
     fn operand(&mut self, number: Number, literal: f64) -> Value {
@@ -333,7 +339,7 @@ impl<C: Scalar> Work<'_, C> {
         for (i, derivative) in derivatives.iter_mut().enumerate() {
             let mut sum = self.checked(f[i]);
             for (j, column) in g.chunks_exact(states).enumerate() {
-                let (factor, input) = (self.checked(column[i]), self.hidden.start + j);
+                let (factor, input) = (self.checked(column[i]), self.inputs + j);
                 if factor == self.zero {
                     continue;
                 }
@@ -356,33 +362,25 @@ impl<C: Scalar> Record for Work<'_, C> {
         }
         // Sine and cosine are computed together, and mostly asked for near each other.
         if matches!(operation, Operation::SinCos(_)) {
-            let recent = self.steps[..self.position].iter().rev().take(RECENT);
+            let recent = self.steps[self.others..].iter().rev().take(RECENT);
             if let Some(done) = recent.into_iter().find(|step| step.operation == operation) {
                 return done.to;
             }
         }
-        let to = self.next;
-        let step = Step { operation, to };
-        if self.orders.start == 0 {
-            if self.steps.len() >= MAX_OPERATIONS {
+        let (to, end) = (self.next, self.next + operation.results());
+        if self.steps.len() >= MAX_OPERATIONS {
+            return self.fail(Fault::TooMany);
+        }
+        if end > self.series.registers() {
+            if !self.growing {
                 return self.fail(Fault::TooMany);
             }
-            let end = to + operation.results();
-            if end > self.series.registers() {
-                if !self.growing {
-                    return self.fail(Fault::TooMany);
-                }
-                self.series.grow(2 * end);
-            }
-            self.steps.push(step);
-        } else if self.steps.get(self.position) != Some(&step) {
-            return self.fail(Fault::Different);
+            self.series.grow(2 * end);
         }
-        self.position += 1;
-        self.next += operation.results();
-        for k in self.orders.clone() {
-            self.series.advance_one(&step, k);
-        }
+        let step = Step { operation, to };
+        self.steps.push(step);
+        self.next = end;
+        self.series.advance_one(&step, 0);
         to
     }
 }
@@ -426,8 +424,7 @@ impl<C: Scalar> Calculator for Work<'_, C> {
 
     fn value(&self, a: Number) -> f64 {
         let register = a as Register;
-        let known = register < self.next && !self.hidden.contains(&register);
-        if known { self.series.get(register, 0).value() } else { f64::NAN }
+        if self.is_given(register) { self.series.get(register, 0).value() } else { f64::NAN }
     }
 }
 
@@ -451,37 +448,34 @@ impl Equations for Evaluated {
     }
 
     fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize) {
+        if k > 0 {
+            return series.advance(&self.steps, k);
+        }
         let time = self.time();
         let zero = time as Number + 1;
         self.f.fill(zero);
         self.g.fill(zero);
-        if k == 0 {
-            self.steps.clear();
-            self.fault = None;
-        }
+        self.steps.clear();
         let mut work = Work {
             series,
             steps: &mut self.steps,
-            position: 0,
+            others: 0,
             next: time + RESERVED,
-            orders: k..k + 1,
             // Time is for barriers.
-            hidden: self.states..time + 1,
+            hidden: [self.states..time + 1, 0..0],
+            inputs: self.states,
             zero: time + 1,
             growing: self.growing,
             fault: None,
         };
         self.code.plant(&mut work, &self.parameters, &self.x, &mut self.f, &mut self.g);
         work.combine(&self.f, &self.g, &mut self.derivatives);
-        let (mut fault, next, position, nan) = (work.fault, work.next, work.position, work.not_a_number());
-        if k > 0 && position != self.plant_steps {
-            fault = fault.or(Some(Fault::Different));
-        }
-        if fault.is_some() {
+        let nan = work.not_a_number();
+        (self.next, self.fault) = (work.next, work.fault);
+        self.plant_steps = self.steps.len();
+        if self.fault.is_some() {
             self.derivatives.fill(nan);
         }
-        (self.next, self.plant_steps) = (next, position);
-        self.fault = self.fault.or(fault);
     }
 
     fn derivative(&self, i: usize) -> Register {
@@ -494,10 +488,11 @@ impl Equations for Evaluated {
         let mut work = Work {
             series,
             steps: &mut self.steps,
-            position: self.plant_steps,
+            others: self.plant_steps,
             next: self.next,
-            orders: 0..n + 1,
-            hidden: self.states..time,
+            // What the plant has computed ends below order n.
+            hidden: [self.states..time, time + RESERVED..self.next],
+            inputs: self.states,
             zero: time + 1,
             growing: self.growing,
             fault: self.fault,
@@ -505,6 +500,9 @@ impl Equations for Evaluated {
         let h = self.code.barrier(self.barrier, &mut work, &self.parameters, time as Number, &self.x);
         let h = work.checked(h);
         let (fault, nan, end) = (work.fault, work.not_a_number(), work.next);
+        for k in 1..=n {
+            series.advance(&self.steps[self.plant_steps..], k);
+        }
         self.fault = fault;
         if self.growing {
             self.registers = self.registers.max(end);

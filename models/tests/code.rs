@@ -84,21 +84,35 @@ fn made(plant: Plant, barrier: Barrier) -> Result<CodeModel, String> {
         .map_err(|e| e.to_string())
 }
 
-fn sources() -> [Box<dyn DerivativeSource>; 2] {
-    let code = made(unicycle, disc).expect("a model").barrier(0).expect("a barrier");
+/// The cosine is one that the plant computes too, to an order less.
+fn shared(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
+    let (slow, cos) = (with(c, "multiply", t, 0.1), op(c, "cos", x[2], 0));
+    let sum = op(c, "add", x[3], cos);
+    op(c, "subtract", sum, slow)
+}
+
+const SHARED: &str = "v + cos(th) - t*0.1";
+
+/// The same by code and by expressions, of relative degree `n`.
+fn sources(barrier: Barrier, expression: &str, n: usize) -> [Box<dyn DerivativeSource>; 2] {
+    let code = made(unicycle, barrier).expect("a model").barrier(0).expect("a barrier");
     let model = Model::new(&["x", "y", "th", "v"], &["a", "w"], &[], &DERIVATIVES).expect("a model");
-    let expressions = model.barrier(DISC).expect("a barrier");
-    let n = code.relative_degree(&ANY);
-    assert_eq!(n.uniform(), Some(2), "{n:?}");
-    assert_eq!(n, expressions.relative_degree(&ANY));
-    [code.source(2).expect("in range"), expressions.source(2).expect("in range")]
+    let expressions = model.barrier(expression).expect("a barrier");
+    let found = code.relative_degree(&ANY);
+    assert_eq!(found.uniform(), Some(n), "{found:?}");
+    assert_eq!(found, expressions.relative_degree(&ANY));
+    [code.source(n).expect("in range"), expressions.source(n).expect("in range")]
 }
 
 const STATES: [[f64; 4]; 3] = [[1.0, 2.0, 0.3, 4.0], [30.0, -5.0, -2.0, -0.5], [19.0, 45.0, 7.0, 12.0]];
 
 #[test]
 fn code_gives_the_bits_of_expressions() {
-    let [code, expressions] = sources();
+    compare(sources(disc, DISC, 2));
+    compare(sources(shared, SHARED, 1));
+}
+
+fn compare([code, expressions]: [Box<dyn DerivativeSource>; 2]) {
     for x in STATES {
         let ([dx, u, du], t) = ([[0.3, -1.0, 0.5, 2.0], [1.5, -0.4, 0.0, 0.0], [0.2, 0.9, 0.0, 0.0]], 1.7);
         let (u, du) = (&u[..2], &du[..2]);
@@ -123,7 +137,7 @@ fn code_gives_the_bits_of_expressions() {
 
 #[test]
 fn a_step_allocates_nothing() {
-    let [code, _] = sources();
+    let [code, _] = sources(disc, DISC, 2);
     let (mut out, mut ahead, mut x) = (Derivatives::ZERO, Ahead::ZERO, STATES[0]);
     let found = allocation_counter::measure(|| {
         for at in STATES {
