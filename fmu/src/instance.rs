@@ -8,9 +8,10 @@
 //! sample at its start and remembers it; after the step, outputs stay that sample (a filter) or show
 //! the new state (a plant) until inputs change.
 
+mod access;
 mod derivative;
 
-use punctual_modeldescription::{BaseType, Causality, Variable, VariableKind};
+use punctual_modeldescription::{BaseType, Causality, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
 use crate::configuration::{Configuration, ConfigurationError};
@@ -132,6 +133,8 @@ pub struct State {
 /// One instance of an FMU.
 pub struct Instance {
     product: Product,
+    /// Type and causality by value reference: what every read and write checks, in few bytes.
+    kinds: Vec<(BaseType, Causality)>,
     block: Box<dyn Block>,
     /// What a new block remembers: nothing yet.
     start: BlockState,
@@ -173,8 +176,10 @@ impl Instance {
         let values = Values::zeros(len);
         let mut start = BlockState::Plant { x: Vec::new() };
         block.save(&mut start);
+        let kinds = product.variables.iter().map(|v| (v.kind.base_type(), v.causality)).collect();
         let mut instance = Self {
             product,
+            kinds,
             block,
             start,
             mode: Mode::INSTANTIATED,
@@ -315,6 +320,7 @@ impl Instance {
         // Without `..`: whoever adds a field decides here whether it belongs to the state.
         let Self {
             product,
+            kinds: _,
             block,
             start: _,
             mode,
@@ -513,45 +519,6 @@ impl Instance {
             *o = array(&self.values)[reference as usize];
         }
         Ok(())
-    }
-
-    fn check_references(&self, call: Call, base: BaseType, references: &[u32]) -> Result<(), Failure> {
-        self.check(call)?;
-        references.iter().try_for_each(|&reference| self.variable(base, reference).map(|_| ()))
-    }
-
-    fn check_settable(&self, base: BaseType, references: &[u32]) -> Result<(), Failure> {
-        self.check(Call::Set)?;
-        for &reference in references {
-            let variable = self.variable(base, reference)?;
-            match variable.causality {
-                Causality::Input => {}
-                Causality::Parameter if self.mode != Mode::STEP => {}
-                Causality::Parameter => {
-                    return Err(format!(
-                        "{} is a fixed parameter and cannot change after initialization",
-                        variable.name
-                    ));
-                }
-                _ => return Err(format!("{} is an output and cannot be set", variable.name)),
-            }
-        }
-        Ok(())
-    }
-
-    fn variable(&self, base: BaseType, reference: u32) -> Result<&Variable, Failure> {
-        let variables = &self.product.variables;
-        let variable = variables.get(reference as usize).ok_or_else(|| {
-            format!("value reference {reference} is unknown, must be 0 to {}", variables.len() - 1)
-        })?;
-        let found = variable.kind.base_type();
-        if found != base {
-            return Err(format!(
-                "value reference {reference} is {} of type {found:?}, not {base:?}",
-                variable.name
-            ));
-        }
-        Ok(variable)
     }
 
     /// Computes the outputs if inputs changed since.
