@@ -2,7 +2,7 @@
 //!
 //!     rustc --edition 2024 -O --crate-type cdylib -o libarm.so arm.rs
 
-#[path = "../../fmu/include/punctual_model.rs"]
+#[path = "../../fmu/src/abi/plugin/punctual_model.rs"]
 mod punctual_model;
 
 use punctual_model::{Model, Number, Output, Variable};

@@ -73,6 +73,9 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     }
 }
 
+/// No module of the crate whose folder it is in: it is compiled into plug-ins.
+const FOR_PLUGINS: &str = "fmu/src/abi/plugin/punctual_model.rs";
+
 /// A crate's modules: each line uses only the lines above it, and none of its own line but itself.
 struct Order {
     folder: &'static str,
@@ -87,7 +90,8 @@ impl Order {
     }
 
     fn check(&self) {
-        for source in SOURCES.iter().filter(|s| s.path.starts_with(self.folder) && !s.is_test()) {
+        let modules = |path: &str| path.starts_with(self.folder) && path != FOR_PLUGINS;
+        for source in SOURCES.iter().filter(|s| modules(&s.path) && !s.is_test()) {
             let inside = source.path[self.folder.len()..].trim_end_matches(".rs");
             let (module, nested) =
                 inside.split_once('/').map_or((inside, false), |(module, _)| (module, true));
