@@ -5,8 +5,9 @@ use std::path::Path;
 use std::process::Command;
 
 use punctual::coupling::System;
+use punctual_core::filter::Status;
 use punctual_fmu::configuration::Configuration;
-use punctual_fmu::product::Product;
+use punctual_fmu::product::{Product, describe};
 use punctual_modeldescription::Causality;
 
 use crate::sources::{TEXTS, root};
@@ -90,12 +91,68 @@ fn variables(causality: Causality) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_readme_lists_the_variables_of_the_filter() {
-    let readme = text("README.md");
+fn the_variables_of_the_filter_are_listed() {
+    let document = text("docs/fmu.md");
     for (head, causality) in
         [("inputs", Causality::Input), ("outputs", Causality::Output), ("parameters", Causality::Parameter)]
     {
-        assert_eq!(quoted_in_row(readme, head), variables(causality), "README.md, {head}");
+        assert_eq!(quoted_in_row(document, head), variables(causality), "docs/fmu.md, {head}");
+    }
+    for status in Status::ALL {
+        let (name, meaning) = describe(status);
+        let row = format!("| {} `{name}` | {meaning} |", status as i32);
+        assert!(document.contains(&row), "docs/fmu.md has no row {row}");
+    }
+}
+
+/// The keys of each table of a Markdown text that begins with `| key |`.
+fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
+    let keys = |row: &str| {
+        let first = row.split('|').nth(1).unwrap_or_default();
+        first.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let rows =
+        |table: &str| table.lines().skip(2).take_while(|l| l.starts_with("| ")).flat_map(keys).collect();
+    markdown.split("\n| key |").skip(1).map(rows).collect()
+}
+
+/// Beginnings of files up to a key that none has, in the order of the tables of docs/configuration.md.
+const PLACES: [&str; 19] = [
+    "kind = \"filter\"",
+    "kind = \"filter\"\n[[barrier]]",
+    "kind = \"filter\"\n[plant]",
+    "kind = \"filter\"\n[[plant.states]]",
+    "kind = \"filter\"\n[[plant.parameters]]",
+    "kind = \"filter\"\n[integrator]",
+    "kind = \"plant\"",
+    "kind = \"plant\"\n[integration]",
+    "kind = \"plant\"\n[disturbance]",
+    "kind = \"controller\"",
+    "kind = \"filter\"\n[experiment]",
+    "",
+    "[experiment]",
+    "[[component]]",
+    "[[connection]]",
+    "[[connect_by_name]]",
+    "[record]",
+    "[[plot]]\nkind = \"path\"",
+    "[[plot]]\nkind = \"time\"",
+];
+
+#[test]
+fn every_key_of_every_file_is_listed() {
+    let listed = tables_of_keys(text("docs/configuration.md"));
+    assert_eq!(listed.len(), PLACES.len(), "the tables of docs/configuration.md");
+    for (place, listed) in PLACES.iter().zip(listed) {
+        let file = format!("{place}\nno_such_key = 1\n");
+        let refused = match place.starts_with("kind") {
+            true => Configuration::parse(&file).map(|_| ()).map_err(|e| e.to_string()),
+            false => System::parse(&file).map(|_| ()).map_err(|e| e.to_string()),
+        };
+        let message = refused.expect_err("an unknown key");
+        let (_, known) = message.split_once("expected").unwrap_or_else(|| panic!("{place}: {message}"));
+        let known: BTreeSet<_> = known.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+        assert_eq!(listed, known, "docs/configuration.md, keys after {place:?}");
     }
 }
 
