@@ -185,12 +185,14 @@ fn code_that_does_what_it_must_not_is_refused() {
         let value = c.value(x[0]).sin();
         c.apply(0, 0, 0, value)
     };
+    let nowhere: Barrier = |c, _, _| c.apply(0, 0, 0, f64::NAN);
     for (plant, barrier, wanted) in [
         (forged, disc as Barrier, "plant: uses a number that it was not given (4000)"),
         (inputs, disc, "plant: uses a number that it was not given (4)"),
         (unknown, disc, "plant: asks for operation 19, must be 0 to 18"),
         (unicycle, endless, "barrier[0]: asks for more than 4096 operations"),
         (changing, disc, "plant: asks for other operations when it is called again at the same state"),
+        (unicycle, nowhere, "barrier[0]: is not finite at any sample: give the states the ranges "),
         (unicycle, looked_up, "barrier[0]: has a derivative along a direction of "),
     ] {
         let found = made(plant, barrier).expect_err("it is refused");

@@ -26,8 +26,7 @@ type Outcome = Vec<[f64; 2]>;
 ///
 /// What it did that it must not.
 pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]]) -> Result<(), Error> {
-    let mut samples = 0;
-    let mut wrong: Vec<(usize, String)> = Vec::new();
+    let mut found: Vec<Found> = Vec::new();
     for (k, (t, x)) in lie::samples(ranges).into_iter().enumerate() {
         // Forwards and backwards in turn, and no two components by the same part.
         let part = |i: usize| if (i + k).is_multiple_of(2) { 1.0 } else { -0.7 + 0.01 * i as f64 };
@@ -36,38 +35,51 @@ pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]
         let here = outcome(equations, barriers, t, &x, &v)?;
         let ahead = outcome(equations, barriers, t + REACH, &at(REACH), &v)?;
         let behind = outcome(equations, barriers, t - REACH, &at(-REACH), &v)?;
-        let numbers = || here.iter().chain(&ahead).chain(&behind).flatten();
-        if !numbers().all(|v| v.is_finite()) {
-            continue;
-        }
-        samples += 1;
-        wrong.resize(here.len(), (0, String::new()));
-        for (i, wrong) in wrong.iter_mut().enumerate() {
+        found.resize(here.len(), Found::default());
+        for (i, found) in found.iter_mut().enumerate() {
+            if ![here[i], ahead[i], behind[i]].iter().flatten().all(|v| v.is_finite()) {
+                continue;
+            }
+            found.samples += 1;
             let (slope, difference) = (here[i][1] * REACH, (ahead[i][0] - behind[i][0]) / 2.0);
             let size = slope.abs().max(difference.abs());
             if (slope - difference).abs() > APART * size + ROUND_OFF * here[i][0].abs() {
-                wrong.0 += 1;
-                wrong.1 = format!("{:.6e}, but by its values {:.6e}", slope / REACH, difference / REACH);
+                found.wrong += 1;
+                found.slopes = [slope, difference].map(|change| change / REACH);
             }
         }
     }
-    // Not where it is so at few samples: a function may have kinks and jumps.
-    match wrong.iter().position(|wrong| 2 * wrong.0 > samples) {
-        Some(i) => {
-            let (states, inputs) = (equations.states(), equations.inputs());
-            let place = match i.checked_sub(states) {
-                None => format!("f[{i}]"),
-                Some(i) if i < states * inputs => format!("g[{i}]"),
-                Some(i) => format!("barrier[{}]", i - states * inputs),
-            };
-            let message = format!(
-                "has a derivative along a direction of {} at more than half of the samples: probably something was computed from plain values",
-                wrong[i].1
-            );
-            Err(Error::new(place, message))
+    let (states, inputs) = (equations.states(), equations.inputs());
+    let place = |i: usize| match i.checked_sub(states) {
+        None => format!("f[{i}]"),
+        Some(i) if i < states * inputs => format!("g[{i}]"),
+        Some(i) => format!("barrier[{}]", i - states * inputs),
+    };
+    for (i, Found { samples, wrong, slopes: [slope, difference] }) in found.into_iter().enumerate() {
+        if samples == 0 {
+            let message = "is not finite at any sample: give the states the ranges (min, max) for which the model is meant";
+            return Err(Error::new(place(i), message));
         }
-        None => Ok(()),
+        // Not where it is so at few samples: a function may have kinks and jumps.
+        if 2 * wrong > samples {
+            let message = format!(
+                "has a derivative along a direction of {slope:.6e}, but by its values {difference:.6e} at more than half of the samples: probably something was computed from plain values"
+            );
+            return Err(Error::new(place(i), message));
+        }
     }
+    Ok(())
+}
+
+/// What was found of a component at the samples.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    /// Those at which it and its difference are finite.
+    samples: usize,
+    /// Those at which slope and difference differ.
+    wrong: usize,
+    /// Slope and difference at the last of these.
+    slopes: [f64; 2],
 }
 
 /// Values at `t` and `x`, and slopes along (1, `v`).
