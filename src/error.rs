@@ -30,6 +30,8 @@ pub enum FmuProblem {
     Archive(String),
     /// An entry of this name would be written outside the folder it is unpacked to.
     UnsafeEntry(String),
+    /// It cannot be joined with others to one; with the reason.
+    Unfit(String),
     /// More than is unpacked or read from a file of unknown origin.
     Limit {
         /// What is measured, as the beginning of a sentence.
@@ -74,6 +76,7 @@ impl fmt::Display for FmuProblem {
             Self::UnsafeEntry(entry) => {
                 write!(f, "refused, because the archive entry {entry:?} points out of the archive")
             }
+            Self::Unfit(reason) => write!(f, "cannot be merged: {reason}"),
             Self::Limit { what, value, unit, allowed } => {
                 write!(f, "refused: {what} {value}")?;
                 if !unit.is_empty() {

@@ -12,7 +12,7 @@
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
 //! pictures             from a system file's plots and a recording to pictures
-//! package              from a configuration to an .fmu file, from a system to an .ssp file
+//! package              from a configuration to an .fmu file, from a system to an .ssp file, FMUs merged
 //! demo                 the demonstration: three plants, two methods
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! output               the one place that prints

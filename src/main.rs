@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, campaign, check, demo, inspect, replay, reproduce, run, validate};
+use punctual::command::{build, campaign, check, demo, inspect, merge, replay, reproduce, run, validate};
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
@@ -37,6 +37,8 @@ enum Command {
     Replay(replay::Arguments),
     /// Show what an FMU offers
     Inspect(inspect::Arguments),
+    /// Join equal FMUs that were built on different systems to one for all of them
+    Merge(merge::Arguments),
     /// Say what is wrong with an FMU, ours or another's, before a master stumbles over it
     Validate(validate::Arguments),
     /// The part of `validate` that may crash, in a process of its own
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Reproduce(arguments) => reproduce::execute(&arguments),
+        Command::Merge(arguments) => merge::execute(&arguments),
         Command::Replay(arguments) => replay::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),

@@ -39,7 +39,7 @@ pub struct TrialArguments {
     folder: PathBuf,
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.01..=86_400.0).contains(&value) => Ok(Duration::from_secs_f64(value)),
         _ => Err("must be seconds, 0.01 to 86400".to_owned()),

@@ -117,8 +117,11 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     Ok(library.into())
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
+    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    // What it needs lies beside it (section 2.3), where the system would not look otherwise.
     // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
-    unsafe { libloading::Library::new(path) }
+    let library = unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }?;
+    Ok(library.into())
 }

@@ -1,9 +1,11 @@
 //! From a configuration to an `.fmu` file: model description, library, resources, documentation and
-//! icon; and from a system to an `.ssp` file. No compiler is needed; the same configuration and library give
-//! the same bytes.
+//! icon; from a system to an `.ssp` file; and from FMUs of several systems to one. No compiler is needed; the
+//! same configuration and library give the same bytes.
 
+mod difference;
 mod documentation;
 pub mod library;
+pub mod merge;
 pub mod plugin;
 pub mod system;
 

@@ -12,7 +12,7 @@ fn help_of_the_program() {
 fn help_of_every_command() {
     let workshop = Workshop::new();
     let commands =
-        ["build", "campaign", "check", "demo", "inspect", "replay", "reproduce", "run", "validate"];
+        ["build", "campaign", "check", "demo", "inspect", "merge", "replay", "reproduce", "run", "validate"];
     for command in commands {
         assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
     }

@@ -74,6 +74,12 @@ fn refused(fmu: &[u8], rule: &str, message: &str) {
         ran.code == 1 && ran.stderr.starts_with("error: c (x.fmu): ") && ran.stderr.contains(message),
         "{ran:#?}"
     );
+    let merged = punctual(&workshop, &["merge", "x.fmu", "x.fmu", "-o", "y.fmu"]);
+    assert!(
+        merged.code == 1 && merged.stderr.starts_with("error: x.fmu: ") && merged.stderr.contains(message),
+        "{merged:#?}"
+    );
+    assert!(!workshop.files().contains(&"y.fmu".to_owned()), "{merged:#?}");
     let validated = punctual(&workshop, &["validate", "x.fmu"]);
     assert!(validated.code == 1 && validated.stdout.contains(&format!("[{rule}]")), "{validated:#?}");
     assert!(

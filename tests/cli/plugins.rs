@@ -7,6 +7,7 @@ use std::process::Command;
 use punctual::host::PLATFORM;
 use punctual_fmu::plugin_file_name;
 
+use crate::merging::{elsewhere, entries, for_other_processor, write};
 use crate::table::{Table, assert_same_bits};
 use crate::workshop::{Workshop, assert_golden, without_guids};
 
@@ -224,6 +225,9 @@ fn configurations_that_are_refused() {
         FILTER.replace("plugin = \"fixture\"", "plugin = \"fixture\", model = \"unicycle\""),
         FILTER.replace("plugin = \"fixture\"", "model = \"unicycle\", plugin_digest = \"1\""),
         format!("{head}plugin_digest = \"1\"\n{wall}"),
+        format!("{head}plugin_digest = {{ {PLATFORM} = \"1\", other = \"2\" }}\n{wall}"),
+        format!("{head}plugin_digest = {{ other = \"2\" }}\n{wall}"),
+        format!("{head}plugin_digest = {{ {PLATFORM} = 1 }}\n{wall}"),
         format!("{head}derivatives = {{ x = \"v\" }}\n{wall}"),
         format!("{head}l_r = 1.0\n{wall}"),
         format!("{head}states = [{{ name = \"x\" }}, {{ name = \"w\" }}]\n{wall}"),
@@ -251,7 +255,7 @@ fn configurations_that_are_refused() {
         told.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
     // Made from the bytes that the compiler wrote.
     let digest = told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
-    assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST"));
+    assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"));
 }
 
 /// Two compilations, two GUIDs; the same twice, the same bytes.
@@ -298,6 +302,57 @@ fn an_fmu_with_another_library_is_refused() {
         assert!(seen, "no {place}");
         let done = workshop.punctual(["run", "s.toml", "--out", "out"]);
         done.fails_like(1, "fmi2Instantiate of f (f.fmu) returned no instance", &[message]);
+    }
+}
+
+/// Libraries of two systems: each makes another GUID, unless the configuration has the digests of both.
+#[test]
+fn an_fmu_of_two_systems_has_the_digests_of_both() {
+    const OTHER: &str = "aarch64-linux";
+    let workshop = Workshop::with_library();
+    let file = plugin_file_name("fixture");
+    let build = |name: &str, macros: &[&str], digests: &str| {
+        fixture(&workshop, macros);
+        let digests = format!("\"fixture\"{digests}");
+        workshop.write("f.toml", FILTER.replacen("\"fixture\"", &digests, 1));
+        let done = workshop.punctual(["build", "f.toml", "-o", name]);
+        (workshop.bytes(&file), done)
+    };
+    let merge = || workshop.punctual(["merge", "here.fmu", "there.fmu", "-o", "both.fmu"]);
+    let (_, here) = build("here.fmu", &[], "");
+    let (theirs, there) = build("there.fmu", &["OWN_SINE"], "");
+    assert_ne!(here.success(), there.success());
+    let told = merge().stderr;
+    let advice = "; the GUID of an FMU with a plug-in is made from its library too: build with a plugin_digest for \
+                  every platform (docs/plugin.md)\n";
+    assert!(told.starts_with(
+        "error: there.fmu: cannot be merged: modelDescription.xml differs from here.fmu's: guid"
+    ));
+    assert!(told.ends_with(advice), "{told}");
+
+    // The digests stand in the messages of a build that has none.
+    let digest = |macros: &[&str]| {
+        let told = build("x.fmu", macros, &format!(", plugin_digest = {{ {OTHER} = \"\" }}")).1.stderr;
+        told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned()
+    };
+    let digests = format!(
+        ", plugin_digest = {{ {OTHER} = {:?}, {PLATFORM} = {:?} }}",
+        digest(&["OWN_SINE"]),
+        digest(&[])
+    );
+    build("here.fmu", &[], &digests).1.success();
+    let mut there = elsewhere(&entries(&workshop, "here.fmu"), OTHER, for_other_processor);
+    there.insert(format!("resources/{OTHER}/{file}"), theirs);
+    write(&workshop, "there.fmu", &there);
+    let done = merge();
+    assert_eq!(done.stderr, "");
+    assert!(
+        done.success()
+            .starts_with(&format!("both.fmu: filter for {OTHER} (there.fmu), {PLATFORM} (here.fmu)"))
+    );
+    let both = entries(&workshop, "both.fmu");
+    for platform in [OTHER, PLATFORM] {
+        assert!(both.contains_key(&format!("resources/{platform}/{file}")), "{:?}", both.keys());
     }
 }
 

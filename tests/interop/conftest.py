@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -12,12 +13,27 @@ MODELS = ["point_mass", "unicycle", "bicycle"]
 METHODS = ["repeated_root", "reference_profile"]
 
 
+def binary():
+    """The command line: PUNCTUAL or the release build."""
+    return os.environ.get("PUNCTUAL", str(ROOT / "target" / "release" / "punctual"))
+
+
 def punctual(*arguments, check=True, cwd=None):
-    """Runs the command line; the binary is PUNCTUAL or the release build."""
-    binary = os.environ.get("PUNCTUAL", ROOT / "target" / "release" / "punctual")
+    """Runs the command line."""
     return subprocess.run(
-        [str(binary), *map(str, arguments)], check=check, capture_output=True, text=True, cwd=cwd
+        [binary(), *map(str, arguments)], check=check, capture_output=True, text=True, cwd=cwd
     )
+
+
+def for_windows(here, there):
+    """Writes the FMU `here`, built on this system, as a build on Windows would be, but for the library."""
+    with zipfile.ZipFile(here) as source, zipfile.ZipFile(there, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name.startswith("binaries/"):
+                name = name.replace("linux64", "win64").replace(".so", ".dll")
+                content = b"stands for what a build on Windows makes"
+            target.writestr(name, content)
 
 
 @pytest.fixture(scope="session")

@@ -252,7 +252,10 @@ fn each_dependency_is_named_in_one_place() {
         (&["fmi_rs", ":", ":"], &["src/host/"]),
         (&["libloading", ":", ":"], &["src/host/", "fmu/src/abi/"]),
         (&["object", ":", ":"], &["src/validate/symbols.rs"]),
-        (&["roxmltree", ":", ":"], &["src/validate/", "src/host/description.rs"]),
+        (
+            &["roxmltree", ":", ":"],
+            &["src/validate/", "src/host/description.rs", "src/package/difference.rs"],
+        ),
         (&["plotters", ":", ":"], &["src/plot/"]),
         (&["indicatif", ":", ":"], &["src/output.rs"]),
         (&["parquet", ":", ":"], &["src/campaign/table.rs"]),

@@ -1,6 +1,6 @@
 //! The repository's own rules: which crate and module may use which, where unsafe code and printing
-//! stand, that examples parse, that formulas can be set and that documents agree with the program. Each
-//! rule is one test.
+//! stand, that examples parse, that formulas can be set, that documents agree with the program and versions
+//! with each other. Each rule is one test.
 
 mod dependencies;
 mod documents;
@@ -8,3 +8,4 @@ mod formulas;
 mod lexer;
 mod places;
 mod sources;
+mod versions;

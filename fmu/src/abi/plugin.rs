@@ -118,18 +118,21 @@ impl PluginLoader for PluginFolder {
     }
 }
 
-#[cfg(unix)]
 fn open(path: &Path) -> Result<Library, libloading::Error> {
-    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // Without a folder the system would look elsewhere.
-    let path = if path.parent() == Some(Path::new("")) { Path::new(".").join(path) } else { path.to_owned() };
+    if path.parent() == Some(Path::new("")) { open_at(&Path::new(".").join(path)) } else { open_at(path) }
+}
+
+#[cfg(unix)]
+fn open_at(path: &Path) -> Result<Library, libloading::Error> {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
     // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
     let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }?;
     Ok(library.into())
 }
 
 #[cfg(not(unix))]
-fn open(path: &Path) -> Result<Library, libloading::Error> {
+fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
     unsafe { Library::new(path) }
 }

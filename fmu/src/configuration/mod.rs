@@ -25,7 +25,7 @@ pub use integrator::IntegratorSection;
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
-pub use plugin::{Plugin, PluginLoader};
+pub use plugin::{Plugin, PluginDigest, PluginLoader};
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};

@@ -8,7 +8,7 @@ use punctual_models::Model;
 use serde::{Deserialize, Serialize};
 
 use super::external::check_inputs as check_external_inputs;
-use super::plugin::{Loaded, PluginLoader};
+use super::plugin::{Loaded, PluginDigest, PluginLoader};
 use super::{
     ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_identifier, check_unit,
 };
@@ -106,9 +106,9 @@ pub struct PlantSection {
     /// states, inputs and parameters are its own, and given here only to change ranges and values. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plugin: Option<String>,
-    /// What the plug-in's bytes must come to. Default: whatever they do.
+    /// What the plug-in's bytes must come to, on every platform or on each by its name. Default: whatever they do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plugin_digest: Option<String>,
+    pub plugin_digest: Option<PluginDigest>,
     #[serde(skip)]
     pub(super) loaded: Option<Loaded>,
     /// As [`ReferenceSection::l_r`].

@@ -4,11 +4,14 @@
 //! with a number made from the library's bytes; so variables and GUID follow from that as for any plant, and a
 //! library that is exchanged afterwards is noticed.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use punctual_modeldescription::PLATFORM;
 use punctual_models::evaluated::{Code, CodeModel, Dimensions};
+use serde::{Deserialize, Serialize};
 
 use super::model::check_variable;
 use super::{
@@ -35,6 +38,35 @@ pub struct Plugin {
     pub barriers: Vec<VariableSection>,
     /// The functions.
     pub code: Arc<dyn Code>,
+}
+
+/// What the bytes of a plug-in must come to.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "must be a text, or a table with a text for each platform")]
+pub enum PluginDigest {
+    /// On the platform that the FMU is built for.
+    One(String),
+    /// On each platform, by its name in FMI 2.0. The configuration is then the same on all of them, and so is the GUID.
+    Each(BTreeMap<String, String>),
+}
+
+impl PluginDigest {
+    /// Refuses a plug-in whose bytes come to something else on this platform.
+    fn check(&self, plugin: &Plugin) -> Result<(), ConfigurationError> {
+        let (file, found) = (&plugin.file, &plugin.digest);
+        let (field, wanted) = match self {
+            Self::One(wanted) => ("plant.plugin_digest".to_owned(), Some(wanted)),
+            Self::Each(wanted) => (format!("plant.plugin_digest.{PLATFORM}"), wanted.get(PLATFORM)),
+        };
+        let message = match wanted {
+            Some(wanted) if wanted == found => return Ok(()),
+            Some(wanted) => {
+                format!("is {wanted:?}, but {file} has {found:?}: it is not the file that this was made with")
+            }
+            None => format!("is not given, but {file} has {found:?}, and other platforms have theirs"),
+        };
+        Err(ConfigurationError::new(field, message))
+    }
 }
 
 /// Finds plug-ins by their names.
@@ -117,14 +149,7 @@ impl PlantSection {
         if let Err(error) = plugin.check() {
             return refuse(format!("{}: {error}", plugin.file));
         }
-        let given = self.plugin_digest.get_or_insert_with(|| plugin.digest.clone());
-        if *given != plugin.digest {
-            let message = format!(
-                "is {given:?}, but {} has {:?}: it is not the file that this was made with",
-                plugin.file, plugin.digest
-            );
-            return Err(ConfigurationError::new("plant.plugin_digest", message));
-        }
+        self.plugin_digest.get_or_insert_with(|| PluginDigest::One(plugin.digest.clone())).check(&plugin)?;
         merge("states", &mut self.states, &plugin.states)?;
         merge("inputs", &mut self.inputs, &plugin.inputs)?;
         merge_parameters(&mut self.parameters, &plugin.parameters)?;

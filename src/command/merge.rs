@@ -1,0 +1,96 @@
+//! `punctual merge`: equal FMUs from different systems become one.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::validate::seconds;
+use crate::error::Error;
+use crate::output;
+use crate::package::merge;
+use crate::validate::Severity;
+
+/// Arguments of `punctual merge`.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The .fmu files, two or more, equal but for their platforms' folders
+    #[arg(required = true, num_args = 2.., value_name = "FMU")]
+    files: Vec<PathBuf>,
+    /// The .fmu file to write; may be one of them
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+    /// How long the trial of the product may take, in seconds (0.01 to 86400)
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    time_limit: Duration,
+    /// Join the files only; nothing of the FMU is run
+    #[arg(long)]
+    no_trial: bool,
+}
+
+/// What `merge` tells, as JSON.
+#[derive(Serialize)]
+struct Told {
+    file: String,
+    model_name: String,
+    guid: String,
+    platforms: Vec<Platform>,
+    /// Errors that `validate` finds in the product and in what it was made from.
+    errors: usize,
+    left_out: Vec<String>,
+    not_examined: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Platform {
+    platform: String,
+    from: String,
+}
+
+/// Joins the FMUs and tries the product.
+///
+/// # Errors
+///
+/// As [`merge::merge`].
+pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
+    let limit = (!arguments.no_trial).then_some(arguments.time_limit);
+    let merged = merge::merge(&arguments.files, &arguments.output, limit)?;
+    let told = told(arguments, merged);
+    for folder in &told.left_out {
+        output::note(&format!("note: left out, since it is empty: {folder}"));
+    }
+    for skipped in &told.not_examined {
+        output::note(&format!("note: not examined: {skipped}"));
+    }
+    if told.errors > 0 {
+        let number = told.errors;
+        output::note(&format!("note: `punctual validate {}` finds errors ({number})", told.file));
+    }
+    if arguments.json {
+        output::json(&told);
+    } else {
+        let platforms = told.platforms.iter().map(|p| format!("{} ({})", p.platform, p.from));
+        let platforms = platforms.collect::<Vec<_>>().join(", ");
+        output::result(&format!("{}: {} for {platforms}, guid {}", told.file, told.model_name, told.guid));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn told(arguments: &Arguments, merged: merge::Merged) -> Told {
+    let merge::Merged { model_name, guid, platforms, left_out, report } = merged;
+    let platform =
+        |(platform, from): (String, PathBuf)| Platform { platform, from: from.display().to_string() };
+    Told {
+        file: arguments.output.display().to_string(),
+        model_name,
+        guid,
+        platforms: platforms.into_iter().map(platform).collect(),
+        errors: report.count(Severity::Error),
+        left_out,
+        not_examined: report.skipped,
+    }
+}

@@ -1,0 +1,235 @@
+//! FMUs of the same content, built on different systems, joined to one with the binaries of all.
+//!
+//! A platform's own are the folders `binaries/<platform>/` and, for the platforms that have one, `resources/<platform>/`,
+//! where plug-ins lie. All else must be the same in every FMU: the bytes of each file, and what the model description
+//! says.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use punctual_fmu::configuration::RESOURCE;
+use punctual_modeldescription as written;
+
+use super::difference;
+use crate::error::{Error, FmuProblem};
+use crate::host::Archive;
+use crate::validate::{self, Report, Severity};
+
+/// The greatest size of the product unpacked, in bytes: it is put together in memory.
+pub const MAX_MERGED_BYTES: u64 = 1 << 30;
+
+const MODEL_DESCRIPTION: &str = "modelDescription.xml";
+
+/// What was joined.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// The model's name.
+    pub model_name: String,
+    /// The GUID of all.
+    pub guid: String,
+    /// The platforms, sorted, each with the file that its binaries are from.
+    pub platforms: Vec<(String, PathBuf)>,
+    /// Folders without a file, which the product does not have.
+    pub left_out: Vec<String>,
+    /// What `validate` finds in the product.
+    pub report: Report,
+}
+
+/// One of the FMUs.
+struct Part {
+    archive: Archive,
+    description: String,
+    files: BTreeSet<String>,
+}
+
+/// `binaries/<platform>/` or `resources/<platform>/`.
+type Group<'a> = (&'a str, &'a str);
+
+impl Part {
+    fn open(path: &Path) -> Result<Self, Error> {
+        let archive = Archive::open(path)?;
+        let description = archive.model_description().map_err(|e| Error::fmu(path, e))?;
+        let files = archive.entries().iter().filter(|entry| !entry.ends_with('/')).cloned().collect();
+        Ok(Self { archive, description, files })
+    }
+
+    fn path(&self) -> &Path {
+        self.archive.source()
+    }
+
+    fn read(&self, entry: &str) -> Result<Vec<u8>, Error> {
+        std::fs::read(self.archive.path(entry)).map_err(|e| Error::io("read", &self.archive.path(entry), e))
+    }
+
+    fn size(&self, entry: &str) -> Result<u64, Error> {
+        let path = self.archive.path(entry);
+        Ok(std::fs::metadata(&path).map_err(|e| Error::io("read", &path, e))?.len())
+    }
+
+    /// Whether it was built by this program with a plug-in.
+    fn has_plugin(&self) -> bool {
+        let text = self.read(&format!("resources/{RESOURCE}")).unwrap_or_default();
+        String::from_utf8_lossy(&text).contains("\nplugin_digest = ")
+    }
+}
+
+fn unfit(path: &Path, reason: impl Into<String>) -> Error {
+    Error::fmu(path, FmuProblem::Unfit(reason.into()))
+}
+
+fn broken(path: &Path) -> impl Fn(written::Error) -> Error {
+    |e| Error::fmu(path, FmuProblem::Archive(e.to_string()))
+}
+
+/// The platform's folder that an entry is in, if it is in one.
+fn group<'a>(entry: &'a str, platforms: &BTreeSet<&str>) -> Option<Group<'a>> {
+    let (root, rest) = entry.split_once('/')?;
+    let (platform, _) = rest.split_once('/')?;
+    (["binaries", "resources"].contains(&root) && platforms.contains(platform)).then_some((root, platform))
+}
+
+/// Joins the FMUs at `paths` and writes the product to `file`, which may be one of them; then examines it as `validate`
+/// does. `limit` is the time of the trial, which there is where this system's platform is among those joined; `None`
+/// leaves it out, and nothing of an FMU is run. The order of `paths` changes no byte of the product.
+///
+/// # Errors
+///
+/// A file that cannot be read or written; FMUs that differ in more than their platforms, or in one that
+/// both have; a product that does not work. `file` is then as before.
+pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<Merged, Error> {
+    let parts = paths.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>()?;
+    let Some((first, others)) = parts.split_first() else {
+        return Err(Error::configuration("files", "are none, must be at least one"));
+    };
+    let platforms: BTreeSet<&str> =
+        parts.iter().flat_map(|part| part.archive.platforms()).map(String::as_str).collect();
+    let (model_name, guid) = compare_descriptions(first, others)?;
+    if let Some(part) = parts.iter().find(|part| part.archive.platforms().is_empty()) {
+        return Err(unfit(part.path(), "there is nothing in its binaries/"));
+    }
+    for other in others {
+        let common = |entry: &str| entry != MODEL_DESCRIPTION && group(entry, &platforms).is_none();
+        compare(first, other, "", common)?;
+    }
+    let mut owners: BTreeMap<Group<'_>, &Part> = BTreeMap::new();
+    for part in &parts {
+        let groups: BTreeSet<_> = part.files.iter().filter_map(|entry| group(entry, &platforms)).collect();
+        for own in groups {
+            let owner = *owners.entry(own).or_insert(part);
+            let context = format!("both are for {}, but ", own.1);
+            compare(owner, part, &context, |entry| group(entry, &platforms) == Some(own))?;
+        }
+    }
+    // Written in another way they say the same; one of them is taken, whatever the order.
+    let descriptions =
+        parts.iter().map(|part| part.read(MODEL_DESCRIPTION)).collect::<Result<Vec<_>, _>>()?;
+    let description = descriptions.into_iter().min().unwrap_or_default();
+    let mut total = description.len() as u64;
+    let mut product = written::Archive::new().with_timestamp(super::timestamp()?);
+    product.add(MODEL_DESCRIPTION, description).map_err(broken(first.path()))?;
+    for part in &parts {
+        for entry in part.files.iter().filter(|entry| *entry != MODEL_DESCRIPTION) {
+            let owner = group(entry, &platforms).and_then(|own| owners.get(&own).copied()).unwrap_or(first);
+            if !std::ptr::eq(owner, part) {
+                continue;
+            }
+            total = total.saturating_add(part.size(entry)?);
+            if total > MAX_MERGED_BYTES {
+                let what = "merged and unpacked, the archive would have";
+                let problem =
+                    FmuProblem::Limit { what, value: total, unit: "bytes", allowed: MAX_MERGED_BYTES };
+                return Err(Error::fmu(part.path(), problem));
+            }
+            product.add(entry, part.read(entry)?).map_err(broken(part.path()))?;
+        }
+    }
+    let empty = |folder: &&String| {
+        let all = parts.iter().flat_map(|part| &part.files);
+        folder.ends_with('/') && !all.clone().any(|entry| entry.starts_with(folder.as_str()))
+    };
+    let folders = parts.iter().flat_map(|part| part.archive.entries()).filter(empty);
+    let left_out: BTreeSet<String> = folders.cloned().collect();
+    let report = write(&product, file, limit)?;
+    let from = |platform: &str| owners.get(&("binaries", platform)).map(|part| part.path().to_owned());
+    let platforms = platforms.iter().filter_map(|&platform| Some((platform.to_owned(), from(platform)?)));
+    Ok(Merged {
+        model_name,
+        guid,
+        platforms: platforms.collect(),
+        left_out: left_out.into_iter().collect(),
+        report,
+    })
+}
+
+/// The name and GUID that all descriptions have, if they say the same.
+fn compare_descriptions(first: &Part, others: &[Part]) -> Result<(String, String), Error> {
+    let problem = |part: &Part, text| Error::fmu(part.path(), FmuProblem::Description(text));
+    let there = difference::parse(&first.description).map_err(|e| problem(first, e))?;
+    for other in others {
+        let here = difference::parse(&other.description).map_err(|e| problem(other, e))?;
+        let Some(difference) = difference::of(&here, &there) else { continue };
+        let plugins = difference.starts_with("guid ") && first.has_plugin() && other.has_plugin();
+        let advice = if plugins {
+            "; the GUID of an FMU with a plug-in is made from its library too: build with a plugin_digest for every \
+             platform (docs/plugin.md)"
+        } else {
+            ""
+        };
+        let reason =
+            format!("{MODEL_DESCRIPTION} differs from {}'s: {difference}{advice}", first.path().display());
+        return Err(unfit(other.path(), reason));
+    }
+    let attribute = |name| there.root_element().attribute(name).unwrap_or_default().to_owned();
+    Ok((attribute("modelName"), attribute("guid")))
+}
+
+/// Refuses `other` where one of the files that `belong` is not as in `first`.
+fn compare(first: &Part, other: &Part, context: &str, belong: impl Fn(&str) -> bool) -> Result<(), Error> {
+    let name = first.path().display();
+    let refuse = |text: String| Err(unfit(other.path(), format!("{context}{text}")));
+    for entry in first.files.union(&other.files).filter(|entry| belong(entry)) {
+        if !other.files.contains(entry) {
+            return refuse(format!("there is no {entry}, which {name} has"));
+        }
+        if !first.files.contains(entry) {
+            return refuse(format!("there is {entry}, which {name} has not"));
+        }
+        let (mine, theirs) = (other.read(entry)?, first.read(entry)?);
+        if mine != theirs {
+            let same = mine.iter().zip(&theirs).take_while(|(a, b)| a == b).count();
+            return refuse(format!(
+                "{entry} differs from {name}'s: {} bytes, there {}; byte {} is the first that differs",
+                mine.len(),
+                theirs.len(),
+                same + 1
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Writes the product beside `file`, examines it there, and puts it in the place of `file`.
+fn write(product: &written::Archive, file: &Path, limit: Option<Duration>) -> Result<Report, Error> {
+    let bytes = product.to_bytes().map_err(broken(file))?;
+    let failed = |e| Error::io("write", file, e);
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let place = tempfile::Builder::new().prefix(".punctual-").tempdir_in(folder).map_err(failed)?;
+    let draft = place.path().join("product.fmu");
+    std::fs::write(&draft, bytes).map_err(failed)?;
+    let mut report = validate::validate(&draft, limit)?;
+    for finding in &mut report.findings {
+        let (from, to) = (draft.display().to_string(), file.display().to_string());
+        finding.message = finding.message.replace(&from, &to);
+    }
+    // What else is wrong was wrong before; these are what joining, or this system's library, may have broken.
+    let rules = ["archive.readable", "archive.name", "archive.limit", "trial."];
+    let fatal = report.findings.iter().find(|finding| {
+        finding.severity == Severity::Error && rules.iter().any(|rule| finding.rule.starts_with(rule))
+    });
+    if let Some(finding) = fatal {
+        return Err(unfit(file, format!("the product does not work here: {}", finding.message)));
+    }
+    std::fs::rename(&draft, file).map_err(failed)?;
+    Ok(report)
+}
