@@ -50,7 +50,7 @@ pub(crate) fn elsewhere(entries: &Entries, platform: &str, edit: impl Fn(&mut Ve
 }
 
 /// Makes an ELF library one of [`OTHER`]: the processor stands in bytes 18 and 19.
-pub(crate) fn for_other_processor(library: &mut Vec<u8>) {
+pub(crate) fn for_other_processor(library: &mut [u8]) {
     assert!(library.starts_with(b"\x7fELF"), "this test makes a library of Linux one for another processor");
     library[18..20].copy_from_slice(&[183, 0]);
 }
@@ -60,7 +60,7 @@ fn two_systems() -> Workshop {
     let workshop = Workshop::with_fmus();
     let here = entries(&workshop, "filter.fmu");
     write(&workshop, "here.fmu", &here);
-    write(&workshop, "there.fmu", &elsewhere(&here, OTHER, for_other_processor));
+    write(&workshop, "there.fmu", &elsewhere(&here, OTHER, |bytes| for_other_processor(bytes)));
     workshop
 }
 
@@ -218,7 +218,7 @@ fn a_product_that_does_not_work_takes_no_place() {
     let workshop = Workshop::new();
     misbehaving::write(&workshop, "a.fmu", description("crash-in-enter", &[]), &misbehaving::library(&[]));
     let library = misbehaving::library(&[]);
-    let other = elsewhere(&entries(&workshop, "a.fmu"), OTHER, for_other_processor);
+    let other = elsewhere(&entries(&workshop, "a.fmu"), OTHER, |bytes| for_other_processor(bytes));
     write(&workshop, "b.fmu", &other);
     workshop.write("both.fmu", "as before");
     let merge = ["merge", "a.fmu", "b.fmu", "-o", "both.fmu"];

@@ -341,7 +341,7 @@ fn an_fmu_of_two_systems_has_the_digests_of_both() {
         digest(&[])
     );
     build("here.fmu", &[], &digests).1.success();
-    let mut there = elsewhere(&entries(&workshop, "here.fmu"), OTHER, for_other_processor);
+    let mut there = elsewhere(&entries(&workshop, "here.fmu"), OTHER, |bytes| for_other_processor(bytes));
     there.insert(format!("resources/{OTHER}/{file}"), theirs);
     write(&workshop, "there.fmu", &there);
     let done = merge();
