@@ -83,9 +83,9 @@ fn array<T: Element + Copy>(
     }
     let array = array.try_readonly()?;
     match array.as_slice() {
-        Ok(values) => into.copy_from_slice(values),
-        // Not contiguous: in the order of the indices.
-        Err(_) => into.iter_mut().zip(array.as_array().iter()).for_each(|(to, from)| *to = *from),
+        // A slice of Fortran's order is another one.
+        Ok(values) if array.is_c_contiguous() => into.copy_from_slice(values),
+        _ => into.iter_mut().zip(array.as_array().iter()).for_each(|(to, from)| *to = *from),
     }
     Ok(())
 }

@@ -23,7 +23,8 @@ def test_a_dict_and_a_file_of_the_same_content_make_the_same_fmu(tmp_path):
             # What configurations come from in programs.
             {"name": "goal", "centre": np.array([45, 45.0]), "radius": np.float64(2.0), "deadline": 10, "margin": 0.02}
         ],
-        "bounds": {"a": (-20.0, np.int64(20))},
+        "bounds": {},
+        "experiment": {"stop_time": np.int64(20), "step_size": 0.001},
     }
     paths = punctual.build(file, tmp_path / "a.fmu"), punctual.build(text, str(tmp_path / "b.fmu"))
     assert paths == (tmp_path / "a.fmu", tmp_path / "b.fmu")
@@ -49,7 +50,7 @@ def test_a_refused_dict_is_told_without_a_file_name(tmp_path):
     (tmp_path / "filter.toml").write_text("kind = 1\n")
     with pytest.raises(punctual.Error, match="filter.toml: kind: "):
         punctual.build(tmp_path / "filter.toml", tmp_path / "filter.fmu")
-    with pytest.raises(TypeError, match=r"plant.parameters\[0\].start: is {1}, must be a number"):
+    with pytest.raises(TypeError, match=r"plant.parameters\[0\].start: is \{1\}, must be a number"):
         punctual.build({"plant": {"parameters": [{"start": {1}}]}}, tmp_path / "filter.fmu")
 
 
