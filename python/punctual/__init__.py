@@ -12,7 +12,7 @@ from ._enumerations import Phase, Status
 from ._error import Error
 from ._fmu import Variable, build, check, variables
 from ._punctual import BarrierReport, Filter, FilterBatch, Step, __version__
-from ._simulate import Nominal, simulate
+from ._simulate import simulate
 
 __all__ = [
     "BarrierReport",
@@ -20,7 +20,6 @@ __all__ = [
     "Error",
     "Filter",
     "FilterBatch",
-    "Nominal",
     "Phase",
     "Status",
     "Step",

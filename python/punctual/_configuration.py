@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import tomli_w
 
-Configuration: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any]"
+Configuration: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
 
 
 def toml_text(configuration: Mapping[str, Any]) -> str:

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from ._configuration import Configuration
 from ._enumerations import Phase, Status
 
+__all__ = ["BarrierReport", "Filter", "FilterBatch", "Step", "__version__"]
+
 __version__: str
 
 @final

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Term: TypeAlias = "tuple[str, float] | tuple[str, float, float]"
-Nominal: TypeAlias = "Mapping[str, Term] | Callable[[float, NDArray[np.float64]], Sequence[float] | NDArray[np.float64]]"
+    _Term: TypeAlias = tuple[str, float] | tuple[str, float, float]
+    _Vector: TypeAlias = NDArray[np.float64]
+    _Nominal: TypeAlias = Mapping[str, _Term] | Callable[[float, _Vector], Sequence[float] | _Vector]
 
 _WHOLE = 1e-6  # steps by which an experiment may differ from a whole number of them, as in `punctual run`
 
@@ -29,7 +30,7 @@ def simulate(
     stop_time: float,
     step_size: float,
     start: Mapping[str, float] | None = None,
-    nominal: Nominal | None = None,
+    nominal: _Nominal | None = None,
     parameters: Mapping[str, float] | None = None,
     record: Sequence[str] | None = None,
 ) -> NDArray[np.void]:
@@ -131,19 +132,19 @@ class _Pair:
         others = [n for n in gives if n not in connected]
         parts = [others, connected, self.wanted, seen, driving]
         ends = list(accumulate(map(len, parts), initial=0))
-        self.reals = numpy.zeros(ends[-1])
+        self.values = (ctypes.c_double * ends[-1])()
+        self.reals = numpy.ctypeslib.as_array(self.values)
         names = list(chain(*parts))
         owners = [plant] * ends[2] + [own] * (ends[5] - ends[2])
         self.slots = {(owner, name): i for i, (owner, name) in enumerate(zip(owners, names))}
         self.x, self.u_ref = self.reals[ends[1] : ends[2]], slice(ends[2], ends[3])
         self.x.flags.writeable = False
-        self.values = (ctypes.c_double * ends[-1]).from_buffer(self.reals)
         for name in self.wanted:
             self.values[self.slots[own, name]] = starts[0].get(name, float(own.variables[name].start or 0.0))
 
         def stretch(function: str, slave: Slave, first: int, last: int) -> list[Call]:
             moved = names[ends[first] : ends[last]]
-            at = (ctypes.c_double * len(moved)).from_buffer(self.reals, 8 * ends[first]) if moved else None
+            at = (ctypes.c_double * len(moved)).from_buffer(self.values, 8 * ends[first]) if moved else None
             return slave.moved(function, moved, at)
 
         self.give = stretch("fmi2GetReal", plant, 0, 2)
@@ -158,16 +159,17 @@ class _Pair:
 
         kinds = [(slave, kind) for slave in (self.own, self.plant) for kind in ("Integer", "Boolean")]
         groups = [[n for o, n in self.columns.values() if o is slave and slave.kind(n) == kind] for slave, kind in kinds]
-        self.numbers = numpy.zeros(sum(map(len, groups)), numpy.int32)
+        memory = (ctypes.c_int * sum(map(len, groups)))()
+        self.numbers = numpy.ctypeslib.as_array(memory)
         at = 0
         for (slave, kind), group in zip(kinds, groups):
             self.slots |= {(slave, name): at + i for i, name in enumerate(group)}
             if group:
-                values = (ctypes.c_int * len(group)).from_buffer(self.numbers, 4 * at)
+                values = (ctypes.c_int * len(group)).from_buffer(memory, 4 * at)
                 (self.answer if slave is self.own else self.give).extend(slave.moved(f"fmi2Get{kind}", group, values))
             at += len(group)
 
-    def wish(self, nominal: Nominal | None) -> None:
+    def wish(self, nominal: _Nominal | None) -> None:
         """Makes `self.want(t)`, which writes u_ref."""
         values, x, place = self.values, self.x, self.u_ref
         if callable(nominal):
@@ -175,7 +177,7 @@ class _Pair:
             def function(t: float) -> None:
                 wanted = nominal(t, x)
                 try:
-                    values[place] = wanted
+                    values[place] = list(wanted)
                 except (TypeError, ValueError):
                     names = ", ".join(self.wanted)
                     raise Error(f"nominal: is {wanted!r} at t = {t:g} s, must be numbers for {names}") from None
