@@ -3,15 +3,15 @@
 use std::sync::{Mutex, PoisonError};
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use punctual_fmu::configuration::FilterConfiguration;
 use rayon::prelude::*;
 
 use crate::loading::{Interface, Signals, configuration, refused};
-use crate::{arrays, pool};
 use crate::sample::{Loop, Memory};
+use crate::{arrays, pool};
 
 /// Rows go to threads in parts of equal size; more of them than threads, since some rows take longer than others.
 const PARTS_PER_THREAD: usize = 4;

@@ -3,10 +3,10 @@
 use std::fmt::Display;
 use std::path::PathBuf;
 
-use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use punctual_fmu::PluginFolder;
 use punctual_fmu::configuration::{Configuration, ConfigurationError, FilterConfiguration};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 pyo3::import_exception!(punctual._error, Error);
 

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
+use punctual_core::filter::{self, Phase, Report, Status};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
-use punctual_core::filter::{self, Phase, Report, Status};
 
 /// `punctual.Status` and `punctual.Phase`, once they were asked for.
 static STATUS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

@@ -1,8 +1,8 @@
 //! One loop: a filter, and all that it remembers between samples.
 
-use pyo3::prelude::*;
 use punctual_core::filter::{FilterState, Integrator, Report, SafetyFilter};
 use punctual_fmu::configuration::FilterConfiguration;
+use pyo3::prelude::*;
 
 use crate::loading::refused;
 
