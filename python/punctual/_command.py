@@ -24,7 +24,10 @@ def run_cli(*arguments: str | os.PathLike[str]) -> str:
 def run(arguments: tuple[str | os.PathLike[str], ...], accepted: tuple[int, ...]) -> str:
     """As `run_cli`, with a choice of exit codes that are no error."""
     words = [os.fspath(argument) for argument in arguments]
-    done = subprocess.run([_PROGRAM, *words], capture_output=True, encoding="utf-8")
+    try:
+        done = subprocess.run([_PROGRAM, *words], capture_output=True, encoding="utf-8")
+    except FileNotFoundError:
+        raise Error(f"{_PROGRAM}: there is no such file; python/wheel makes the package with it") from None
     if done.returncode in accepted:
         return done.stdout
     # What it noted before is no part of the reason.

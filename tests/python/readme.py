@@ -5,8 +5,10 @@ import re
 import tempfile
 from pathlib import Path
 
-readme = Path(__file__).resolve().parents[2].joinpath("README.md").read_text(encoding="utf-8")
-[example] = re.findall(r"```python\n(import punctual\n.*?)```", readme, re.DOTALL)
+root = Path(__file__).resolve().parents[2]
+texts = [(root / name).read_text(encoding="utf-8") for name in ["README.md", "python/README.md"]]
+[example], [shown] = (re.findall(r"```python\n(import punctual\n.*?)```", text, re.DOTALL) for text in texts)
+assert example == shown, "the wheel's page shows another example"
 lines = [line for line in example.splitlines() if line.strip()]
 assert len(lines) < 10, f"{len(lines)} lines, must be under ten"
 with tempfile.TemporaryDirectory() as folder:
