@@ -32,6 +32,10 @@ fn main() {
     {
         return;
     }
+    // Zig (release/portable) links against the old version itself, and refuses the arguments below.
+    if env::var("RUSTC_LINKER").is_ok_and(|linker| linker.contains("zigcc")) {
+        return;
+    }
     println!("cargo::rustc-cfg=old_glibc");
     for name in NEWER {
         println!("cargo::rustc-cdylib-link-arg=-Wl,--wrap={name}");

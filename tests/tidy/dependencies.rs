@@ -32,6 +32,7 @@ fn crates_depend_on_crates_below_them_only() {
         ("modeldescription/Cargo.toml", &[]),
         ("models/Cargo.toml", &["punctual-core"]),
         ("fmu/Cargo.toml", &["punctual-core", "punctual-modeldescription", "punctual-models"]),
+        ("python/Cargo.toml", &["punctual-core", "punctual-fmu"]),
         // The models for a benchmark only.
         ("Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription", "punctual-models"]),
     ];
@@ -57,6 +58,8 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         ("clap", &["Cargo.toml"]),
         ("fmi-rs", &["Cargo.toml"]),
         ("object", &["Cargo.toml"]),
+        ("pyo3", &["python/Cargo.toml"]),
+        ("numpy", &["python/Cargo.toml"]),
         ("roxmltree", &["Cargo.toml"]),
     ];
     for path in [
@@ -65,6 +68,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         "modeldescription/Cargo.toml",
         "models/Cargo.toml",
         "fmu/Cargo.toml",
+        "python/Cargo.toml",
     ] {
         let dependencies = manifest(path).dependencies;
         for (name, owners) in owners {
@@ -210,6 +214,15 @@ fn modules_of_the_models_use_modules_above_them() {
     Order { folder: "models/src/", lines: documented, excepted: &[] }.check();
 }
 
+/// The order of the table in python/src/lib.rs.
+#[test]
+fn modules_of_the_python_module_use_modules_above_them() {
+    let documented = documented("python/src/lib.rs", |line| {
+        Some(line.strip_prefix("//! | `")?.split('`').next()?.to_owned())
+    });
+    Order { folder: "python/src/", lines: documented, excepted: &[] }.check();
+}
+
 /// The order of the list in src/lib.rs.
 #[test]
 fn modules_of_the_command_line_use_modules_above_them() {
@@ -260,7 +273,12 @@ fn each_dependency_is_named_in_one_place() {
         (&["indicatif", ":", ":"], &["src/output.rs"]),
         (&["parquet", ":", ":"], &["src/campaign/table.rs"]),
         (&["rand_chacha", ":", ":"], &["src/campaign/sampling.rs"]),
-        (&["rayon", ":", ":"], &["src/campaign/runner.rs", "src/reproduce/"]),
+        (
+            &["rayon", ":", ":"],
+            &["src/campaign/runner.rs", "src/reproduce/", "python/src/pool.rs", "python/src/batch.rs"],
+        ),
+        (&["pyo3", ":", ":"], &["python/src/"]),
+        (&["numpy", ":", ":"], &["python/src/arrays.rs", "python/src/batch.rs", "python/src/report.rs"]),
         (&["statrs", ":", ":"], &["src/campaign/distribution.rs"]),
         (&["ctrlc", ":", ":"], &["src/command/campaign.rs"]),
     ];

@@ -9,6 +9,7 @@ fn every_crate_root_speaks_on_unsafe_code() {
         ("modeldescription/src/lib.rs", "forbid"),
         ("models/src/lib.rs", "forbid"),
         ("fmu/src/lib.rs", "deny"),
+        ("python/src/lib.rs", "forbid"),
         ("src/lib.rs", "deny"),
         ("src/main.rs", "deny"),
     ];

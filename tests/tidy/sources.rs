@@ -57,9 +57,9 @@ pub(crate) static SOURCES: LazyLock<Vec<Source>> = LazyLock::new(|| {
     rust.map(|text| Source { path: text.path.clone(), lexed: lex(&text.text) }).collect()
 });
 
-/// The Rust files of the five crates themselves.
+/// The Rust files of the six crates themselves.
 pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
-    let folders = ["src/", "core/src/", "modeldescription/src/", "models/src/", "fmu/src/"];
+    let folders = ["src/", "core/src/", "modeldescription/src/", "models/src/", "fmu/src/", "python/src/"];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))
 }
 
@@ -68,8 +68,9 @@ fn walk(folder: &Path, texts: &mut Vec<Text>) {
         let path: PathBuf = entry.expect("a readable entry").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         // What .gitignore names, and the repository's own data.
-        let skipped = ["target", ".venv", "out", "__pycache__", ".pytest_cache", ".git"].contains(&&*name);
-        if skipped || path.is_symlink() {
+        let skipped =
+            ["target", ".venv", ".venv-release", "_bin", "out", "__pycache__", ".pytest_cache", ".git"];
+        if skipped.contains(&&*name) || path.is_symlink() {
             continue;
         }
         if path.is_dir() {

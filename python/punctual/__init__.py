@@ -1,0 +1,33 @@
+"""A safety filter that gets a system into its safe set by a deadline and keeps it there.
+
+- `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` says what a configuration
+  comes to, `simulate` couples a filter FMU with a plant FMU in FMPy.
+- `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI.
+- `run_cli` runs the command line, which is installed as `punctual` too.
+"""
+
+from ._command import run_cli
+from ._configuration import Configuration
+from ._enumerations import Phase, Status
+from ._error import Error
+from ._fmu import Variable, build, check, variables
+from ._punctual import BarrierReport, Filter, FilterBatch, Step, __version__
+from ._simulate import simulate
+
+__all__ = [
+    "BarrierReport",
+    "Configuration",
+    "Error",
+    "Filter",
+    "FilterBatch",
+    "Phase",
+    "Status",
+    "Step",
+    "Variable",
+    "__version__",
+    "build",
+    "check",
+    "run_cli",
+    "simulate",
+    "variables",
+]

@@ -1,0 +1,43 @@
+"""The command line that this package carries, with the shared library of every FMU beside it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+from ._error import Error
+
+_PROGRAM = Path(__file__).with_name("_bin") / ("punctual.exe" if sys.platform == "win32" else "punctual")
+
+
+def run_cli(*arguments: str | os.PathLike[str]) -> str:
+    """Runs the command line, such as `run_cli("run", "system.toml", "--json")`; returns what it prints.
+
+    Raises `Error` with its words where it ends with another exit code than 0.
+    """
+    return run(arguments, accepted=(0,))
+
+
+def run(arguments: tuple[str | os.PathLike[str], ...], accepted: tuple[int, ...]) -> str:
+    """As `run_cli`, with a choice of exit codes that are no error."""
+    words = [os.fspath(argument) for argument in arguments]
+    try:
+        done = subprocess.run([_PROGRAM, *words], capture_output=True, encoding="utf-8")
+    except FileNotFoundError:
+        raise Error(f"{_PROGRAM}: there is no such file; python/wheel makes the package with it") from None
+    if done.returncode in accepted:
+        return done.stdout
+    # What it noted before is no part of the reason.
+    _, _, reason = f"\n{done.stderr}".partition("\nerror: ")
+    raise Error((reason or done.stderr or done.stdout).strip() or f"exit code {done.returncode}")
+
+
+def main() -> NoReturn:
+    """The console command `punctual`: becomes the program."""
+    words = [str(_PROGRAM), *sys.argv[1:]]
+    if sys.platform == "win32":
+        sys.exit(subprocess.run(words).returncode)
+    os.execv(_PROGRAM, words)

@@ -1,0 +1,41 @@
+"""Numbers that leave a filter, by their names: the enumerations of the filter FMU."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How a step ended, and so what its input means."""
+
+    UNCHANGED = 0
+    """u_ref satisfies every constraint and is passed through, bit for bit."""
+    FILTERED = 1
+    """u is the safe input nearest to u_ref."""
+    INFEASIBLE = 2
+    """Not possible within the input bounds: the input of least violation."""
+    DEGENERATE = 3
+    """The barrier cannot be influenced at this state: the input of least violation, or the best that was found."""
+    INVALID_INPUT = 4
+    """Time, state or u_ref is not a number or infinite: the admissible input nearest 0."""
+    SINGULAR = 5
+    """The model is not finite at this state: the admissible input nearest 0."""
+    WRONG_RELATIVE_DEGREE = 6
+    """An input enters a derivative of h too early, so the constraint would be wrong: the input nearest 0."""
+    SOLVER_FAILED = 7
+    """The solver did not converge: u_ref within its bounds."""
+
+
+class Phase(IntEnum):
+    """Where a barrier stands with its promise."""
+
+    WAITING = 0
+    """No step with valid inputs yet, or not begun."""
+    APPROACH = 1
+    """On the way, before the deadline."""
+    LATE = 2
+    """The deadline passed outside; the approach goes on."""
+    STAY = 3
+    """Inside, and kept there."""
+    LEFT = 4
+    """Outside again; pulled back without a deadline."""
+    RELEASED = 5
+    """Let go: nothing is asked any more."""

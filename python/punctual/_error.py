@@ -1,0 +1,5 @@
+"""The one exception of this package."""
+
+
+class Error(ValueError):
+    """What was refused, with the field, the value and what is allowed; or an FMI call that failed."""

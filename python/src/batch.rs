@@ -1,0 +1,206 @@
+//! `FilterBatch`: many loops of one configuration, a row of the arrays each.
+
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use punctual_fmu::configuration::FilterConfiguration;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use crate::loading::{Interface, Signals, configuration, refused};
+use crate::sample::{Loop, Memory};
+use crate::{arrays, pool};
+
+/// Rows go to threads in parts of equal size; more of them than threads, since some rows take longer than others.
+const PARTS_PER_THREAD: usize = 4;
+
+/// The fewest rows of a part: fewer are done before another thread wakes up.
+const LEAST_ROWS: usize = 16;
+
+/// Safe inputs, statuses and h, row after row.
+type Rows<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<f64>>);
+
+/// `n` independent loops with filters of one configuration, each with its own memory: row i of every array belongs
+/// to loop i, and gives the same bits as a `Filter` of its own would.
+///
+/// `configuration` is as for `Filter`; `n` >= 1. Rows are computed on all cores (`RAYON_NUM_THREADS`: on so many)
+/// without the interpreter's lock.
+#[pyclass(module = "punctual")]
+pub(crate) struct FilterBatch {
+    configuration: FilterConfiguration,
+    interface: Interface,
+    memories: Vec<Memory>,
+    fresh: Memory,
+    /// One for each part; what it remembers is put there before each row.
+    // A lock for the compiler's sake: Python lends the object to one call at a time.
+    loops: Mutex<Vec<Loop>>,
+    x: Vec<f64>,
+    u_ref: Vec<f64>,
+}
+
+#[pymethods]
+impl FilterBatch {
+    #[new]
+    fn new(configuration: &Bound<'_, PyAny>, n: usize) -> PyResult<Self> {
+        if n == 0 {
+            return Err(PyValueError::new_err("n: is 0, must be >= 1"));
+        }
+        let configuration = self::configuration(configuration)?;
+        let interface = Interface::of(&configuration);
+        let own = Loop::new(&configuration)?;
+        let fresh = own.memory();
+        Ok(Self {
+            memories: vec![fresh.clone(); n],
+            fresh,
+            loops: Mutex::new(vec![own]),
+            x: vec![0.0; n * interface.states.len()],
+            u_ref: vec![0.0; n * interface.inputs.len()],
+            configuration,
+            interface,
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.memories.len()
+    }
+
+    /// What the columns of `x` are: name to unit.
+    #[getter]
+    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.states.dict(py)
+    }
+
+    /// What the columns of `u` and `u_ref` are: name to unit.
+    #[getter]
+    fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.inputs.dict(py)
+    }
+
+    /// What the columns of `h` are: name to unit.
+    #[getter]
+    fn barriers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.barriers.dict(py)
+    }
+
+    /// Computes the safe inputs of all loops at time `t` (s) and remembers the samples.
+    ///
+    /// - `x`: the states, an array of float64 of shape (n, states).
+    /// - `u_ref`: the inputs wanted, of shape (n, inputs). Default: zeros.
+    ///
+    /// Returns `u` of shape (n, inputs), the numbers of the statuses (`punctual.Status`) of shape (n,) and `h` of shape
+    /// (n, barriers). Raises `TypeError` or `ValueError` for an array of another type or shape.
+    #[pyo3(signature = (t, x, u_ref=None))]
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        t: f64,
+        x: &Bound<'py, PyAny>,
+        u_ref: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Rows<'py>> {
+        let n = self.memories.len();
+        let Interface { states, inputs, barriers } = &self.interface;
+        arrays::matrix(x, "x", n, &states.names, &mut self.x)?;
+        match u_ref {
+            Some(u_ref) => arrays::matrix(u_ref, "u_ref", n, &inputs.names, &mut self.u_ref)?,
+            None => self.u_ref.fill(0.0),
+        }
+        let threads = pool::threads(py)?;
+        let most = PARTS_PER_THREAD * threads.current_num_threads();
+        let rows = n.div_ceil(most).max(LEAST_ROWS);
+        let loops = self.loops.get_mut().unwrap_or_else(PoisonError::into_inner);
+        while loops.len() < n.div_ceil(rows) {
+            loops.push(Loop::new(&self.configuration)?);
+        }
+        let [nx, nu, nb] = [states, inputs, barriers].map(Signals::len);
+        let (mut u, mut statuses, mut h) = (vec![0.0; n * nu], vec![0; n], vec![0.0; n * nb]);
+        let given = self.x.chunks(rows * nx).zip(self.u_ref.chunks(rows * nu));
+        let said = u.chunks_mut(rows * nu).zip(statuses.chunks_mut(rows)).zip(h.chunks_mut(rows * nb));
+        let mut parts: Vec<_> = (loops.iter_mut().zip(self.memories.chunks_mut(rows)))
+            .zip(given.zip(said))
+            .map(|((own, memories), ((x, u_ref), ((u, statuses), h)))| Part {
+                own,
+                memories,
+                x,
+                u_ref,
+                u,
+                statuses,
+                h,
+            })
+            .collect();
+        let done = py.detach(|| match &mut parts[..] {
+            [one] => one.step(t),
+            parts => threads.install(|| parts.par_iter_mut().try_for_each(|part| part.step(t))),
+        });
+        done.map_err(|e| refused(&e))?;
+        let (u, h) = (u.into_pyarray(py).reshape([n, nu])?, h.into_pyarray(py).reshape([n, nb])?);
+        Ok((u, statuses.into_pyarray(py), h))
+    }
+
+    /// Starts every deadline anew at the next step, of all loops or of those where `rows`, an array of bool of shape
+    /// (n,), is true.
+    #[pyo3(signature = (rows=None))]
+    fn rearm(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let chosen = self.chosen(rows)?;
+        let own = &mut self.loops.get_mut().unwrap_or_else(PoisonError::into_inner)[0];
+        for (memory, _) in self.memories.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+            own.restore(memory).map_err(|e| refused(&e))?;
+            own.rearm();
+            own.save(memory);
+        }
+        Ok(())
+    }
+
+    /// Forgets every sample, of all loops or of those where `rows`, an array of bool of shape (n,), is true. Other
+    /// than `rearm`, this sets an integrated input back too.
+    #[pyo3(signature = (rows=None))]
+    fn reset(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let chosen = self.chosen(rows)?;
+        for (memory, _) in self.memories.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+            memory.clone_from(&self.fresh);
+        }
+        Ok(())
+    }
+}
+
+impl FilterBatch {
+    /// Which rows a mask chooses; without one, all.
+    fn chosen(&self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<bool>> {
+        let n = self.memories.len();
+        let mut chosen = vec![true; n];
+        if let Some(rows) = rows {
+            arrays::mask(rows, "rows", &mut chosen)?;
+        }
+        Ok(chosen)
+    }
+}
+
+/// Rows that one loop computes, one after the other.
+struct Part<'a> {
+    own: &'a mut Loop,
+    memories: &'a mut [Memory],
+    x: &'a [f64],
+    u_ref: &'a [f64],
+    u: &'a mut [f64],
+    statuses: &'a mut [i32],
+    h: &'a mut [f64],
+}
+
+impl Part<'_> {
+    fn step(&mut self, t: f64) -> Result<(), punctual_core::Error> {
+        let n = self.memories.len();
+        let [nx, nu, nb] = [self.x.len(), self.u.len(), self.h.len()].map(|all| all / n);
+        for (i, memory) in self.memories.iter_mut().enumerate() {
+            let (x, u_ref) = (&self.x[i * nx..][..nx], &self.u_ref[i * nu..][..nu]);
+            self.own.restore(memory)?;
+            let report = self.own.step(t, x, u_ref, &mut self.u[i * nu..][..nu])?;
+            self.statuses[i] = report.status as i32;
+            for (h, barrier) in self.h[i * nb..].iter_mut().zip(&report.barriers) {
+                *h = barrier.h;
+            }
+            self.own.save(memory);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,107 @@
+//! `Filter`: one loop.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays;
+use crate::loading::{Interface, configuration, refused};
+use crate::report::Step;
+use crate::sample::{Loop, Memory};
+
+/// A safety filter in this process: what the filter FMU of the same configuration computes, sample by sample, with
+/// the same bits.
+///
+/// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. A plug-in is
+/// loaded from the folder of the file (of a dict: from the current folder), without the trial in a process of its
+/// own that `punctual.check` makes.
+///
+/// Raises `punctual.Error` for a configuration that cannot be used, with the field, the value and what is allowed.
+#[pyclass(module = "punctual")]
+pub(crate) struct Filter {
+    interface: Interface,
+    names: Arc<[String]>,
+    // A lock for the compiler's sake: Python lends the object to one call at a time.
+    own: Mutex<Loop>,
+    fresh: Memory,
+    x: Vec<f64>,
+    u_ref: Vec<f64>,
+    u: Vec<f64>,
+}
+
+#[pymethods]
+impl Filter {
+    #[new]
+    fn new(configuration: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let configuration = self::configuration(configuration)?;
+        let interface = Interface::of(&configuration);
+        let own = Loop::new(&configuration)?;
+        let (states, inputs) = (interface.states.len(), interface.inputs.len());
+        Ok(Self {
+            names: interface.barriers.names.clone().into(),
+            fresh: own.memory(),
+            own: Mutex::new(own),
+            x: vec![0.0; states],
+            u_ref: vec![0.0; inputs],
+            u: vec![0.0; inputs],
+            interface,
+        })
+    }
+
+    /// What `x` consists of, in order: name to unit. The measured states, then the inputs of barriers.
+    #[getter]
+    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.states.dict(py)
+    }
+
+    /// What `u` and `u_ref` consist of, in order: name to unit.
+    #[getter]
+    fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.inputs.dict(py)
+    }
+
+    /// The barriers in order: name to unit of h.
+    #[getter]
+    fn barriers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.interface.barriers.dict(py)
+    }
+
+    /// Computes the safe input at time `t` (s) and remembers the sample. Deadlines count from the first step; the
+    /// sampling period is the time between steps, at first `experiment.step_size`.
+    ///
+    /// - `x`: the state in the order of `states`, an array of float64 or a sequence of numbers.
+    /// - `u_ref`: the input wanted, in the order of `inputs`. Default: zeros.
+    ///
+    /// Raises `TypeError` or `ValueError` for an array of another type or shape. Numerical outcomes (infeasible,
+    /// not a number) are the status.
+    #[pyo3(signature = (t, x, u_ref=None))]
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        t: f64,
+        x: &Bound<'_, PyAny>,
+        u_ref: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Step> {
+        let Interface { states, inputs, .. } = &self.interface;
+        arrays::vector(x, "x", &states.names, &mut self.x)?;
+        match u_ref {
+            Some(u_ref) => arrays::vector(u_ref, "u_ref", &inputs.names, &mut self.u_ref)?,
+            None => self.u_ref.fill(0.0),
+        }
+        let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let report = own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
+        Ok(Step::new(py, &self.u, report, &self.names))
+    }
+
+    /// Starts every deadline anew at the next step.
+    fn rearm(&mut self) {
+        self.own.get_mut().unwrap_or_else(PoisonError::into_inner).rearm();
+    }
+
+    /// Forgets every sample: the filter is as it was made. Other than `rearm`, this sets an integrated input back too.
+    fn reset(&mut self) -> PyResult<()> {
+        let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+        own.restore(&self.fresh).map_err(|e| refused(&e))
+    }
+}

@@ -1,0 +1,36 @@
+//! The extension module `punctual._punctual`: a configuration as a filter that NumPy arrays go through, one
+//! sample at a time or one for each row of many independent loops.
+//!
+//! The Python package around it, `punctual/`, has the command line, the FMUs and the types (`_punctual.pyi`).
+//! The modules, each using only those above it:
+//!
+//! | module | owns |
+//! |---|---|
+//! | `arrays` | arguments that are arrays: type, shape, and what is said of one that does not fit |
+//! | `loading` | a path or dict to a configuration and the names of its signals |
+//! | `sample` | one loop: a filter, and what it remembers |
+//! | `report` | what a step says, as Python objects |
+//! | `filter` | `Filter`: one loop |
+//! | `pool` | the threads, one set for each process |
+//! | `batch` | `FilterBatch`: many loops, a row each |
+#![forbid(unsafe_code)]
+
+mod arrays;
+mod batch;
+mod filter;
+mod loading;
+mod pool;
+mod report;
+mod sample;
+
+use pyo3::prelude::*;
+
+/// The filter on NumPy arrays; the package `punctual` passes it on.
+#[pymodule]
+fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<filter::Filter>()?;
+    module.add_class::<batch::FilterBatch>()?;
+    module.add_class::<report::Step>()?;
+    module.add_class::<report::BarrierReport>()?;
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}

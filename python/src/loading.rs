@@ -1,0 +1,88 @@
+//! From a path or dict to the configuration of a filter and the names of its signals.
+
+use std::fmt::Display;
+use std::path::PathBuf;
+
+use punctual_fmu::PluginFolder;
+use punctual_fmu::configuration::{Configuration, ConfigurationError, FilterConfiguration};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+pyo3::import_exception!(punctual._error, Error);
+
+/// `punctual.Error` with the words of `error`.
+pub(crate) fn refused(error: &dyn Display) -> PyErr {
+    Error::new_err(error.to_string())
+}
+
+/// Reads and completes the configuration of a filter: the path of a TOML file, or a dict with the same content. A
+/// plug-in is loaded from the folder of the file, for a dict from the current folder.
+pub(crate) fn configuration(argument: &Bound<'_, PyAny>) -> PyResult<FilterConfiguration> {
+    let helper = argument.py().import("punctual._configuration")?;
+    let (text, folder, file): (String, PathBuf, String) =
+        helper.call_method1("text_folder_file", (argument,))?.extract()?;
+    let refused = |error: ConfigurationError| match &*file {
+        "" => refused(&error),
+        file => refused(&format!("{file}: {error}")),
+    };
+    match Configuration::parse_with(&text, &PluginFolder::new(folder)).map_err(refused)? {
+        Configuration::Filter(filter) => Ok(filter),
+        other => {
+            let message = format!("is {:?}, must be \"filter\"", other.kind());
+            Err(refused(ConfigurationError::new("kind", message)))
+        }
+    }
+}
+
+/// Signals, each a name with its unit, in order.
+pub(crate) struct Signals {
+    /// The names.
+    pub(crate) names: Vec<String>,
+    units: Vec<String>,
+}
+
+impl Signals {
+    fn new(signals: impl Iterator<Item = (String, String)>) -> Self {
+        let (names, units) = signals.unzip();
+        Self { names, units }
+    }
+
+    /// How many.
+    pub(crate) fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Name to unit, in order.
+    pub(crate) fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, unit) in self.names.iter().zip(&self.units) {
+            dict.set_item(name, unit)?;
+        }
+        Ok(dict)
+    }
+}
+
+/// What goes into a filter and comes out of it.
+pub(crate) struct Interface {
+    /// What is measured: the states of the plant but an integrated one, then the inputs of the barriers.
+    pub(crate) states: Signals,
+    /// What is handed out: the inputs of the plant, an integrated state in the place of its rate.
+    pub(crate) inputs: Signals,
+    /// The barriers, each with the unit of h.
+    pub(crate) barriers: Signals,
+}
+
+impl Interface {
+    /// Of a filter with this configuration.
+    pub(crate) fn of(configuration: &FilterConfiguration) -> Self {
+        let measured = configuration.measured_states().into_iter().map(|s| (s.name, s.unit));
+        let handed = configuration.barrier_inputs().into_iter().map(|s| (s.name, s.unit));
+        let commanded = configuration.commanded().into_iter().map(|s| (s.name, s.unit));
+        let barriers = configuration.barrier.iter().map(|b| (b.name.clone(), b.unit(&configuration.plant)));
+        Self {
+            states: Signals::new(measured.chain(handed)),
+            inputs: Signals::new(commanded),
+            barriers: Signals::new(barriers),
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! What a step says, as Python objects.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use punctual_core::filter::{self, Phase, Report, Status};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
+
+/// `punctual.Status` and `punctual.Phase`, once they were asked for.
+static STATUS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static PHASE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+
+/// The member with this number of the enumeration called `name`.
+fn member<'py>(
+    py: Python<'py>,
+    class: &PyOnceLock<Py<PyType>>,
+    name: &str,
+    number: i32,
+) -> PyResult<Bound<'py, PyAny>> {
+    class.import(py, "punctual._enumerations", name)?.call1((number,))
+}
+
+/// One barrier's part of a step, by the names of the outputs of the filter FMU.
+#[pyclass(frozen, module = "punctual")]
+pub(crate) struct BarrierReport {
+    /// h now, in its own unit; not a number where the state is not.
+    #[pyo3(get)]
+    h: f64,
+    /// The lower bound on h that is promised now, in the unit of h.
+    #[pyo3(get)]
+    profile: f64,
+    /// Time to the deadline in s, 0 from the deadline on.
+    #[pyo3(get)]
+    time_left: f64,
+    /// By how much the returned u meets the constraint; < 0 where it violates it.
+    #[pyo3(get)]
+    slack: f64,
+    /// Whether h >= 0 has been reached since the deadline began to count.
+    #[pyo3(get)]
+    arrived: bool,
+    /// Whether the theorem behind the present phase applies.
+    #[pyo3(get)]
+    guaranteed: bool,
+    phase: Phase,
+    /// The margin in force, in the unit of h.
+    #[pyo3(get)]
+    margin_used: f64,
+    /// How far h may fall below its promise within the period because u is held, in the unit of h.
+    #[pyo3(get)]
+    sampling_loss: f64,
+    /// Steps in a row that have not met the constraint, this one included.
+    #[pyo3(get)]
+    unmet_steps: u32,
+    /// How often the deadline was given up for a later one.
+    #[pyo3(get)]
+    postponed: u32,
+    /// Whether no input within the bounds has h >= 0 at the deadline.
+    #[pyo3(get)]
+    late_certain: bool,
+    /// Whether other barriers block the way and h gets nowhere.
+    #[pyo3(get)]
+    deadlocked: bool,
+}
+
+#[pymethods]
+impl BarrierReport {
+    /// Where the barrier stands with its promise.
+    #[getter]
+    fn phase<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        member(py, &PHASE, "Phase", self.phase as i32)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("BarrierReport(h={}, profile={}, time_left={})", self.h, self.profile, self.time_left)
+    }
+}
+
+impl From<&filter::BarrierReport> for BarrierReport {
+    fn from(b: &filter::BarrierReport) -> Self {
+        Self {
+            h: b.h,
+            profile: b.profile,
+            time_left: b.time_left,
+            slack: b.slack,
+            arrived: b.arrived,
+            guaranteed: b.guaranteed,
+            phase: b.phase,
+            margin_used: b.margin,
+            sampling_loss: b.sampling_loss,
+            unmet_steps: b.unmet_steps,
+            postponed: b.postponed,
+            late_certain: b.late_certain,
+            deadlocked: b.deadlocked,
+        }
+    }
+}
+
+/// What a step gives.
+#[pyclass(frozen, module = "punctual")]
+pub(crate) struct Step {
+    /// The safe input, in the order of `Filter.inputs`: finite and within its bounds, whatever happens.
+    #[pyo3(get)]
+    u: Py<PyArray1<f64>>,
+    status: Status,
+    barriers: Vec<filter::BarrierReport>,
+    names: Arc<[String]>,
+}
+
+impl Step {
+    pub(crate) fn new(py: Python<'_>, u: &[f64], report: &Report, names: &Arc<[String]>) -> Self {
+        Self {
+            u: PyArray1::from_slice(py, u).unbind(),
+            status: report.status,
+            barriers: report.barriers.clone(),
+            names: Arc::clone(names),
+        }
+    }
+}
+
+#[pymethods]
+impl Step {
+    /// How the step ended, and so what `u` means.
+    #[getter]
+    fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        member(py, &STATUS, "Status", self.status as i32)
+    }
+
+    /// Whether `u` satisfies every constraint.
+    #[getter]
+    fn satisfied(&self) -> bool {
+        self.status.is_satisfied()
+    }
+
+    /// What there is to say of each barrier, by its name.
+    #[getter]
+    fn barriers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, barrier) in self.names.iter().zip(&self.barriers) {
+            dict.set_item(name, BarrierReport::from(barrier))?;
+        }
+        Ok(dict)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let status = self.status(py)?.getattr("name")?;
+        Ok(format!("Step(u={}, status={status})", self.u.bind(py).repr()?))
+    }
+}

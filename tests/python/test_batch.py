@@ -1,0 +1,145 @@
+"""`punctual.FilterBatch`: many loops, each with the bits of a `Filter` of its own."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import punctual
+import pytest
+
+from conftest import FILTER, ROOT, STEP, goal
+
+STEPS = 60
+
+
+def drawn(n, steps=STEPS):
+    """States along which n unicycles might go, and what is wanted of them: (steps, n, 4) and (steps, n, 2)."""
+    random = np.random.default_rng(7)
+    x = random.uniform([-5.0, -5.0, -3.0, 0.0], [25.0, 15.0, 3.0, 8.0], (n, 4)) + np.zeros((steps, 1, 1))
+    x[:, :, :2] += 0.05 * np.cumsum(random.uniform(-1.0, 1.0, (steps, n, 2)), axis=0)
+    return x, random.uniform(-3.0, 3.0, (steps, n, 2))
+
+
+# One row, fewer and more than a part takes, and a number that no number of parts divides.
+@pytest.mark.parametrize("n", [1, 15, 257])
+def test_every_row_is_that_of_a_filter_of_its_own(n):
+    x, u_ref = drawn(n)
+    batch, singles = punctual.FilterBatch(FILTER, n), [punctual.Filter(FILTER) for _ in range(n)]
+    statuses = set()
+    for k in range(STEPS):
+        if k == STEPS // 2:
+            chosen = np.arange(n) % 3 == 0
+            batch.rearm(chosen)
+            for single, again in zip(singles, chosen):
+                if again:
+                    single.rearm()
+        u, status, h = batch.step(k * STEP, x[k], u_ref[k])
+        assert (u.shape, status.shape, h.shape) == ((n, 2), (n,), (n, 2))
+        for i, single in enumerate(singles):
+            step = single.step(k * STEP, x[k, i], u_ref[k, i])
+            assert step.u.tolist() == u[i].tolist(), (k, i)
+            assert step.status == status[i]
+            assert [barrier.h for barrier in step.barriers.values()] == h[i].tolist()
+        statuses |= set(status.tolist())
+    assert punctual.Status.FILTERED in statuses
+    if n > 1:
+        assert len(statuses) > 1
+
+
+def test_an_integrated_input_belongs_to_its_row():
+    file, n = ROOT / "examples" / "vehicles" / "car-filter.toml", 40
+    x, u_ref = drawn(n)
+    batch, singles = punctual.FilterBatch(file, n), [punctual.Filter(file) for _ in range(n)]
+    for k in range(STEPS):
+        if k == STEPS // 2:
+            chosen = np.arange(n) % 2 == 0
+            batch.reset(chosen)
+            [single.reset() for single in singles[::2]]
+        u, _, _ = batch.step(k * STEP, x[k], u_ref[k])
+        assert u.tolist() == [s.step(k * STEP, x[k, i], u_ref[k, i]).u.tolist() for i, s in enumerate(singles)]
+
+
+def test_all_is_forgotten_by_reset():
+    x, u_ref = drawn(20)
+    batch = punctual.FilterBatch(FILTER, 20)
+    assert len(batch) == 20 and list(batch.states) == ["x_p", "y_p", "theta", "v"]
+    assert list(batch.inputs) == ["a", "omega"] and list(batch.barriers) == ["goal", "post"]
+    first = [batch.step(k * STEP, x[k], u_ref[k]) for k in range(5)]
+    batch.reset()
+    for k, before in enumerate(first):
+        for a, b in zip(before, batch.step(k * STEP, x[k], u_ref[k])):
+            assert a.tobytes() == b.tobytes()
+
+
+def test_u_ref_is_zero_by_default_and_layout_does_not_matter():
+    x, _ = drawn(20)
+    given = [(x[0], np.zeros((20, 2))), (x[0], None), (np.asfortranarray(x[0]), None), (np.repeat(x[0], 2, 0)[::2], None)]
+    answers = [[a.tobytes() for a in punctual.FilterBatch(FILTER, 20).step(0.0, *g)] for g in given]
+    assert answers == [answers[0]] * len(given)
+
+
+def test_the_number_of_threads_changes_no_bit():
+    script = """
+import sys; import numpy as np, punctual; sys.path.append(sys.argv[1])
+from conftest import FILTER
+from test_batch import drawn
+x, u_ref = drawn(300, 3)
+batch = punctual.FilterBatch(FILTER, 300)
+print([a.tobytes().hex() for k in range(3) for a in batch.step(k * 0.01, x[k], u_ref[k])])
+"""
+    folder = os.path.dirname(__file__)
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", script, folder],
+            env=os.environ | {"RAYON_NUM_THREADS": threads},
+            check=True,
+            capture_output=True,
+        ).stdout
+        for threads in ["1", "3"]
+    }
+    assert len(outputs) == 1
+
+
+def test_a_forked_process_has_threads_of_its_own():
+    x, u_ref = drawn(300, 2)
+    batch = punctual.FilterBatch(FILTER, 300)
+    batch.step(0.0, x[0], u_ref[0])
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        # A pool of the parent would let it wait for ever.
+        signal.alarm(20)
+        os.write(write, batch.step(STEP, x[1], u_ref[1])[0].tobytes()[:4000])
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    assert status == 0
+    assert os.read(read, 4000) == batch.step(STEP, x[1], u_ref[1])[0].tobytes()[:4000]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ((np.zeros((3, 4)),), ValueError, r"x: has shape \(3, 4\), must have \(5, 4\) \(x_p, y_p, theta, v\)"),
+        ((np.zeros(20),), ValueError, r"x: has shape \(20,\), must have \(5, 4\)"),
+        ((np.zeros((5, 4)), np.zeros((5, 4))), ValueError, r"u_ref: has shape \(5, 4\), must have \(5, 2\) \(a, omega\)"),
+        ((np.zeros((5, 4), np.float32),), TypeError, "x: is an array of float32, must be one of float64"),
+        (([[0.0] * 4] * 5,), TypeError, r"x: is list, must be an array of float64 of shape \(5, 4\)"),
+    ],
+)
+def test_other_arrays_are_refused(arguments, error, words):
+    with pytest.raises(error, match=words):
+        punctual.FilterBatch(FILTER, 5).step(0.0, *arguments)
+
+
+def test_other_arguments_are_refused():
+    with pytest.raises(ValueError, match="n: is 0, must be >= 1"):
+        punctual.FilterBatch(FILTER, 0)
+    with pytest.raises(punctual.Error, match=r"^barrier\[0\]\.deadline: "):
+        punctual.FilterBatch(FILTER | {"barrier": [goal(deadline=0.0)]}, 2)
+    batch = punctual.FilterBatch(FILTER, 5)
+    with pytest.raises(ValueError, match=r"rows: has shape \(4,\), must have \(5,\)"):
+        batch.rearm(np.zeros(4, bool))
+    with pytest.raises(TypeError, match="rows: is an array of int64, must be one of bool"):
+        batch.reset(np.zeros(5, int))

@@ -1,0 +1,131 @@
+"""`punctual.Filter` against the FMU of the same configuration, and what it refuses."""
+
+import math
+
+import numpy as np
+import punctual
+import pytest
+from punctual import Phase, Status
+
+from conftest import FILTER, PLANT, ROOT, STEP
+
+STATES = ["x_p", "y_p", "theta", "v"]
+
+
+def sampled(result):
+    """The rows with the time that an FMU takes: where its last step ended."""
+    return zip([0.0, *(result["time"][:-1] + STEP)], result)
+
+
+def test_every_bit_is_that_of_the_fmu(fmus):
+    result = punctual.simulate(*fmus, stop_time=8.0, step_size=STEP, nominal={"a": ("v", -1.0)})
+    own = punctual.Filter(FILTER)
+    for t, row in sampled(result):
+        step = own.step(t, [row[f"x.{name}"] for name in STATES], [row["u_ref.a"], row["u_ref.omega"]])
+        assert step.u.tolist() == [row["u.a"], row["u.omega"]], t
+        assert step.status == row["status"]
+        for name, barrier in step.barriers.items():
+            for field in [n.removeprefix(f"{name}.") for n in result.dtype.names if n.startswith(f"{name}.")]:
+                assert getattr(barrier, field) == row[f"{name}.{field}"], (t, name, field)
+    assert {Status(s) for s in result["status"]} >= {Status.UNCHANGED, Status.FILTERED}
+
+
+def test_an_integrated_input_is_that_of_the_fmu(tmp_path):
+    folder = ROOT / "examples" / "vehicles"
+    fmus = [punctual.build(folder / f"car-{kind}.toml", tmp_path / f"{kind}.fmu") for kind in ["filter", "plant"]]
+    result = punctual.simulate(*fmus, stop_time=3.0, step_size=STEP)
+    own = punctual.Filter(folder / "car-filter.toml")
+    assert own.states == {"x_p": "m", "y_p": "m", "theta": "rad", "v": "m/s"}
+    assert own.inputs == {"a": "m/s2", "delta": "rad"}
+    # Without the last row: there the FMU is not told for how long its input is going to be held.
+    for t, row in [*sampled(result)][:-1]:
+        step = own.step(t, [row[f"x.{name}"] for name in STATES])
+        assert step.u.tolist() == [row["u.a"], row["u.delta"]], t
+    again = own.step(3.0 + STEP, [result[f"x.{name}"][-1] for name in STATES])
+    own.reset()
+    first = own.step(0.0, [result[f"x.{name}"][0] for name in STATES])
+    assert first.u.tolist() == [result["u.a"][0], result["u.delta"][0]] != again.u.tolist()
+
+
+def test_names_units_and_enumerations_are_those_of_the_fmu(fmus):
+    own, variables = punctual.Filter(FILTER), {v.name: v for v in punctual.variables(fmus[0])}
+    assert own.states == {name: variables[f"x.{name}"].unit for name in STATES}
+    assert own.inputs == {name: variables[f"u.{name}"].unit for name in ["a", "omega"]}
+    assert own.barriers == {name: variables[f"{name}.h"].unit for name in ["goal", "post"]}
+    for variable, enumeration in [("status", Status), ("goal.phase", Phase)]:
+        assert {item.name.lower(): item.value for item in enumeration} == variables[variable].items
+    fields = {n.removeprefix("goal.") for n, v in variables.items() if v.causality == "output" and n.startswith("goal.")}
+    assert fields == {name for name in dir(punctual.BarrierReport) if not name.startswith("_")}
+
+
+def test_deadlines_start_anew():
+    own, x = punctual.Filter(FILTER), np.array([0.0, 0.0, 0.3, 2.0])
+    first = own.step(0.0, x)
+    assert first.barriers["goal"].time_left == 5.0 and first.barriers["goal"].phase is Phase.APPROACH
+    assert own.step(2.0, x).barriers["goal"].time_left == 3.0
+    own.rearm()
+    assert own.step(3.0, x).barriers["goal"].time_left == 5.0
+    own.reset()
+    assert own.step(0.0, x).u.tolist() == first.u.tolist()
+
+
+def test_arrays_of_any_layout_and_sequences_are_taken():
+    table = np.array([[0.0, 0.0, 0.3, 2.0], [1.0, 2.0, 0.1, 3.0]])
+    given = [table[1], np.asfortranarray(table)[1], table[1].tolist(), tuple(table[1]), [1, 2, 0.1, 3]]
+    answers = [punctual.Filter(FILTER).step(0.0, x).u.tolist() for x in given]
+    assert answers == [answers[0]] * len(given)
+
+
+def test_what_is_no_number_is_an_outcome():
+    own = punctual.Filter(FILTER)
+    step = own.step(0.0, [math.nan, 0.0, 0.0, 0.0])
+    assert step.status is Status.INVALID_INPUT and not step.satisfied and step.u.tolist() == [0.0, 0.0]
+    assert repr(step) == "Step(u=array([0., 0.]), status=INVALID_INPUT)"
+    assert own.step(0.0, [0.0, 0.0, 0.0, 2.0]).satisfied
+
+
+@pytest.mark.parametrize(
+    ("x", "error", "words"),
+    [
+        (np.zeros(3), ValueError, r"x: has shape \(3,\), must have \(4,\) \(x_p, y_p, theta, v\)"),
+        (np.zeros((1, 4)), ValueError, r"x: has shape \(1, 4\), must have \(4,\)"),
+        ([0.0], ValueError, r"x: has shape \(1,\), must have \(4,\)"),
+        (np.zeros(4, np.float32), TypeError, "x: is an array of float32, must be one of float64"),
+        (np.zeros(4, int), TypeError, "x: is an array of int64, must be one of float64"),
+        ("zero", TypeError, "x: is str, must be an array of float64 or a sequence of 4 numbers"),
+        (None, TypeError, "x: is NoneType"),
+    ],
+)
+def test_another_state_is_refused(x, error, words):
+    with pytest.raises(error, match=words):
+        punctual.Filter(FILTER).step(0.0, x)
+
+
+def test_another_u_ref_is_refused():
+    with pytest.raises(ValueError, match=r"u_ref: has shape \(4,\), must have \(2,\) \(a, omega\)"):
+        punctual.Filter(FILTER).step(0.0, np.zeros(4), np.zeros(4))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"barrier": [FILTER["barrier"][0] | {"radius": -1.0}]}, r"^barrier\[0\]\.radius: is -1, must be"),
+        ({"plant": {"model": "boat"}}, "boat"),
+        ({"bounds": {"a": [1.0, -1.0]}}, r"^bounds.a: is \[1, -1\]"),
+    ],
+)
+def test_another_configuration_is_refused(change, words):
+    with pytest.raises(punctual.Error, match=words):
+        punctual.Filter(FILTER | change)
+    with pytest.raises(punctual.Error, match='^kind: is "plant", must be "filter"$'):
+        punctual.Filter(PLANT)
+
+
+def test_a_file_is_named(tmp_path):
+    (tmp_path / "filter.toml").write_text('kind = "filter"\n')
+    with pytest.raises(punctual.Error, match=r"(?s)filter.toml: .*plant"):
+        punctual.Filter(tmp_path / "filter.toml")
+    with pytest.raises(FileNotFoundError):
+        punctual.Filter(str(tmp_path / "none.toml"))
+    with pytest.raises(TypeError, match=r"barrier\[0\].radius: is None, must be a number"):
+        punctual.Filter(FILTER | {"barrier": [{"name": "goal", "radius": None}]})

@@ -1,0 +1,101 @@
+"""`build`, `check`, `variables` and `run_cli`: the command line by way of the package."""
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import punctual
+import pytest
+
+from conftest import FILTER, PLANT, ROOT, goal
+
+
+def test_a_dict_and_a_file_of_the_same_content_make_the_same_fmu(tmp_path):
+    file = ROOT / "examples" / "vehicles" / "unicycle-filter.toml"
+    text = {
+        "kind": "filter",
+        "name": "unicycle_filter",
+        "plant": {"model": "unicycle"},
+        "barrier": [
+            # What configurations come from in programs.
+            {"name": "goal", "centre": np.array([45, 45.0]), "radius": np.float64(2.0), "deadline": 10, "margin": 0.02}
+        ],
+        "bounds": {},
+        "experiment": {"stop_time": np.int64(20), "step_size": 0.001},
+    }
+    paths = punctual.build(file, tmp_path / "a.fmu"), punctual.build(text, str(tmp_path / "b.fmu"))
+    assert paths == (tmp_path / "a.fmu", tmp_path / "b.fmu")
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_the_library_inside_is_the_one_of_the_package(tmp_path, fmus):
+    library = Path(punctual.__file__).parent / "_bin" / "libpunctual_fmu.so"
+    own = zipfile.ZipFile(fmus[0]).read("binaries/linux64/unicycle_filter.so")
+    assert own == library.read_bytes()
+    shutil.copy(library, tmp_path / "other.so")
+    other = punctual.build(FILTER, tmp_path / "filter.fmu", library=tmp_path / "other.so")
+    assert other.read_bytes() == fmus[0].read_bytes()
+    with pytest.raises(punctual.Error, match="none.so"):
+        punctual.build(FILTER, tmp_path / "filter.fmu", library=tmp_path / "none.so")
+
+
+def test_a_refused_dict_is_told_without_a_file_name(tmp_path):
+    with pytest.raises(punctual.Error, match=r"^barrier\[0\]\.radius: is -1, must be ") as refused:
+        punctual.build(FILTER | {"barrier": [goal(radius=-1.0)]}, tmp_path / "filter.fmu")
+    assert isinstance(refused.value, ValueError)
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "filter.toml").write_text("kind = 1\n")
+    with pytest.raises(punctual.Error, match="filter.toml: kind: "):
+        punctual.build(tmp_path / "filter.toml", tmp_path / "filter.fmu")
+    with pytest.raises(TypeError, match=r"plant.parameters\[0\].start: is \{1\}, must be a number"):
+        punctual.build({"plant": {"parameters": [{"start": {1}}]}}, tmp_path / "filter.fmu")
+
+
+def test_a_plugin_of_a_dict_is_looked_for_in_the_current_folder(tmp_path, monkeypatch):
+    header = ROOT / "fmu" / "include"
+    source = ROOT / "examples" / "plugin" / "jerk_car.c"
+    command = ["cc", "-O2", "-shared", "-fPIC", f"-I{header}", source, "-o", tmp_path / "libjerk_car.so", "-lm"]
+    subprocess.run(command, check=True)
+    filter_ = {"kind": "filter", "plant": {"plugin": "jerk_car"}, "barrier": [{"name": "merge", "deadline": 4.0}]}
+    monkeypatch.chdir(tmp_path)
+    punctual.build(filter_, "filter.fmu")
+    assert punctual.Filter(filter_).states == {"p": "m", "v": "m/s", "acc": "m/s2"}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["filter.fmu", "libjerk_car.so"]
+
+
+def test_check_is_what_the_command_line_says():
+    report = punctual.check(FILTER, x0={"v": 2.0})
+    assert [barrier["relative_degree"] for barrier in report["barriers"]] == [2, 2]
+    assert report["barriers"][0]["start"]["guaranteed"] is True
+    assert punctual.check(FILTER, plant=PLANT)["barriers"] == report["barriers"]
+    # A deadline that the bounds do not allow is an answer, not an error.
+    lost = punctual.check(FILTER | {"barrier": [goal(deadline=0.5)]}, x0={"v": 2.0})
+    assert lost["barriers"][0]["start"]["reach"]["deadline"] == "cannot_be_met"
+    with pytest.raises(punctual.Error, match="x0"):
+        punctual.check(FILTER, x0={"w": 2.0})
+
+
+def test_the_variables_of_an_fmu(fmus):
+    variables = {v.name: v for v in punctual.variables(fmus[0])}
+    a = variables["u_max.a"]
+    assert (a.type, a.causality, a.variability, a.unit, a.start) == ("Real", "parameter", "fixed", "m/s2", 20.0)
+    assert a.minimum < -1e29 and a.maximum > 1e29 and a.description and a.items == {}
+    status = variables["status"]
+    assert status.type == "Enumeration" and status.items["filtered"] == 1 and status.start is None
+    assert variables["rearm"].start is False
+    assert sorted(v.value_reference for v in variables.values()) == list(range(len(variables)))
+    with pytest.raises(punctual.Error, match="test_fmus.py: not a readable FMU archive"):
+        punctual.variables(__file__)
+
+
+def test_the_command_line_is_there(tmp_path):
+    script = Path(sys.executable).with_name("punctual")
+    done = subprocess.run([script, "--version"], check=True, capture_output=True, text=True)
+    assert done.stdout == f"punctual {punctual.__version__}\n" == punctual.run_cli("--version")
+    done = subprocess.run([script, "build", "none.toml", "-o", "none.fmu"], capture_output=True, text=True)
+    assert done.returncode == 2 and "none.toml" in done.stderr
+    with pytest.raises(punctual.Error, match="^unexpected argument '--none'"):
+        punctual.run_cli("--none")

@@ -1,0 +1,179 @@
+"""`punctual.simulate` against `punctual run`: the same calls, the same bits."""
+
+import csv
+import math
+
+import fmpy
+import fmpy.util
+import numpy as np
+import punctual
+import pytest
+
+from conftest import FILTER, PLANT, ROOT, STEP, goal
+
+STOP = 8.0
+DAMPING = {"a": ("v", -1.0)}
+
+
+def recorded(folder, filter_fmu, plant_fmu, experiment, connections="", start=""):
+    """The columns of the CSV file that `punctual run` writes for the same system."""
+    (folder / "system.toml").write_text(
+        f"""[experiment]
+{experiment}
+[[component]]
+name = "filter"
+fmu = "{filter_fmu}"
+[[component]]
+name = "plant"
+fmu = "{plant_fmu}"
+{start}
+[[connect_by_name]]
+components = ["filter", "plant"]
+{connections}
+"""
+    )
+    punctual.run_cli("run", folder / "system.toml", "--out", folder)
+    with open(folder / "system.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    return dict(zip(rows[0], np.array(rows[1:], float).T))
+
+
+def assert_same(result, columns):
+    """Every field of `result` has the bits of its column, and no column is missing."""
+    fields = {"time": "time"}
+    for column in columns:
+        component, _, variable = column.partition(".")
+        is_input = component == "filter" and variable.startswith("x.") or component == "plant" and variable[:2] == "u."
+        if component and variable and not is_input:
+            fields[variable] = column
+    # u_ref.* that nothing is connected to is no column.
+    assert set(fields) <= set(result.dtype.names)
+    assert {name for name in result.dtype.names if not name.startswith("u_ref.")} <= set(fields)
+    for field, column in fields.items():
+        values = result[field].astype(float)
+        assert values.tobytes() == columns[column].tobytes(), (field, np.abs(values - columns[column]).max())
+
+
+DAMPED = '[[connection]]\nfrom = "plant.x.v"\nto = "filter.u_ref.a"\nfactor = -1.0\n'
+
+
+@pytest.mark.parametrize("step", [0.01, 0.03], ids=["whole", "the last step is shorter"])
+def test_every_number_is_that_of_punctual_run(fmus, tmp_path, step):
+    columns = recorded(tmp_path, *fmus, f"stop_time = {STOP}\nstep = {step}", DAMPED)
+    result = punctual.simulate(*fmus, stop_time=STOP, step_size=step, nominal=DAMPING)
+    assert len(result) == math.ceil(STOP / step - 1e-6) + 1
+    assert_same(result, columns)
+    # The promise itself, so that it is not two times the same nonsense.
+    assert result["goal.h"][0] < 0.0 <= result["goal.h"][result["time"] >= 5.0].min()
+    assert result["post.h"].min() >= 0.0
+
+
+def test_start_offset_and_parameters_are_those_of_a_system_file(fmus, tmp_path):
+    offset = DAMPED + "offset = 3.0\n"
+    start = 'start = { "x0.v" = -1.5, "x0.theta" = 0.5 }\n'
+    system = "stop_time = 2.0\nstep = 0.01"
+    columns = recorded(tmp_path, *fmus, system, offset, start)
+    nominal = {"u_ref.a": ("x.v", -1.0, 3.0)}
+    options = dict(stop_time=2.0, step_size=0.01, nominal=nominal)
+    result = punctual.simulate(*fmus, start={"v": -1.5, "x0.theta": 0.5}, **options)
+    assert_same(result, columns)
+    later = punctual.simulate(*fmus, parameters={"goal.deadline": 7.0}, **options)
+    assert later["goal.time_left"][0] == 7.0 and result["goal.time_left"][0] == 5.0
+
+
+@pytest.mark.parametrize("kind", ["car", "delayed"])
+def test_other_filters_too(kind, tmp_path):
+    # One that hands out an integrated angle; one whose outputs change in steps only, so that masters delay it.
+    folder = ROOT / "examples" / "vehicles"
+    if kind == "car":
+        configurations = folder / "car-filter.toml", folder / "car-plant.toml"
+    else:
+        configurations = FILTER | {"direct_feedthrough": False, "actuation_delay": STEP}, PLANT
+    fmus = [punctual.build(c, tmp_path / f"{i}.fmu") for i, c in enumerate(configurations)]
+    columns = recorded(tmp_path, *fmus, "stop_time = 3.0\nstep = 0.01", DAMPED)
+    assert_same(punctual.simulate(*fmus, stop_time=3.0, step_size=STEP, nominal=DAMPING), columns)
+
+
+def test_a_function_as_nominal_controller(fmus):
+    seen = []
+
+    def damping(t, x):
+        seen.append((t, x.copy()))
+        with pytest.raises(ValueError, match="read-only"):
+            x[0] = 1.0
+        return [-x[3], 0.0]
+
+    options = dict(stop_time=1.0, step_size=STEP)
+    result = punctual.simulate(*fmus, nominal=damping, **options)
+    assert result.tobytes() == punctual.simulate(*fmus, nominal=DAMPING, **options).tobytes()
+    t, x = seen[-1]
+    assert t == 1.0 and x.tolist() == [result[f"x.{name}"][-1] for name in ["x_p", "y_p", "theta", "v"]]
+    array = punctual.simulate(*fmus, nominal=lambda t, x: np.array([-x[3], 0.0]), **options)
+    assert array.tobytes() == result.tobytes()
+
+
+def test_the_result_is_one_of_fmpy(fmus, tmp_path):
+    result = punctual.simulate(*fmus, stop_time=0.1, step_size=STEP, record=["x.v", "status", "goal.arrived", "u_ref.a"])
+    assert result.dtype.names == ("time", "x.v", "status", "goal.arrived", "u_ref.a")
+    assert [result.dtype[i].kind for i in range(5)] == ["f", "f", "i", "b", "f"]
+    # It cannot read Booleans.
+    numbers = result[["time", "x.v", "status"]]
+    fmpy.util.write_csv(tmp_path / "result.csv", numbers)
+    assert fmpy.util.read_csv(tmp_path / "result.csv")["x.v"].tolist() == result["x.v"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (dict(stop_time=0.0), "stop_time: is 0.0, must be finite and > 0"),
+        (dict(step_size=math.nan), "step_size: is nan, must be finite and > 0"),
+        (dict(start={"w": 1.0}), "start: 'w' is no parameter or input of the plant, which has x0.x_p"),
+        (dict(parameters={"goal.T": 1.0}), "parameters: 'goal.T' is no parameter or input of the filter"),
+        (dict(parameters={"goal.deadline": -1.0}), "fmi2.* of the filter was refused: .*goal.deadline"),
+        (dict(record=["goal.hh"]), "record: 'goal.hh' is none of x.x_p"),
+        (dict(nominal={"b": ("v", 1.0)}), "nominal: 'b' is none of u_ref.a, u_ref.omega"),
+        (dict(nominal={"a": ("w", 1.0)}), "nominal.a: 'w' is no output of the plant, which has x.x_p"),
+        (dict(nominal=lambda t, x: [0.0]), r"nominal: is \[0.0\] at t = 0 s, must be numbers for u_ref.a, u_ref.omega"),
+    ],
+)
+def test_what_does_not_fit_is_refused(fmus, change, words):
+    options = dict(stop_time=0.1, step_size=STEP) | change
+    with pytest.raises(punctual.Error, match=words):
+        punctual.simulate(*fmus, **options)
+
+
+def test_an_input_that_nothing_feeds_is_refused(fmus, tmp_path):
+    other = punctual.build({"kind": "plant", "plant": {"model": "point_mass"}}, tmp_path / "plant.fmu")
+    with pytest.raises(punctual.Error, match="x.theta, x.v of the filter: the plant has no output of that name"):
+        punctual.simulate(fmus[0], other, stop_time=0.1, step_size=STEP)
+    with pytest.raises(punctual.Error, match="u.u_x, u.u_y of the plant: the filter has no output of that name"):
+        punctual.simulate(fmus[0], other, stop_time=0.1, step_size=STEP, parameters={"x.theta": 0.0, "x.v": 0.0})
+    moving = FILTER | {"barrier": [goal(centre_input=True) | {"centre": [0.0, 0.0]}]}
+    centre = punctual.build(moving, tmp_path / "filter.fmu")
+    with pytest.raises(punctual.Error, match=r"goal\.centre"):
+        punctual.simulate(centre, fmus[1], stop_time=0.1, step_size=STEP)
+    inputs = [v.name for v in punctual.variables(centre) if v.causality == "input" and v.name.startswith("goal.")]
+    values = dict(zip(inputs, [20.0, 10.0, 0.0, 0.0]))
+    result = punctual.simulate(centre, fmus[1], stop_time=0.1, step_size=STEP, parameters=values)
+    assert result["goal.h"][0] == punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)["goal.h"][0]
+
+
+def test_a_refused_step_names_fmu_time_and_reason(fmus):
+    # A state that is no number is an outcome of the filter; a plant cannot go on from one.
+    with pytest.raises(punctual.Error, match="fmi2.* of the plant.* was refused: ") as refused:
+        punctual.simulate(*fmus, stop_time=0.1, step_size=STEP, start={"v": math.nan})
+    assert "nan" in str(refused.value).lower()
+
+
+def test_a_file_that_is_no_fmu_is_named(fmus, tmp_path):
+    (tmp_path / "no.fmu").write_text("no")
+    with pytest.raises(punctual.Error, match="no.fmu: "):
+        punctual.simulate(tmp_path / "no.fmu", fmus[1], stop_time=0.1, step_size=STEP)
+    with pytest.raises(FileNotFoundError, match="none.fmu"):
+        punctual.simulate(fmus[0], tmp_path / "none.fmu", stop_time=0.1, step_size=STEP)
+
+
+def test_without_fmpy_the_message_says_what_to_install(fmus, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "fmpy", None)
+    with pytest.raises(ImportError, match=r"pip install punctual\[fmpy\]"):
+        punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)
