@@ -143,7 +143,7 @@ pub const CANDIDATES: [Candidate; 8] = {
 impl Candidate {
     /// `settings` with this profile and rate in place of theirs.
     pub fn applied(&self, settings: BarrierSettings) -> BarrierSettings {
-        let rate = Some(self.rate_times_deadline / settings.deadline);
+        let rate = settings.deadline.map(|deadline| self.rate_times_deadline / deadline);
         BarrierSettings { profile: self.profile, rate, rates: None, ..settings }
     }
 }

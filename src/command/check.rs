@@ -264,14 +264,15 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
     for (i, section) in c.barrier.iter().enumerate() {
         let (name, unit) = (&section.name, section.unit(&c.plant));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
-        let default_rate = BarrierSettings::default_rate(settings.deadline, step);
+        let deadline = settings.deadline.unwrap_or(f64::INFINITY);
+        let default_rate = BarrierSettings::default_rate(deadline, step);
         let begun = start.is_some();
         let approaching = begun && filter.report().barriers[i].phase == Phase::Approach;
         let (method, rate) = match settings.method {
             Method::ReferenceProfile if settings.rates.is_some() => ("reference profile, rates given", None),
             Method::ReferenceProfile => ("reference profile", Some(settings.rate.unwrap_or(default_rate))),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
-            Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(settings.deadline))),
+            Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(deadline))),
         };
         let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
         let margin = if begun { filter.report().barriers[i].margin } else { settings.margin };
@@ -289,10 +290,10 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
                 number(rate * step)
             ));
         }
-        if settings.deadline < step {
+        if deadline < step {
             warn(format!("the deadline is shorter than the step of {} s", number(step)));
         }
-        if experiment.stop_time - experiment.start_time < settings.deadline {
+        if experiment.stop_time - experiment.start_time < deadline {
             warn("the experiment stops before the deadline".to_owned());
         }
         if let Some(reason) = filter.refusal(i) {
@@ -306,7 +307,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
             warn(format!(
                 "the repeated root is negative: errors grow by a factor of {} until the deadline",
-                number((-rate * settings.deadline).exp())
+                number((-rate * deadline).exp())
             ));
         }
         let report = begun.then(|| filter.report().barriers[i]);
@@ -326,9 +327,9 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             unit,
             relative_degree: degrees[i],
             method,
-            deadline: settings.deadline,
+            deadline,
             rate,
-            rate_times_deadline: rate.map(|rate| rate * settings.deadline),
+            rate_times_deadline: rate.map(|rate| rate * deadline),
             stay_rate,
             margin,
             start,

@@ -101,7 +101,7 @@ fn run(
 }
 
 fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
-    c.barrier.iter().map(|b| b.deadline).collect()
+    c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
 /// What the bounds allow barrier `index` from `x0`.
@@ -113,7 +113,7 @@ pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result
     let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
-        tried.barrier[index].deadline = deadline;
+        tried.barrier[index].deadline = Some(deadline);
         tried.barrier[index].when_infeasible = punctual_fmu::configuration::InfeasibleName::Report;
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, x0, &deadlines(&tried))?.kept)
@@ -159,7 +159,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
         let mut tried = c.clone();
         for section in &mut tried.barrier {
             section.rates.clear();
-            section.rate = candidate.rate_times_deadline / section.deadline;
+            section.rate = section.deadline.map_or(0.0, |deadline| candidate.rate_times_deadline / deadline);
             section.profile = match candidate.profile {
                 ProfileKind::Hermite => ProfileName::Hermite,
                 ProfileKind::LowPeak => ProfileName::LowPeak,
@@ -181,7 +181,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
     let lines = |candidate: &Candidate, bound: Option<f64>| {
         let mut lines: Vec<String> = Vec::new();
         for section in &c.barrier {
-            let rate = candidate.rate_times_deadline / section.deadline;
+            let rate = section.deadline.map_or(0.0, |deadline| candidate.rate_times_deadline / deadline);
             let profile = name(candidate.profile);
             lines
                 .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));

@@ -228,7 +228,7 @@ impl FixedTime {
     ///
     /// A deadline that is not finite or ≤ 0.
     pub fn with_deadline(mut self, deadline: f64) -> Result<Self, Error> {
-        self.settings.deadline = positive("deadline", deadline)?;
+        self.settings.deadline = Some(positive("deadline", deadline)?);
         Ok(self)
     }
 
@@ -236,6 +236,11 @@ impl FixedTime {
     #[inline]
     pub fn relative_degree(&self) -> usize {
         self.n
+    }
+
+    /// T in s from the anchor, infinite where there is none.
+    pub fn deadline(&self) -> f64 {
+        self.settings.deadline.unwrap_or(f64::INFINITY)
     }
 
     /// The settings.
@@ -280,7 +285,7 @@ impl FixedTime {
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
         if state.phase == Phase::Waiting {
-            self.anchor(state, t, &lowest, self.settings.deadline, 0.0);
+            self.anchor(state, t, &lowest, self.deadline(), 0.0);
         }
         if let Some(condition) = &self.condition {
             return self.advance_condition(&**condition, state, t, h);
@@ -380,7 +385,7 @@ impl FixedTime {
     pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64, period: f64) {
         let settings = &self.settings;
         let (n, past) = (self.n, deadline <= 0.0);
-        let allowed = if past { settings.deadline } else { deadline };
+        let allowed = if past { self.deadline() } else { deadline };
         let default_rate = FixedTimeSettings::default_rate(allowed, period);
         let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
         let mut anchor = [0.0; MAX_RELATIVE_DEGREE];

@@ -49,8 +49,8 @@ pub enum Infeasible {
 pub struct FixedTimeSettings {
     /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample for
     /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)); for
-    /// higher ones later.
-    pub deadline: f64,
+    /// higher ones later. `None`: the set is to be kept, from a start inside it; nothing is promised from one outside.
+    pub deadline: Option<f64>,
     /// How the deadline is met. Default: [`Method::ReferenceProfile`].
     pub method: Method,
     /// Which profile the reference profile follows. Default: [`ProfileKind::Hermite`].
@@ -87,7 +87,7 @@ impl FixedTimeSettings {
     /// The defaults for a deadline of `deadline` seconds: reference profile, default rates, no margin.
     pub fn within(deadline: f64) -> Self {
         Self {
-            deadline,
+            deadline: Some(deadline),
             method: Method::default(),
             profile: ProfileKind::default(),
             infeasible: Infeasible::default(),
@@ -98,6 +98,11 @@ impl FixedTimeSettings {
             recovery: None,
             disturbance: 0.0,
         }
+    }
+
+    /// The defaults for a set that is to be kept and has no deadline.
+    pub fn keeping() -> Self {
+        Self { deadline: None, ..Self::within(1.0) }
     }
 
     /// The default of both rates in 1/s: the smaller of 20/T and 1/(2δ), for a deadline T > 0 and a period
@@ -127,7 +132,13 @@ impl FixedTimeSettings {
                 "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
             ));
         }
-        positive("deadline", self.deadline)?;
+        if let Some(deadline) = self.deadline {
+            positive("deadline", deadline)?;
+        } else if self.method != Method::ReferenceProfile {
+            return unsupported(
+                "has no deadline to meet; leave it out for a barrier that is only kept".into(),
+            );
+        }
         for (field, value) in
             [("rate", self.rate), ("stay_rate", self.stay_rate), ("recovery", self.recovery)]
         {

@@ -216,7 +216,7 @@ impl FilterBuilder {
             Begin::AtOnce => {}
             Begin::At(seconds) => {
                 opens = non_negative("begin", seconds).map_err(named)?;
-                let deadline = channel.promise.settings().deadline;
+                let deadline = channel.promise.deadline();
                 if opens >= deadline {
                     return range("begin", format!("is {opens}, must be < deadline = {deadline}"));
                 }
@@ -418,7 +418,7 @@ impl FilterBuilder {
             report: Report::new(channels.len()),
             programme: qp::Workspace::new(backend),
         };
-        let deadlines = channels.iter().map(|c| c.promise.settings().deadline);
+        let deadlines = channels.iter().map(|c| c.promise.deadline());
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
         Ok(SafetyFilter {
             state_dim,

@@ -125,7 +125,7 @@ impl Channel {
         let period = period.unwrap_or(0.0);
         if promise.phase == Phase::Waiting {
             let waited = begin - delay - promise.start_time.unwrap_or(begin - delay);
-            let deadline = self.promise.settings().deadline - waited - delay;
+            let deadline = self.promise.deadline() - waited - delay;
             self.promise.anchor(promise, begin, h, deadline, period);
         } else if promise.phase == Phase::Approach && period > promise.period {
             self.promise.resample(promise, period);
@@ -174,7 +174,7 @@ impl Channel {
         if self.promise.settings().infeasible != Infeasible::Soonest {
             return false;
         }
-        let configured = self.promise.settings().deadline;
+        let configured = self.promise.deadline();
         let soonest = reach::soonest(&*self.source, now, bounds, HORIZON * configured);
         let factor = FACTOR * GROWTH.powi(promise.postponed.min(16) as i32);
         // Near the set the soonest time tends to zero: never shorter than ten samples.

@@ -218,8 +218,10 @@ pub struct BarrierSection {
     /// `external`: n, in 1 ..= 8: the order of the derivative of h that the inputs enter. Nobody checks it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_degree: Option<usize>,
-    /// Deadline T in s after the first step, > 0.
-    pub deadline: f64,
+    /// Deadline T in s after the first step, > 0. Default: none, for a set that is only to be kept from a start
+    /// inside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deadline: Option<f64>,
     /// How it is met. Default `reference_profile`.
     #[serde(default)]
     pub method: MethodName,
@@ -407,7 +409,11 @@ impl BarrierSection {
                 ));
             };
         let (positive, non_negative, finite) = (Range::POSITIVE, Range::NON_NEGATIVE, Range::FINITE);
-        row("deadline", "s", positive, "time from the first step to be inside", |b| &mut b.deadline);
+        if self.deadline.is_some() {
+            row("deadline", "s", positive, "time from the first step to be inside", |b| {
+                b.deadline.get_or_insert(1.0)
+            });
+        }
         row(
             "rate",
             "1/s",
