@@ -18,7 +18,7 @@ struct Run {
 
 /// Runs from `h` for twice the deadline; h⁽ⁿ⁾ is whatever the floor asks for, or 0 if that is more.
 fn run(settings: FixedTimeSettings, mut h: Vec<f64>, step: f64) -> Run {
-    let (n, deadline) = (h.len(), settings.deadline);
+    let (n, deadline) = (h.len(), settings.deadline.expect("one"));
     let promise = FixedTime::new(n, settings).expect("valid settings");
     let mut state = FixedTimeState::default();
     let mut run = Run { arrival: f64::INFINITY, least_after: f64::INFINITY, guaranteed: true };

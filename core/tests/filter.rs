@@ -78,7 +78,8 @@ fn late_stay_left_and_back() {
         (b.phase, b.guaranteed, b.arrival_time)
     };
     assert_eq!(phase(&mut filter, 3.0, &outside), (Phase::Approach, true, None));
-    assert_eq!(phase(&mut filter, 3.999, &outside), (Phase::Approach, true, None));
+    // Where the profile asked it to be it is not, and no time is left to start anew.
+    assert_eq!(phase(&mut filter, 3.999, &outside), (Phase::Approach, false, None));
     assert_eq!(phase(&mut filter, 4.0, &outside), (Phase::Late, false, None));
     assert_eq!(phase(&mut filter, 4.5, &outside), (Phase::Late, false, None));
     assert_eq!(phase(&mut filter, 5.0, &inside), (Phase::Stay, true, Some(5.0)));
@@ -109,13 +110,13 @@ fn a_start_inside_stays() {
     }
 }
 
-/// Just inside but leaving too fast for the stay constraint: the approach keeps its deadline.
+/// Just inside but leaving faster than samples can follow: to be kept, without a promise.
 #[test]
-fn a_start_inside_that_cannot_stay_is_an_approach() {
+fn a_start_inside_that_cannot_stay_is_not_promised() {
     let mut filter = goal(BarrierSettings::within(5.0));
     step(&mut filter, 0.0, &[43.01, 45.0, -30.0, 0.0]);
     let b = filter.report().barriers[0];
-    assert_eq!((b.phase, b.arrived), (Phase::Approach, true));
+    assert_eq!((b.phase, b.arrived, b.guaranteed), (Phase::Stay, true, false));
 }
 
 #[test]
@@ -172,7 +173,8 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
         if t >= 5.0 {
             assert!(b.h >= margin - SAMPLING, "h = {} at {t}", b.h);
             // The first step does not know the period yet and takes a hundredth of the deadline for it.
-            assert!(b.profile == b.margin && (0.0..1e-3).contains(&(b.margin - margin)), "{b:?}");
+            // What rounding takes from the margin in force is given back by and by.
+            assert!((b.profile - b.margin).abs() < 1e-6 && (0.0..1e-3).contains(&(b.margin - margin)), "{b:?}");
         }
     })
     .expect("valid schedule");

@@ -36,7 +36,7 @@ fn settings_out_of_range_are_refused() {
 
     for (value, shown) in [(-1.0, "-1"), (0.0, "0"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         let message = |field: &str| format!("goal.{field}: is {shown}, must be finite and > 0");
-        bad(BarrierSettings { deadline: value, ..good }, &message("deadline"));
+        bad(BarrierSettings { deadline: Some(value), ..good }, &message("deadline"));
         bad(BarrierSettings { rate: Some(value), ..good }, &message("rate"));
         bad(BarrierSettings { stay_rate: Some(value), ..good }, &message("stay_rate"));
     }

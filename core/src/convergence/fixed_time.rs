@@ -9,8 +9,9 @@ use super::condition::Condition;
 use super::hermite::HermiteProfile;
 use super::profile::{self, Derivatives, Hermite, LowPeak, Profile, ProfileError};
 use super::repeated_root::{self, NoAdmissibleRate};
+use super::sampled;
 use super::settings::{FixedTimeSettings, Method, ProfileKind};
-use super::{sampled, stay};
+use super::stay::{self, Means};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, positive};
 
@@ -28,10 +29,10 @@ pub enum Phase {
     Approach = 1,
     /// The deadline passed outside the safe set; the approach goes on.
     Late = 2,
-    /// Inside, under the stay constraint.
+    /// To be kept: inside, from the start or since it has been reached, under the stay constraint.
     Stay = 3,
-    /// Outside again after having been inside, with no recovery time set; the stay constraint pulls
-    /// back, without a deadline.
+    /// Outside again after having been inside, with no recovery time set, or outside from the start without a
+    /// deadline; the stay constraint pulls back, without a deadline.
     Left = 4,
     /// Released: nothing is asked any more ([`End`](crate::filter::End)).
     Released = 5,
@@ -46,7 +47,7 @@ pub struct FixedTimeState {
     pub start_time: Option<f64>,
     /// Time of the anchor, t₀ in s.
     pub anchor_time: f64,
-    /// T in s, counted from the anchor.
+    /// T in s, counted from the anchor; infinite where there is none.
     pub deadline: f64,
     /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
     pub recoveries: u32,
@@ -57,8 +58,14 @@ pub struct FixedTimeState {
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
     pub rate: f64,
-    /// The rate of the stay constraint in 1/s, chosen at the anchor.
+    /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`]).
     pub stay_rate: f64,
+    /// The margin of the stay constraint in the unit of h, and what leads back to `margin`, `[h]`/sⁿ: chosen there too.
+    pub stay_margin: f64,
+    /// See `stay_margin`.
+    pub pull: f64,
+    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor.
+    pub gain: f64,
     /// μ in the unit of h, chosen at the anchor: the settings' margin and what held inputs cost.
     pub margin: f64,
     /// The sampling period in s that was accounted for at the anchor, 0 for none.
@@ -68,10 +75,8 @@ pub struct FixedTimeState {
     pub fallback: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
-    /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
-    /// phase, and every step since then was satisfied (whoever enforces the row clears this if not).
-    /// With a margin, an approach also loses it where a sample shows that held inputs have used up the
-    /// margin (h below the profile); without one it is of the continuous-time constraint only.
+    /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
+    /// Whoever enforces the row clears this where it is not met, or where the held input breaks the promise on the way.
     pub guaranteed: bool,
     /// The steps in a row that did not meet its constraint, until now.
     pub unmet: Option<Unmet>,
@@ -154,6 +159,14 @@ pub struct FixedTime {
     own: Option<Arc<dyn Profile + Send + Sync>>,
     /// A constraint of one's own in place of the settings' method.
     condition: Option<Arc<dyn Condition + Send + Sync>>,
+}
+
+/// h − μ and its derivatives.
+fn from_margin<const N: usize>(h: &[f64], margin: f64) -> [f64; N] {
+    let mut e = [0.0; N];
+    e.copy_from_slice(&h[..N]);
+    e[0] -= margin;
+    e
 }
 
 impl fmt::Debug for FixedTime {
@@ -261,16 +274,29 @@ impl FixedTime {
     /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0: what starts a theorem starts from the smallest
     /// derivatives there can be, and what ends one is h < 0 for certain. Arrival stays that of `h` as it is given.
     pub fn advance_within(&self, state: &mut FixedTimeState, t: f64, h: &[f64], errors: &Stack) -> Demand {
+        self.advance_by(state, t, h, errors, &Means { hold: state.period, ..Means::UNKNOWN })
+    }
+
+    /// As [`Self::advance_within`], where `means` says what plant and inputs can do: the rate of the stay constraint is
+    /// chosen for that.
+    pub fn advance_by(
+        &self,
+        state: &mut FixedTimeState,
+        t: f64,
+        h: &[f64],
+        errors: &Stack,
+        means: &Means,
+    ) -> Demand {
         // With n known to the compiler the short loops of the formulas unroll.
         match self.n {
-            1 => self.advance_degree::<1>(state, t, h, errors),
-            2 => self.advance_degree::<2>(state, t, h, errors),
-            3 => self.advance_degree::<3>(state, t, h, errors),
-            4 => self.advance_degree::<4>(state, t, h, errors),
-            5 => self.advance_degree::<5>(state, t, h, errors),
-            6 => self.advance_degree::<6>(state, t, h, errors),
-            7 => self.advance_degree::<7>(state, t, h, errors),
-            _ => self.advance_degree::<8>(state, t, h, errors),
+            1 => self.advance_degree::<1>(state, t, h, errors, means),
+            2 => self.advance_degree::<2>(state, t, h, errors, means),
+            3 => self.advance_degree::<3>(state, t, h, errors, means),
+            4 => self.advance_degree::<4>(state, t, h, errors, means),
+            5 => self.advance_degree::<5>(state, t, h, errors, means),
+            6 => self.advance_degree::<6>(state, t, h, errors, means),
+            7 => self.advance_degree::<7>(state, t, h, errors, means),
+            _ => self.advance_degree::<8>(state, t, h, errors, means),
         }
     }
 
@@ -281,6 +307,7 @@ impl FixedTime {
         t: f64,
         h: &[f64],
         errors: &Stack,
+        means: &Means,
     ) -> Demand {
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
@@ -290,44 +317,101 @@ impl FixedTime {
         if let Some(condition) = &self.condition {
             return self.advance_condition(&**condition, state, t, h);
         }
-        if let Some(recovery) = self.settings.recovery
-            && state.phase == Phase::Stay
-            && is_outside
-        {
+        let was_left = state.phase == Phase::Stay && is_outside;
+        if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
             self.anchor(state, t, &lowest, recovery, state.period);
             state.recoveries = state.recoveries.saturating_add(1);
         }
-        let FixedTimeState { stay_rate, margin, deadline, .. } = *state;
-        let mut e = [0.0; N];
-        e.copy_from_slice(&h[..N]);
-        e[0] -= margin;
         let elapsed = (t - state.anchor_time).max(0.0);
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
         }
-        match state.phase {
-            _ if stay::is_invariant(stay_rate, &from_fn::<_, N, _>(|k| e[k] - errors[k])) => {
-                state.phase = Phase::Stay;
-                state.guaranteed = true;
-            }
-            Phase::Stay if !is_outside => {}
-            Phase::Stay | Phase::Left => {
-                state.phase = Phase::Left;
-                state.guaranteed = false;
-            }
-            _ if elapsed >= deadline && is_outside => {
-                state.phase = Phase::Late;
-                state.guaranteed = false;
-            }
-            _ => {}
-        }
-
+        self.change_phase(state, elapsed, &lowest, is_outside, means);
         let (floor, profile) = match state.phase {
-            Phase::Stay | Phase::Left => (-lower_terms(stay_rate, &e), 0.0),
-            _ => self.approach(state, elapsed, &e, errors),
+            Phase::Stay => self.stay(state, h, &lowest, means),
+            Phase::Left => {
+                state.guaranteed = false;
+                (state.stay_rate, state.stay_margin, state.pull) =
+                    (self.base_rate(&lowest, means), state.margin, 0.0);
+                (-lower_terms(state.stay_rate, &from_margin::<N>(h, state.margin)), state.margin)
+            }
+            _ => {
+                let e = from_margin::<N>(h, state.margin);
+                let (floor, bound) = self.approach(state, elapsed, &e, errors);
+                (floor, bound + state.margin)
+            }
         };
+        // What was promised is broken here; the new promise is for later samples to give.
+        state.guaranteed &= !was_left;
         let floor = floor + self.settings.disturbance;
-        Demand { floor, profile: profile + margin, time_left: (deadline - elapsed).max(0.0) }
+        let time_left = if state.deadline.is_finite() { (state.deadline - elapsed).max(0.0) } else { 0.0 };
+        Demand { floor, profile, time_left }
+    }
+
+    /// Which phase begins at this sample.
+    fn change_phase<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        elapsed: f64,
+        lowest: &[f64; N],
+        is_outside: bool,
+        means: &Means,
+    ) {
+        let (is_inside, is_over) = (lowest[0] >= 0.0, elapsed >= state.deadline);
+        let keeps = |margin: f64| {
+            let base = self.base_rate(lowest, means);
+            is_inside && stay::is_invariant(base, &from_margin::<N>(lowest, margin))
+        };
+        state.phase = match state.phase {
+            Phase::Stay | Phase::Left if is_outside => Phase::Left,
+            Phase::Stay => Phase::Stay,
+            Phase::Left if is_inside => Phase::Stay,
+            // Until the deadline the profile may ask for less than staying does.
+            Phase::Approach if !is_over && keeps(state.margin) => Phase::Stay,
+            Phase::Approach if is_over && is_inside => Phase::Stay,
+            Phase::Late if is_inside => Phase::Stay,
+            Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
+            other => other,
+        };
+        state.guaranteed &= !matches!(state.phase, Phase::Late | Phase::Left);
+    }
+
+    /// The floor under h⁽ⁿ⁾ and the bound on h while the set is kept.
+    fn stay<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        h: &[f64],
+        lowest: &[f64; N],
+        means: &Means,
+    ) -> (f64, f64) {
+        let drift = means.drift - self.settings.disturbance;
+        let means = Means { drift, ..*means };
+        let keep = stay::keep(lowest, state.margin, self.base_rate(lowest, &means), &means);
+        (state.stay_rate, state.stay_margin, state.pull) = (keep.rate, keep.margin, keep.pull);
+        state.guaranteed = keep.is_invariant;
+        (keep.pull - lower_terms(keep.rate, &from_margin::<N>(h, keep.margin)), keep.margin)
+    }
+
+    /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
+    fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
+        /// The part of what bounds allow that is used where there is time.
+        const COMFORTABLE: f64 = 0.5;
+        if let Some(rate) = self.settings.stay_rate.or(self.settings.rate) {
+            return rate;
+        }
+        let by_time = match self.settings.deadline {
+            Some(deadline) => FixedTimeSettings::default_rate(deadline, means.hold),
+            None => f64::INFINITY,
+        };
+        let brakes = COMFORTABLE * (means.drift + means.reach);
+        let by_brakes = match brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
+            true => (brakes / h[0]).powf(1.0 / N as f64),
+            false if by_time.is_finite() => by_time,
+            false => FixedTimeSettings::DEFAULT_KEEP_RATE,
+        };
+        let by_hold = stay::LARGEST_RATE_TIMES_HOLD / means.hold;
+        let rate = by_time.min(by_brakes);
+        if means.hold > 0.0 { rate.min(by_hold) } else { rate }
     }
 
     /// [`Self::advance`] under a constraint of one's own, after anchoring.
@@ -387,7 +471,11 @@ impl FixedTime {
         let (n, past) = (self.n, deadline <= 0.0);
         let allowed = if past { self.deadline() } else { deadline };
         let default_rate = FixedTimeSettings::default_rate(allowed, period);
-        let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
+        let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(match allowed.is_finite() {
+            true => default_rate,
+            false => FixedTimeSettings::DEFAULT_KEEP_RATE,
+        });
+        let keeps = self.condition.is_none() && (h[0] >= 0.0 || deadline == f64::INFINITY);
         let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
         anchor[..n].copy_from_slice(&h[..n]);
         let mut margin = settings.margin;
@@ -396,8 +484,10 @@ impl FixedTime {
         match settings.method {
             _ if self.condition.is_some() => {}
             Method::ReferenceProfile => {
-                rate = settings.rate.unwrap_or(default_rate);
-                if !past && period > 0.0 {
+                rate = settings.rate.unwrap_or(if keeps { stay_rate } else { default_rate });
+                if keeps {
+                    margin += sampled::ROUND_OFF * h[0].abs();
+                } else if !past && period > 0.0 {
                     let attenuation = self.attenuation(rate, deadline);
                     margin += sampled::margin(self.built_in(), &anchor[..n], deadline, attenuation, period);
                 }
@@ -406,7 +496,7 @@ impl FixedTime {
             Method::RepeatedRoot | Method::FirstOrder(_) => {}
         }
         anchor[0] -= margin;
-        if !past {
+        if !past && !keeps {
             if settings.method == Method::RepeatedRoot {
                 match repeated_root::rate(&anchor[..n], deadline) {
                     Ok(root) => rate = root,
@@ -417,7 +507,7 @@ impl FixedTime {
             }
         }
         *state = FixedTimeState {
-            phase: Phase::Approach,
+            phase: if keeps { Phase::Stay } else { Phase::Approach },
             start_time: state.start_time,
             anchor_time: t,
             deadline,
@@ -426,6 +516,9 @@ impl FixedTime {
             anchor,
             rate,
             stay_rate,
+            stay_margin: margin,
+            pull: 0.0,
+            gain: 0.0,
             margin,
             period,
             fallback,
@@ -443,11 +536,35 @@ impl FixedTime {
         if self.settings.method != Method::ReferenceProfile || self.condition.is_some() {
             return;
         }
-        let FixedTimeState { arrival, guaranteed, phase, .. } = *state;
+        let FixedTimeState { arrival, guaranteed, phase, gain, .. } = *state;
         let mut h = state.anchor;
         h[0] += state.margin;
         self.anchor(state, state.anchor_time, &h[..self.n], state.deadline, period);
-        (state.arrival, state.guaranteed, state.phase) = (arrival, guaranteed, phase);
+        (state.arrival, state.guaranteed, state.phase, state.gain) = (arrival, guaranteed, phase, gain);
+    }
+
+    /// Starts the profile anew from the sample at time `t` (s) that `state` has been moved to, where `h` holds the smallest
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there, if the theorem has been lost on the way to it: with the time that is left until the same
+    /// deadline. The error is zero again, so the theorem applies again. Returns whether it did.
+    ///
+    /// Not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a profile of
+    /// one's own, whose check takes long.
+    pub fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
+        /// Samples, and part of the configured deadline, that must be left.
+        const SAMPLES: f64 = 10.0;
+        const PART: f64 = 0.05;
+        let left = state.deadline - (t - state.anchor_time);
+        let lost = state.phase == Phase::Approach && !state.guaranteed && h[0] < 0.0 && t > state.anchor_time;
+        let can = self.settings.method == Method::ReferenceProfile
+            && self.own.is_none()
+            && self.condition.is_none();
+        if !lost || !can || left < (SAMPLES * period).max(PART * self.deadline()) {
+            return false;
+        }
+        let FixedTimeState { arrival, gain, .. } = *state;
+        self.anchor(state, t, h, left, period);
+        (state.arrival, state.gain) = (arrival, gain);
+        true
     }
 
     /// The profile of the settings.
@@ -485,12 +602,18 @@ impl FixedTime {
     ) -> (f64, f64) {
         let anchor = &state.anchor[..N];
         match self.settings.method {
-            Method::RepeatedRoot => (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed)),
+            Method::RepeatedRoot => {
+                // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
+                let ahead = lower_bound(state.rate, e, (state.deadline - elapsed).max(0.0));
+                let scale = MARGIN_TOLERANCE * (anchor[0].abs() + state.margin);
+                state.guaranteed &= ahead >= -state.margin - scale;
+                (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed))
+            }
             Method::FirstOrder(exponent) => {
                 let deadline = state.deadline;
                 let bound = exponent.lower_bound(anchor[0], deadline, elapsed);
                 // The comparison can start at any sample that is not below the bound.
-                state.guaranteed |= elapsed < deadline && e[0] >= bound;
+                state.guaranteed = state.phase == Phase::Approach && elapsed < deadline && e[0] >= bound;
                 (exponent.floor(anchor[0], deadline, e[0]), bound)
             }
             Method::ReferenceProfile => {
@@ -502,22 +625,19 @@ impl FixedTime {
                     _ => self.profile(state, elapsed),
                 };
                 let error: [f64; N] = from_fn(|k| e[k] - r[k]);
-                // h below r: what held inputs cost has used up the margin, and the deadline may be missed.
-                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
-                if state.margin > 0.0 && error[0] < -state.margin - errors[0] - scale {
-                    state.guaranteed = false;
-                }
                 let terms = match &self.settings.rates {
                     Some(rates) => rates.lower_terms(&error),
                     None => lower_terms(state.rate, &error),
                 };
+                // The lemma with what is left of the margin: from this sample on h ≥ r, if the constraint holds.
                 let lowest: [f64; N] = from_fn(|k| error[k] - errors[k]);
-                let invariant = || match &self.settings.rates {
-                    Some(rates) => rates.is_invariant(&lowest),
-                    None => stay::is_invariant(state.rate, &lowest),
-                };
-                // The lemma can start at any sample before the deadline, also after one that was lost.
-                state.guaranteed = state.guaranteed || elapsed < state.deadline && invariant();
+                let left = state.margin
+                    + match &self.settings.rates {
+                        Some(rates) => rates.affordable_margin(&lowest),
+                        None => stay::affordable_margin(state.rate, &lowest),
+                    };
+                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
+                state.guaranteed = state.phase == Phase::Approach && state.deadline > 0.0 && left >= -scale;
                 (r[N] - terms, r[0])
             }
         }

@@ -126,6 +126,27 @@ impl Operator {
     }
 }
 
+impl Operator {
+    /// The largest μ, negative where there is none ≥ 0, for which e − μ satisfies [`Self::is_invariant`] from `e`.
+    pub fn affordable_margin(&self, e: &[f64]) -> f64 {
+        let mut cascade = [0.0; MAX_RELATIVE_DEGREE];
+        cascade[..self.n].copy_from_slice(&e[..self.n]);
+        let (mut least, mut product) = (f64::INFINITY, 1.0);
+        for i in 0..self.n {
+            let margin = cascade[0] / product;
+            // Not `f64::min`, which would drop what is not a number.
+            if !(margin >= least) {
+                least = margin;
+            }
+            for j in 0..self.n - 1 - i {
+                cascade[j] = cascade[j + 1] + self.rates[i] * cascade[j];
+            }
+            product *= self.rates[i];
+        }
+        least
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{comparison, stay};

@@ -145,7 +145,7 @@ pub(super) fn margin_along(
 const LARGEST_MARGIN: f64 = 0.01;
 
 /// The tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
-const ROUND_OFF: f64 = 1e-8;
+pub(super) const ROUND_OFF: f64 = 1e-8;
 
 fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
@@ -202,19 +202,21 @@ impl FixedTime {
                 *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
             }
         }
+        let stays = matches!(state.phase, Phase::Stay | Phase::Left);
+        let (margin, pull) = if stays { (state.stay_margin, state.pull) } else { (state.margin, 0.0) };
         // What h is compared with: μ + r and its derivatives.
         let target = |elapsed: f64| {
             let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
             if follows {
                 r = self.profile(state, elapsed);
             }
-            r[0] += state.margin;
+            r[0] += margin;
             r
         };
         let (now, then) = (target(elapsed), target(elapsed + period));
         let decay = (-last * period).exp();
         let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
-        let floor = undisturbed + self.disturbed(&weights, period);
+        let floor = undisturbed + pull * period + self.disturbed(&weights, period);
         Some(SampledDemand { weights, floor, attenuation, decay })
     }
 

@@ -62,7 +62,9 @@ pub struct FixedTimeSettings {
     pub rate: Option<f64>,
     /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
     pub rates: Option<Operator>,
-    /// a of the stay constraint in 1/s, finite, > 0. Default: [`Self::default_rate`].
+    /// a of the stay constraint in 1/s, finite, > 0; a larger one is taken where it must be
+    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T; where inputs have bounds at most what braking with
+    /// half of them allows, (b/2e)^{1/n}; without a deadline that alone, and 2/s without bounds.
     pub stay_rate: Option<f64>,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. What held inputs are expected
     /// to cost comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
@@ -80,6 +82,9 @@ pub struct FixedTimeSettings {
 impl FixedTimeSettings {
     /// Rate times deadline of [`Self::default_rate`], for periods that are short against the deadline.
     pub const DEFAULT_RATE_TIMES_DEADLINE: f64 = 20.0;
+
+    /// The default of `stay_rate` in 1/s where neither a deadline nor bounds on the inputs say anything.
+    pub const DEFAULT_KEEP_RATE: f64 = 2.0;
 
     /// Rate times sampling period that [`Self::default_rate`] stays below.
     pub const DEFAULT_RATE_TIMES_PERIOD: f64 = 0.5;

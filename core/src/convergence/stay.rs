@@ -13,8 +13,22 @@
 //! and A_0 … A_k are ≥ 0 on a smaller ray [a_k, ∞), or nowhere if A_k is a negative constant. By
 //! induction the rates ≥ 0 with all c_k ≥ 0 are a ray [a_min, ∞), and there is none if and only if the
 //! first derivative that is not zero is negative. Every rate above [`smallest_rate`] will do as well.
+//!
+//! **The rate of a sample.** Along an active or inactive constraint the A_k stay ≥ 0, so a rate that would do at one
+//! sample does at the next: the rate may be chosen anew at every sample, from what is known there, and h ≥ 0 stays
+//! true. The least h⁽ⁿ⁾ that a rate asks for,
+//!
+//! ```math
+//! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
+//! ```
+//!
+//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can, and a larger one
+//! where the gentle one asks for what the inputs cannot give and nothing is about to be left.
+//!
+//! **Any margin will do.** With e = h − μ all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n: the least of them,
+//! [`affordable_margin`], is the largest margin with which the lemma holds.
 
-use super::comparison::scaled_coefficient;
+use super::comparison::{lower_terms, scaled_coefficient};
 use super::polynomial::first;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
@@ -46,6 +60,106 @@ pub fn smallest_rate(e: &[f64]) -> Option<f64> {
         return Some(0.0);
     }
     is_invariant(f64::MAX, e).then(|| first(0.0, f64::MAX, |rate| is_invariant(rate, e)))
+}
+
+/// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative where none ≥ 0 does. `h` holds
+/// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
+pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
+    let (mut least, mut power) = (h[0], 1.0);
+    for k in 1..h.len() {
+        power *= rate;
+        let margin = scaled_coefficient(rate, h, k) / power;
+        // Not `f64::min`, which would drop what is not a number.
+        if !(margin >= least) {
+            least = margin;
+        }
+    }
+    least
+}
+
+/// What plant and inputs can do about h⁽ⁿ⁾ at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Means {
+    /// L_fⁿh, `[h]`/sⁿ: what h⁽ⁿ⁾ is without an input.
+    pub drift: f64,
+    /// The most that inputs within their bounds add to it, `[h]`/sⁿ; infinite without bounds.
+    pub reach: f64,
+    /// ‖L_gL_f^{n−1}h‖ as a part of the largest that has been seen, 0 ..= 1: how well h can be influenced now.
+    pub weight: f64,
+    /// The longest time in s for which the input may be held, 0 where it is not known.
+    pub hold: f64,
+}
+
+impl Means {
+    /// Nothing is known: every h⁽ⁿ⁾ can be had at once.
+    pub const UNKNOWN: Self = Self { drift: 0.0, reach: f64::INFINITY, weight: 1.0, hold: 0.0 };
+}
+
+/// How the set is kept from a sample: (D + a)ⁿ (h − μ) ≥ pull.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keep {
+    /// a in 1/s.
+    pub rate: f64,
+    /// μ ≥ 0, `[h]`.
+    pub margin: f64,
+    /// What leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
+    pub pull: f64,
+    /// Whether the lemma holds with these: h ≥ μ from now on.
+    pub is_invariant: bool,
+}
+
+/// Rate times hold that an error can follow: a faster one changes more within two samples than an input can do about it.
+pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
+
+/// The rate of least peak over the smallest rate, for n = 2: braking from ė then takes ¾ ė²/e, where a constant ½ ė²/e
+/// would just do. (With the smallest rate it takes ė²/e.)
+const OVER_SMALLEST: f64 = 1.5;
+
+/// Where no period limits the rate: this many times what is asked for.
+const LARGEST_RATE_OVER_BASE: f64 = 1e6;
+
+/// How to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): `margin` μ and rate `base` > 0 where they will do, what is
+/// needed where they do not.
+///
+/// 1. The margin is the one asked for, or what is affordable at the largest rate that samples can follow.
+/// 2. The rate is `base`, or 1.5 times the smallest that will do.
+/// 3. It is raised where the input cannot give what it asks for: beyond what bounds allow (`means.reach`), and where h
+///    can hardly be influenced (`means.weight`), by as much as the plant itself pulls h⁽ⁿ⁾ down there. At the centre of
+///    a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
+    let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
+    let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
+    let affordable = affordable_margin(limit, h);
+    let (is_invariant_at_limit, kept) = (affordable >= 0.0, affordable.clamp(0.0, margin));
+    let mut e = [0.0; crate::MAX_RELATIVE_DEGREE];
+    e[..h.len()].copy_from_slice(h);
+    e[0] -= kept;
+    let e = &e[..h.len()];
+    if !is_invariant_at_limit {
+        // As hard as it must be where that can be said, beyond what samples can follow.
+        let rate = smallest_rate(e).map_or(limit, |rate| rate.max(base));
+        return Keep { rate, margin: kept, pull: 0.0, is_invariant: false };
+    }
+    let gentle = match is_invariant(base / OVER_SMALLEST, e) {
+        true => base,
+        false => smallest_rate(e).map_or(limit, |rate| OVER_SMALLEST * rate).clamp(base, limit),
+    };
+    let floor = |rate: f64| -lower_terms(rate, e);
+    let wanted = floor(gentle);
+    // What the plant pulls down is left to later where h can hardly be influenced.
+    let relieved = means.drift.min(0.0) + wanted.max(0.0);
+    let target =
+        if wanted > relieved { relieved + means.weight.powi(2) * (wanted - relieved) } else { wanted };
+    let possible = means.drift + means.reach;
+    let target = target.min(possible);
+    let rate = match wanted <= target {
+        true => gentle,
+        false if floor(limit) > target => limit,
+        false => first(gentle, limit, |rate| floor(rate) <= target),
+    };
+    let spare = if rate == gentle { (possible - wanted).max(0.0) } else { 0.0 };
+    let pull = (base.powi(h.len() as i32) * (margin - kept)).min(spare);
+    Keep { rate, margin: kept, pull, is_invariant: true }
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};
 use super::{
-    BarrierSettings, Begin, Channel, End, FilterState, Report, SafetyFilter, Sampling, Strictness, Workspace,
+    BarrierSettings, Begin, Channel, End, FilterState, Outlook, Report, SafetyFilter, Sampling, Strictness,
+    Workspace,
 };
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
@@ -25,6 +26,7 @@ pub struct FilterBuilder {
     bounds: Bounds,
     correction_limit: f64,
     sampling: Sampling,
+    period_max: f64,
     delay: f64,
     errors: Vec<f64>,
     backend: Backend,
@@ -42,6 +44,7 @@ impl FilterBuilder {
             bounds: Bounds::NONE,
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
+            period_max: 0.0,
             delay: 0.0,
             errors: Vec::new(),
             backend: Backend::default(),
@@ -314,6 +317,18 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// The longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any length up
+    /// to it. A longer one withdraws them until the next sample shows that they can be given again. Default: the period
+    /// that [`Sampling`] assumes.
+    ///
+    /// # Errors
+    ///
+    /// A time that is not finite or ≤ 0.
+    pub fn period_max(mut self, longest: f64) -> Result<Self, Error> {
+        self.period_max = positive("period_max", longest)?;
+        Ok(self)
+    }
+
     /// The time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
     /// master that exchanges all values first (Jacobi). Default: 0.
     ///
@@ -365,6 +380,7 @@ impl FilterBuilder {
             bounds,
             correction_limit,
             sampling,
+            period_max,
             delay,
             errors,
             backend,
@@ -415,6 +431,8 @@ impl FilterBuilder {
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],
             slopes: vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count() * channels.len()],
+            outlooks: vec![Outlook::NONE; channels.len()],
+            scratch: vec![0.0; state_dim],
             report: Report::new(channels.len()),
             programme: qp::Workspace::new(backend),
         };
@@ -431,6 +449,8 @@ impl FilterBuilder {
             delay,
             errors,
             first_period,
+            period_max,
+            expected: None,
             state,
             workspace,
         })

@@ -117,17 +117,18 @@ impl Channel {
         promise: &mut FixedTimeState,
         (begin, delay): (f64, f64),
         h: &[f64],
-        (period, measured_first): (Option<f64>, bool),
+        (period, measures): (f64, bool),
     ) {
-        if promise.phase != Phase::Waiting && !measured_first {
+        /// A period longer by less than this part of it is the same.
+        const SAME_PERIOD: f64 = 1e-6;
+        if promise.phase != Phase::Waiting && !measures {
             return;
         }
-        let period = period.unwrap_or(0.0);
         if promise.phase == Phase::Waiting {
             let waited = begin - delay - promise.start_time.unwrap_or(begin - delay);
             let deadline = self.promise.deadline() - waited - delay;
             self.promise.anchor(promise, begin, h, deadline, period);
-        } else if promise.phase == Phase::Approach && period > promise.period {
+        } else if promise.phase == Phase::Approach && period > promise.period * (1.0 + SAME_PERIOD) {
             self.promise.resample(promise, period);
         }
     }

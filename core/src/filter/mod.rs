@@ -8,6 +8,7 @@
 mod builder;
 mod channel;
 mod errors;
+mod hold;
 mod integrator;
 mod report;
 mod sampling;
@@ -26,6 +27,7 @@ pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 
 use crate::convergence::sampled::SampledDemand;
+use crate::convergence::stay::Means;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{DerivativeSource, Derivatives};
@@ -72,6 +74,10 @@ struct Workspace {
     predicted: Vec<f64>,
     /// Of each barrier by each measurement error.
     slopes: Vec<Slopes>,
+    /// Of each barrier what its derivatives say of h until the next sample.
+    outlooks: Vec<Outlook>,
+    /// One state.
+    scratch: Vec<f64>,
     report: Report,
     programme: qp::Workspace,
 }
@@ -102,6 +108,10 @@ pub struct SafetyFilter {
     errors: MeasurementErrors,
     /// The period in s that [`Sampling::Measured`] starts from.
     first_period: f64,
+    /// The longest time in s between two samples, 0 where it is not given.
+    period_max: f64,
+    /// For how long the next input will be held, in s, if somebody said so.
+    expected: Option<f64>,
     state: FilterState,
     workspace: Workspace,
 }
@@ -159,8 +169,19 @@ impl SafetyFilter {
         length("u", u.len(), self.input_dim)?;
         let begin = t + self.delay;
         let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
-        let Workspace { derivatives, rows, enforcement, demands, next, predicted, slopes, report, programme } =
-            &mut self.workspace;
+        let Workspace {
+            derivatives,
+            rows,
+            enforcement,
+            demands,
+            next,
+            predicted,
+            slopes,
+            outlooks,
+            scratch,
+            report,
+            programme,
+        } = &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
         if !t.is_finite() || !all_finite(x) || !all_finite(u_ref) {
@@ -170,8 +191,10 @@ impl SafetyFilter {
             return Ok(());
         }
 
-        let period = self.sampling.period(&self.state, t, self.first_period);
-        let first = self.sampling.measures_first(&self.state, t);
+        let period = self.sampling.period(&self.state, t, self.first_period, self.expected);
+        let since = self.state.time.map_or(0.0, |last| (t - last).max(0.0));
+        let hold = period.unwrap_or(since).max(self.period_max);
+        let measures = matches!(self.sampling, Sampling::Measured { .. });
         let mut sampled = period;
         // Slices of one length, so that indices need no check.
         let count = self.channels.len();
@@ -215,14 +238,23 @@ impl SafetyFilter {
             }
             let lowest: [f64; MAX_RELATIVE_DEGREE] =
                 std::array::from_fn(|k| derivatives.drift[k] - unsure[k]);
-            channel.anchor(promise, (begin, self.delay), &lowest[..n], (period, first));
-            let mut demand = channel.promise.advance_within(promise, begin, stack, &unsure);
+            channel.anchor(
+                promise,
+                (begin, self.delay),
+                &lowest[..n],
+                (period.map_or(0.0, |_| hold), measures),
+            );
+            let means = means(derivatives, n, &self.bounds, promise, hold, u.len());
+            let mut demand = channel.promise.advance_by(promise, begin, stack, &unsure, &means);
+            if channel.promise.restart(promise, begin, &lowest[..n], period.map_or(0.0, |_| hold)) {
+                demand = channel.promise.advance_by(promise, begin, stack, &unsure, &means);
+            }
             let mut late_certain = promise.phase == Phase::Late;
             if late_certain || self.bounded {
                 let (now, time_left) = ((begin, from), demand.time_left);
                 late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
                 if late_certain && channel.postpone(promise, now, &self.bounds, &lowest[..n], period) {
-                    demand = channel.promise.advance_within(promise, begin, stack, &unsure);
+                    demand = channel.promise.advance_by(promise, begin, stack, &unsure, &means);
                     late_certain = false;
                 }
             }
@@ -236,6 +268,7 @@ impl SafetyFilter {
                     None => sampled = None,
                 }
             }
+            outlooks[i] = Outlook::new(derivatives, n);
             reports[i] = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
             if !row.floor.is_finite() {
                 report.status = Status::Singular;
@@ -301,6 +334,13 @@ impl SafetyFilter {
             let (row, promise, report_b) = (&rows[i], &mut promises[i], &mut reports[i]);
             if matches!(promise.phase, Phase::Waiting | Phase::Released) {
                 continue;
+            }
+            let states =
+                if self.delay > 0.0 || period.is_some() { &predicted[i * x.len()..][..x.len()] } else { x };
+            let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: states, u };
+            let normal = &report_b.row.normal;
+            if promise.guaranteed && !is_kept_over(promise, &outlooks[i], &held, normal, hold, scratch) {
+                promise.guaranteed = false;
             }
             if let Some(period) = period.filter(|_| report.predicted) {
                 report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period);
@@ -464,6 +504,18 @@ impl SafetyFilter {
         Ok(())
     }
 
+    /// Says for how long the input of the next sample will be held, in s, finite, > 0, or that nobody knows (`None`): for
+    /// whoever is told, such as a co-simulation slave by the size of its step. [`Sampling::Measured`] then goes by it.
+    /// It is asked at every sample, and not part of [`Self::state`].
+    ///
+    /// # Errors
+    ///
+    /// A time out of range.
+    pub fn expect_hold(&mut self, hold: Option<f64>) -> Result<(), Error> {
+        self.expected = hold.map(|hold| positive("hold", hold)).transpose()?;
+        Ok(())
+    }
+
     fn channel(&mut self, index: usize) -> Result<&mut Channel, Error> {
         let count = self.channels.len();
         let message = || format!("is {index}, must be < {count}, the number of barriers");
@@ -482,6 +534,96 @@ impl SafetyFilter {
     }
 }
 
+/// What plant and inputs can do about a barrier at a sample; notes how well it can be influenced.
+fn means(
+    derivatives: &Derivatives,
+    n: usize,
+    bounds: &Bounds,
+    promise: &mut FixedTimeState,
+    hold: f64,
+    inputs: usize,
+) -> Means {
+    let (mut square, mut reach) = (0.0, 0.0);
+    for i in 0..inputs {
+        let a = derivatives.row[i];
+        square += a * a;
+        if a != 0.0 {
+            reach += f64::max(a * bounds.min[i], a * bounds.max[i]);
+        }
+    }
+    let size = square.sqrt();
+    promise.gain = promise.gain.max(size);
+    let weight = if promise.gain > 0.0 { size / promise.gain } else { 1.0 };
+    Means { drift: derivatives.drift[n], reach, weight, hold }
+}
+
+/// What the derivatives at a sample say of h until the next.
+#[derive(Clone, Copy)]
+struct Outlook {
+    n: usize,
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, then L_fⁿh.
+    drift: [f64; MAX_RELATIVE_DEGREE + 1],
+}
+
+impl Outlook {
+    const NONE: Self = Self { n: 0, drift: [0.0; MAX_RELATIVE_DEGREE + 1] };
+
+    fn new(derivatives: &Derivatives, n: usize) -> Self {
+        Self { n, drift: derivatives.drift }
+    }
+
+    /// The Taylor polynomial of order n of h, `s` seconds later; every term but the first as `sign` says.
+    fn polynomial(&self, highest: f64, s: f64, sign: impl Fn(f64) -> f64) -> f64 {
+        let (mut power, mut sum) = (1.0, self.drift[0]);
+        for k in 1..=self.n {
+            power *= s / k as f64;
+            sum += sign(power * if k == self.n { highest } else { self.drift[k] });
+        }
+        sum
+    }
+}
+
+/// Whether the promise holds at every instant of the `hold` that begins, along the model.
+fn is_kept_over(
+    promise: &FixedTimeState,
+    outlook: &Outlook,
+    held: &hold::Hold,
+    normal: &[f64; MAX_INPUTS],
+    hold: f64,
+    scratch: &mut [f64],
+) -> bool {
+    /// Round-off, as a part of the size of h.
+    const ROUND_OFF: f64 = 1e-12;
+    /// The part of h that must be left for the model not to be asked.
+    const CLEAR: f64 = 0.5;
+    /// Instants at which a source that cannot predict is looked at.
+    const INSTANTS: u32 = 16;
+    let from = match promise.phase {
+        Phase::Stay => 0.0,
+        Phase::Approach => (promise.anchor_time + promise.deadline - held.t).max(0.0),
+        _ => return true,
+    };
+    // Also where the end is not a number.
+    if !(from < hold) {
+        return true;
+    }
+    let highest = outlook.drift[outlook.n] + qp::dot(normal, held.u);
+    // With n = 1 a set that moves faster than the samples shows in no derivative that is known here.
+    let h = outlook.drift[0];
+    if outlook.n > 1 && h > 0.0 && outlook.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h {
+        return true;
+    }
+    let least = match held.lowest(from, hold, scratch) {
+        Some(lowest) => lowest.h,
+        None => (0..=INSTANTS)
+            .map(|i| from + (hold - from) * f64::from(i) / f64::from(INSTANTS))
+            .map(|s| outlook.polynomial(highest, s, |term| term))
+            .fold(f64::INFINITY, f64::min),
+    };
+    let size = promise.anchor[0].abs() + promise.margin + h.abs();
+    least >= -ROUND_OFF * size
+}
+
 /// A sample that enforces nothing: the admissible input nearest 0. The promises stay as they were in
 /// `state`, but those already given lose their guarantee.
 fn abstain(state: &FilterState, bounds: &Bounds, next: &mut FilterState, report: &mut Report, u: &mut [f64]) {
@@ -498,15 +640,18 @@ fn abstain(state: &FilterState, bounds: &Bounds, next: &mut FilterState, report:
 /// Why derivatives cannot carry a constraint, if they cannot.
 #[inline]
 fn defect(derivatives: &Derivatives) -> Option<Status> {
-    /// An input that enters below the declared degree by more than this part of the row (or of 1)
-    /// is real; round-off of cancelling terms stays far below.
-    const ROUND_OFF: f64 = 1e-9;
+    /// An input that enters below the declared degree by more than this part of the row is real.
+    const OF_ROW: f64 = 1e-9;
+    /// So is one by more than this part of the derivatives themselves; round-off of cancelling terms stays below.
+    const OF_DERIVATIVES: f64 = 1e-13;
     if !derivatives.is_finite() {
         return Some(Status::Singular);
     }
-    if derivatives.lower_sensitivity <= ROUND_OFF {
+    if derivatives.lower_sensitivity <= 0.0 {
         return None;
     }
-    let size = derivatives.row.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
-    (derivatives.lower_sensitivity > ROUND_OFF * size).then_some(Status::WrongRelativeDegree)
+    let size = derivatives.row.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
+    let terms = derivatives.drift.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
+    let is_real = derivatives.lower_sensitivity > (OF_ROW * size).max(OF_DERIVATIVES * terms);
+    is_real.then_some(Status::WrongRelativeDegree)
 }

@@ -31,8 +31,10 @@ pub enum Sampling {
     /// Not at all: the constraint is enforced at the samples, and the margin has to cover what the held
     /// input costs, Mδ/aⁿ.
     Pointwise,
-    /// The constraint is enforced over the period since the step before, taken as the next one's length.
-    /// After a gap the period at most doubles from step to step. The default.
+    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a longer
+    /// one that was seen not long ago: a period is forgotten within a hundred of its length, so that a very short step
+    /// between long ones changes nothing. After a gap the period at most doubles from step to step. Where somebody says
+    /// how long the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it is that. The default.
     Measured {
         /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth
         /// of the shortest deadline.
@@ -66,23 +68,45 @@ impl Sampling {
     }
 
     /// The period in s that a step at `t` looks over, `None` for the pointwise constraint.
-    pub(super) fn period(self, state: &FilterState, t: f64, first: f64) -> Option<f64> {
-        match (self, state.time, state.period) {
-            (Self::Pointwise, ..) => None,
-            (Self::Period(period), ..) => Some(period),
-            // A sample at the same time, or an earlier one, says nothing new.
-            (_, Some(last), known) if t <= last => Some(known.unwrap_or(first)),
-            (_, Some(last), Some(known)) => Some(f64::min(t - last, 2.0 * known)),
-            (_, Some(last), None) => Some(t - last),
-            (_, None, _) => Some(first),
+    /// What somebody says of it (`expected`) is taken where it is another number than what was measured, and not the
+    /// same one with other round-off.
+    pub(super) fn period(
+        self,
+        state: &FilterState,
+        t: f64,
+        first: f64,
+        expected: Option<f64>,
+    ) -> Option<f64> {
+        /// Of one step, relative: times are sums of many.
+        const SAME: f64 = 1e-6;
+        match self {
+            Self::Pointwise => None,
+            Self::Period(period) => Some(period),
+            Self::Measured { .. } => {
+                let measured = measured(state, t, first);
+                let other = |e: &f64| (e - measured).abs() > SAME * measured;
+                Some(expected.filter(other).unwrap_or(measured))
+            }
         }
     }
+}
 
-    /// Whether a step at `t` is the first that measures the period.
-    pub(super) fn measures_first(self, state: &FilterState, t: f64) -> bool {
-        matches!(self, Self::Measured { .. })
-            && state.period.is_none()
-            && state.time.is_some_and(|last| t > last)
+/// The period in s that samples up to `t` show: that of the last step, or of longer ones not long before.
+fn measured(state: &FilterState, t: f64, first: f64) -> f64 {
+    /// By this part of the time that passes a longer period is forgotten: a hundred of them.
+    const FORGOTTEN: f64 = 0.01;
+    /// Growth from step to step.
+    const GROWTH: f64 = 2.0;
+    /// A first step shorter than this part of what was thought says nothing.
+    const TINY: f64 = 1e-3;
+    let Some(last) = state.time else { return first };
+    let passed = t - last;
+    match state.period {
+        // A sample at the same time, or an earlier one, says nothing new.
+        known if !(passed > 0.0) => known.unwrap_or(first),
+        Some(known) => passed.min(GROWTH * known).max(known - FORGOTTEN * passed),
+        None if passed < TINY * first => first,
+        None => passed,
     }
 }
 

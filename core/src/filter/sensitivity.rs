@@ -415,7 +415,7 @@ impl SafetyFilter {
 
 /// Whether the sample at `begin` anchored the promise.
 fn is_anchored(before: &FixedTimeState, after: &FixedTimeState, begin: f64) -> bool {
-    after.anchor_time == begin && (before.phase == Phase::Waiting || before.recoveries != after.recoveries)
+    after.anchor_time == begin && (before.phase == Phase::Waiting || before.anchor_time != begin)
 }
 
 /// Whether a soft row has its largest multiplier.
