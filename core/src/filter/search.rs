@@ -17,6 +17,8 @@
 //! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
 //! count as equal: a sample taken again gives the same bits.
 
+mod wide;
+
 use super::errors::{Slopes, Uncertainty};
 use super::{Channel, MeasurementErrors};
 use crate::convergence::sampled::SampledDemand;
@@ -26,6 +28,9 @@ use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// Violations up to this part of a row's terms count as met: what Newton's method leaves.
 const MET: f64 = 1e-9;
+/// Violations up to this part of the terms that the derivatives of h are made of count as met: some thousand
+/// roundings of 1e-16.
+const ROUND_OFF: f64 = 1e-12;
 /// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
@@ -141,6 +146,7 @@ impl Held<'_> {
         let mut guess = [0.0; MAX_INPUTS];
         // Whether the rows are linearised at the best guess.
         let mut at_best = false;
+        let mut settled = false;
         for start in [Some(&*pointwise), last].into_iter().flatten() {
             // The last input may come from a state that was made under other bounds.
             for i in 0..m {
@@ -152,16 +158,23 @@ impl Held<'_> {
             {
                 u.copy_from_slice(&guess[..m]);
                 let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
-                let sure = found.sure && near;
+                let (found_sure, sure) = (found.sure, found.sure && near);
                 (best, at_best) = (Some(found), true);
+                settled = found_sure;
                 if sure {
                     break;
                 }
             }
         }
-        let best = best?;
+        let mut best = best?;
+        if !settled && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme) {
+            (best, at_best) = (found, false);
+        }
+        at_best &= settled;
         if !at_best {
-            self.linearise(u, ALL, &mut at)?;
+            self.judge(u, &mut at)?;
+            // What is active at the answer.
+            programme.solve(&self.problem(at.rows), &mut guess[..m]);
         }
         let outcome = match best.outcome {
             Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
@@ -259,6 +272,55 @@ impl Held<'_> {
         Some(())
     }
 
+    /// As [`Self::linearise`] of all rows, where violations that are round-off count as met.
+    fn judge(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
+        self.linearise(u, ALL, at)?;
+        for i in 0..at.rows.len() {
+            if at.violations[i] > 0.0 && at.violations[i].is_finite() {
+                let (condition, row) = (&self.conditions[i], &at.rows[i]);
+                if -row.slack(u) <= ROUND_OFF * self.size(condition, u) {
+                    at.violations[i] = 0.0;
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// The size of the terms whose sum the row of a condition is.
+    ///
+    /// A sum that cancels says nothing about it: 10 − p on the boundary. But a change of every state and of the
+    /// time by a small part of itself shows it, as the terms no longer cancel: each part is another one, of
+    /// either sign, so that sums of states do not cancel again.
+    fn size(&self, condition: &Condition, u: &[f64]) -> f64 {
+        const STATES: usize = 64;
+        const PART: f64 = 1e-6;
+        let channel = &self.channels[condition.channel];
+        let states = self.x.len() / self.channels.len();
+        let x = &self.x[condition.channel * states..][..states];
+        if states > STATES {
+            return 0.0;
+        }
+        let mut moved = [0.0; STATES];
+        for (i, (moved, x)) in moved.iter_mut().zip(x).enumerate() {
+            let part = if i % 2 == 0 { PART } else { -PART };
+            *moved = x * (1.0 + part * (1.0 + i as f64 / states as f64));
+        }
+        let mut ahead = [Ahead::ZERO; 2];
+        let [here, there] = &mut ahead;
+        let known = channel.source.ahead(self.t, x, u, condition.duration, here)
+            && channel.source.ahead(
+                self.t * (1.0 + 0.7 * PART),
+                &moved[..states],
+                u,
+                condition.duration,
+                there,
+            );
+        let n = channel.source.relative_degree();
+        let change = |k: usize| (condition.demand.weights[k] * (there.value[k] - here.value[k])).abs() / PART;
+        let size = (0..n).map(change).sum::<f64>() / condition.divisor(n);
+        if known && size.is_finite() { size } else { 0.0 }
+    }
+
     /// Newton's method from `u`, on the rows that the linearised programme does not give up; those of the bits
     /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
     fn newton(
@@ -337,7 +399,7 @@ impl Held<'_> {
             }
         }
         if !ended {
-            self.linearise(u, ALL, at)?;
+            self.judge(u, at)?;
             found.violation = at.worst(found.given_up);
         }
         found.sure &= ended && found.given_up == soft;
