@@ -109,7 +109,7 @@ impl Case<'_> {
 
     /// A pattern search with shrinking steps, from a grid point.
     fn refine(&self, mut u: [f64; 2], mut step: [f64; 2]) -> ([f64; 2], (f64, f64)) {
-        const DIRECTIONS: usize = 16;
+        const DIRECTIONS: usize = 8;
         let mut key = self.key(u);
         for _ in 0..400 {
             let mut best = (u, key);
@@ -124,8 +124,8 @@ impl Case<'_> {
             if best.1 < key {
                 (u, key) = best;
             } else {
-                step = step.map(|s| s * 0.6);
-                if step[0].max(step[1]) < 1e-7 * (1.0 + key.1) {
+                step = step.map(|s| s * 0.5);
+                if step[0].max(step[1]) < 1e-5 * (1.0 + key.1) {
                     break;
                 }
             }
@@ -140,7 +140,7 @@ impl Case<'_> {
         let mut best: Option<([f64; 2], f64)> = None;
         let mut width = reach;
         // Wide grids miss what is near, fine ones what is far.
-        for _ in 0..4 {
+        for _ in 0..3 {
             let mut points: Vec<((f64, f64), [f64; 2])> = Vec::new();
             let range = |i: usize| {
                 let (low, high) = (centre[i] - width, centre[i] + width);
@@ -165,7 +165,7 @@ impl Case<'_> {
                     continue;
                 }
                 chosen.push(*u);
-                if chosen.len() == 3 {
+                if chosen.len() == 2 {
                     break;
                 }
             }
@@ -175,7 +175,7 @@ impl Case<'_> {
                     best = Some((u, distance));
                 }
             }
-            width /= 6.0;
+            width /= 8.0;
         }
         best
     }

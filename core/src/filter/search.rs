@@ -31,6 +31,8 @@ const MET: f64 = 1e-9;
 /// Violations up to this part of the terms that the derivatives of h are made of count as met: some thousand
 /// roundings of 1e-16.
 const ROUND_OFF: f64 = 1e-12;
+/// Answers that differ by no more than this, as a part of their size, are one.
+const SAME: f64 = 1e-6;
 /// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
@@ -146,7 +148,9 @@ impl Held<'_> {
         let mut guess = [0.0; MAX_INPUTS];
         // Whether the rows are linearised at the best guess.
         let mut at_best = false;
+        // Whether the answer is surely right: by steps that contracted, or the same from both guesses.
         let mut settled = false;
+        let soft = self.soft();
         for start in [Some(&*pointwise), last].into_iter().flatten() {
             // The last input may come from a state that was made under other bounds.
             for i in 0..m {
@@ -154,13 +158,18 @@ impl Held<'_> {
             }
             at_best = false;
             if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme)
-                && best.as_ref().is_none_or(|b| found.better_than(b))
             {
+                let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
+                    && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
+                settled |= same;
+                if !best.as_ref().is_none_or(|b| found.better_than(b)) {
+                    continue;
+                }
                 u.copy_from_slice(&guess[..m]);
                 let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
                 let (found_sure, sure) = (found.sure, found.sure && near);
                 (best, at_best) = (Some(found), true);
-                settled = found_sure;
+                settled |= found_sure;
                 if sure {
                     break;
                 }
@@ -422,6 +431,11 @@ struct Guess {
 }
 
 impl Guess {
+    /// Whether it meets all rows but the `soft` ones.
+    fn is_met(&self, soft: u64) -> bool {
+        self.given_up == soft && self.violation <= 0.0
+    }
+
     fn better_than(&self, other: &Self) -> bool {
         let key = |g: &Self| (g.given_up.count_ones(), g.violation);
         key(self) < key(other) || key(self) == key(other) && self.distance < (1.0 - MET) * other.distance

@@ -24,7 +24,7 @@ use crate::MAX_INPUTS;
 use crate::qp::{Outcome, Problem, Solver, Workspace};
 
 /// Parts of the grid of one scan.
-const GRID: usize = 32;
+const GRID: usize = 16;
 /// Half the width of the finest grid, in units of u.
 const FINEST: f64 = 1.0;
 /// How much wider each grid is than the one before.
@@ -34,7 +34,7 @@ const WIDTHS: usize = 6;
 /// Steps of Newton's method along one axis.
 const ALONG: usize = 3;
 /// Starting points that are kept.
-const STARTS: usize = 8;
+const STARTS: usize = 6;
 /// Steps of a restoration, and of one within a trial of the polishing.
 const RESTORING: [usize; 2] = [10, 4];
 /// Steps of a polishing.
@@ -43,6 +43,8 @@ const POLISHING: usize = 12;
 const TRIALS: usize = 6;
 /// The part of what the linearised programme promises that must come true.
 const SUFFICIENT: f64 = 0.1;
+/// Starts are looked at up to this part of the distance of the answer that is known.
+const NEAR: f64 = 1.2;
 /// An answer takes the place of another one where it is nearer by this part.
 const NEARER: f64 = 2e-3;
 
@@ -93,7 +95,11 @@ impl Held<'_> {
     ) -> Option<Guess> {
         let m = u.len();
         let given_up = self.soft();
-        let known = best.given_up == given_up && best.violation <= 0.0;
+        let mut nearest = Start::NONE;
+        if best.is_met(given_up) {
+            nearest.distance = best.distance * (1.0 - NEARER);
+        }
+        let known = nearest.distance.is_finite();
         let mut starts = Starts([Start::NONE; STARTS]);
         let zero = [0.0; MAX_INPUTS];
         for guess in [Some(&*u), Some(self.u_ref), Some(&zero[..m])].iter().chain(guesses).flatten() {
@@ -104,23 +110,14 @@ impl Held<'_> {
             self.measure(&mut start, m, given_up, at);
             starts.insert(start);
         }
-        let limit = if known { best.distance } else { f64::INFINITY };
-        self.scan_all(limit, given_up, at, &mut starts);
-        let mut nearest = Start { distance: limit * (1.0 - NEARER), ..Start::NONE };
-        let mut found = false;
         let iterations = best.iterations;
-        for start in &mut starts.0 {
-            if !start.distance.is_finite() {
-                continue;
-            }
-            self.restore(start, RESTORING[0], given_up, at, programme);
-            if start.violation <= 0.0 {
-                self.polish(start, m, given_up, at, programme);
-                if start.distance < nearest.distance {
-                    (nearest, found) = (*start, true);
-                }
-            }
+        let mut found = false;
+        if !known {
+            found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
         }
+        let mut starts = Starts([Start::NONE; STARTS]);
+        self.scan_all(nearest.distance, given_up, at, &mut starts);
+        found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
         if !found {
             return None;
         }
@@ -145,6 +142,36 @@ impl Held<'_> {
         })
     }
 
+    /// Restores and polishes the starts, and keeps an answer that is nearer than `nearest`. Returns whether there is
+    /// one.
+    fn finish(
+        &self,
+        starts: &mut Starts,
+        nearest: &mut Start,
+        given_up: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) -> bool {
+        let m = self.u_ref.len();
+        let mut found = false;
+        for start in &mut starts.0 {
+            // Where an answer is known, one that is to be nearer begins near.
+            let near = |start: &Start| start.distance < NEAR * nearest.distance;
+            if !start.distance.is_finite() || !near(start) {
+                continue;
+            }
+            self.restore(start, RESTORING[0], given_up, at, programme);
+            if start.violation <= 0.0 && near(start) {
+                self.polish(start, m, given_up, at, programme);
+                if start.distance < nearest.distance {
+                    (*nearest, found) = (*start, true);
+                    nearest.distance *= 1.0 - NEARER;
+                }
+            }
+        }
+        found
+    }
+
     /// Linearises all rows at the start, and writes its violation and distance.
     fn measure(&self, start: &mut Start, m: usize, given_up: u64, at: &mut Linearised) {
         start.violation = match self.judge(&start.u[..m], at) {
@@ -162,7 +189,7 @@ impl Held<'_> {
         let m = self.u_ref.len();
         for vary in 0..m {
             let centre = self.bounds.clamp(vary, self.u_ref[vary]);
-            let mut width = FINEST;
+            let mut width = if limit.is_finite() { limit / WIDER } else { FINEST };
             for _ in 0..WIDTHS {
                 let low = (centre - width).max(self.bounds.min[vary]);
                 let high = (centre + width).min(self.bounds.max[vary]);
