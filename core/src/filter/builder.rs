@@ -428,6 +428,7 @@ impl FilterBuilder {
             rows: vec![Row::ZERO; channels.len()],
             enforcement: vec![Enforcement::Hard { priority: 0 }; channels.len()],
             demands: vec![SampledDemand::ZERO; channels.len()],
+            conditions: Vec::with_capacity(MAX_ROWS),
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],
             slopes: vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count() * channels.len()],

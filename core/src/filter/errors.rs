@@ -71,13 +71,13 @@ impl MeasurementErrors {
         sum
     }
 
-    /// By how much the sampled row of `demand` may be off, where `held` is t, x, u and the period. `None` where that is
-    /// not finite.
+    /// By how much the sampled row of `demand`, over its divisor, may be off, where `held` is t, x, u and the time
+    /// ahead. `None` where that is not finite.
     pub(super) fn of_row(
         &self,
         source: &dyn DerivativeSource,
         (t, x, u, period): (f64, &[f64], &[f64], f64),
-        demand: &SampledDemand,
+        (demand, divisor): (&SampledDemand, f64),
         slopes: &[Slopes],
     ) -> Option<Uncertainty> {
         let zeros = [0.0; MAX_INPUTS];
@@ -89,7 +89,7 @@ impl MeasurementErrors {
             }
             let (mut along, mut gradient) = (0.0, [0.0; MAX_INPUTS]);
             for k in 0..source.relative_degree() {
-                let weight = demand.weights[k] / period;
+                let weight = demand.weights[k] / divisor;
                 along += weight * (change.value[k] - demand.decay * slopes[k]);
                 for (g, d) in gradient.iter_mut().zip(&change.gradient[k]) {
                     *g += weight * d;

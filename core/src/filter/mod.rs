@@ -12,6 +12,7 @@ mod hold;
 mod integrator;
 mod report;
 mod sampling;
+mod search;
 mod sensitivity;
 
 pub use crate::convergence::{
@@ -35,7 +36,7 @@ use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Residuals, Row};
 use crate::reach;
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
-use sampling::Held;
+use search::{Condition, Held};
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
 #[derive(Debug, Default, PartialEq)]
@@ -69,6 +70,8 @@ struct Workspace {
     rows: Vec<Row>,
     enforcement: Vec<Enforcement>,
     demands: Vec<SampledDemand>,
+    /// What the input held over the period has to meet.
+    conditions: Vec<Condition>,
     next: FilterState,
     /// The state from which each barrier is held, one after the other.
     predicted: Vec<f64>,
@@ -174,6 +177,7 @@ impl SafetyFilter {
             rows,
             enforcement,
             demands,
+            conditions,
             next,
             predicted,
             slopes,
@@ -285,14 +289,18 @@ impl SafetyFilter {
         if let Some(period) = sampled {
             report.period = period;
             let (channels, enforcement) = (&self.channels[..], &*enforcement);
-            let (t, x, demands) = (begin, &predicted[..], &*demands);
+            let (t, x) = (begin, &predicted[..]);
             let (errors, slopes) = (&self.errors, &slopes[..]);
+            // Within the capacity: a step does not allocate.
+            conditions.clear();
+            for (channel, demand) in demands.iter().enumerate() {
+                conditions.push(Condition { channel, demand: *demand, duration: period });
+            }
             let problem = Held {
                 channels,
-                demands,
+                conditions: &*conditions,
                 t,
                 x,
-                period,
                 bounds,
                 u_ref,
                 enforcement,

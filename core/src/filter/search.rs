@@ -1,0 +1,443 @@
+//! What a held input does until the next sample: the sampled form of the rows, and the search for an
+//! input that meets it.
+//!
+//! The row of the pointwise constraint is affine in u; its integral over the period
+//! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
+//! through the plant. It is solved by Newton's method on the rows: linearise them at the present
+//! guess, solve the quadratic programme, and go towards its answer as far as the violation decreases
+//! (halving the way), that of the rows which the programme does not give up. On the way only rows that are
+//! active or violated are linearised anew; the others keep their last linearisation, at first the pointwise
+//! row, and all are evaluated where the search ends.
+//!
+//! The guesses start from the answer of the pointwise rows and from the input of the step before; the better
+//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
+//! guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries the turn that
+//! was begun on through the instants at which the linearisation cannot see it. It is left out where the first
+//! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
+//! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
+//! count as equal: a sample taken again gives the same bits.
+
+mod wide;
+
+use super::errors::{Slopes, Uncertainty};
+use super::{Channel, MeasurementErrors};
+use crate::convergence::sampled::SampledDemand;
+use crate::lie::Ahead;
+use crate::qp::{Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
+use crate::{MAX_INPUTS, MAX_ROWS};
+
+/// Violations up to this part of a row's terms count as met: what Newton's method leaves.
+const MET: f64 = 1e-9;
+/// Violations up to this part of the terms that the derivatives of h are made of count as met: some thousand
+/// roundings of 1e-16.
+const ROUND_OFF: f64 = 1e-12;
+/// Answers that differ by no more than this, as a part of their size, are one.
+const SAME: f64 = 1e-6;
+/// Linearisations per guess.
+const ITERATIONS: u32 = 12;
+/// Halvings of the way to the answer of one linearisation.
+const HALVINGS: u32 = 8;
+/// The part of the decrease that the linearisation foretells which must come true.
+const SUFFICIENT: f64 = 0.3;
+/// How much shorter each step of a search must be than the one before, for its answer to be the only one near.
+const CONTRACTION: f64 = 0.1;
+
+/// What is asked of one barrier at one instant ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Condition {
+    /// The number of the barrier.
+    pub(super) channel: usize,
+    /// Of its derivatives at that instant.
+    pub(super) demand: SampledDemand,
+    /// How far ahead that is, in s, finite, > 0.
+    pub(super) duration: f64,
+}
+
+impl Condition {
+    /// What h⁽ʲ⁾ at the end is divided by, to be comparable with a row on h⁽ⁿ⁾, where j is the highest order that
+    /// the demand weighs: h⁽ⁿ⁾ held for the duration δ changes it by δⁿ⁻ʲ/(n − j)! of itself. That is the
+    /// duration for j = n − 1.
+    fn divisor(&self, n: usize) -> f64 {
+        let order = self.demand.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
+        (1..=n - order).fold(1.0, |product, i| product * (self.duration / i as f64))
+    }
+}
+
+/// One sampled problem: where it starts and what it asks for.
+pub(super) struct Held<'a> {
+    pub(super) channels: &'a [Channel],
+    /// At most [`MAX_ROWS`]; each has a row.
+    pub(super) conditions: &'a [Condition],
+    pub(super) t: f64,
+    /// The state of each barrier, one after the other.
+    pub(super) x: &'a [f64],
+    pub(super) bounds: &'a Bounds,
+    pub(super) u_ref: &'a [f64],
+    /// Of each condition.
+    pub(super) enforcement: &'a [Enforcement],
+    pub(super) correction_limit: f64,
+    pub(super) errors: &'a MeasurementErrors,
+    /// How the derivatives of h at `t` change with each error, one barrier after the other.
+    pub(super) slopes: &'a [Slopes],
+}
+
+/// Models of the sampled rows, and how far each is from being met at the present u, in units of its terms.
+struct Linearised<'a> {
+    rows: &'a mut [Row],
+    violations: [f64; MAX_ROWS],
+}
+
+impl Linearised<'_> {
+    /// The largest violation among the rows that are not in `given_up`, 0 if all are met.
+    fn worst(&self, given_up: u64) -> f64 {
+        let kept = |i: &usize| given_up >> i & 1 == 0;
+        (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
+    }
+
+    /// The rows that are violated, one bit each.
+    fn violated(&self) -> u64 {
+        (0..self.rows.len()).fold(0, |bits, i| bits | u64::from(self.violations[i] > 0.0) << i)
+    }
+}
+
+/// The rows that are active in the last answer of `programme`, one bit each.
+fn active(programme: &Workspace) -> u64 {
+    programme.active().iter().fold(0, |bits, active| match active.constraint {
+        Constraint::Row(i) => bits | 1 << i,
+        Constraint::Lower(_) | Constraint::Upper(_) => bits,
+    })
+}
+
+/// Every row.
+const ALL: u64 = u64::MAX;
+
+impl Held<'_> {
+    /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
+    /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
+    /// them, where a source cannot predict or its prediction is not finite.
+    pub(super) fn solve(
+        &self,
+        rows: &mut [Row],
+        last: Option<&[f64]>,
+        programme: &mut Workspace,
+        u: &mut [f64],
+    ) -> Option<Solution> {
+        let m = u.len();
+        let mut at = Linearised { rows, violations: [0.0; MAX_ROWS] };
+        let mut pointwise = [0.0; MAX_INPUTS];
+        let pointwise = &mut pointwise[..m];
+        let first = programme.solve(&self.problem(at.rows), pointwise);
+        for (i, ui) in u.iter_mut().enumerate() {
+            *ui = self.bounds.clamp(i, self.u_ref[i]);
+        }
+        // Nothing to do where u_ref meets the sampled rows, those first of which it is doubtful.
+        let doubtful = active(programme);
+        self.linearise(u, doubtful, &mut at)?;
+        if at.violated() & doubtful == 0 {
+            self.linearise(u, ALL, &mut at)?;
+            if at.worst(0) <= 0.0 {
+                return Some(Solution {
+                    outcome: Outcome::Optimal,
+                    solver: Solver::Unchanged,
+                    iterations: 0,
+                });
+            }
+        }
+        let watched = doubtful | at.violated();
+        let mut best: Option<Guess> = None;
+        let mut guess = [0.0; MAX_INPUTS];
+        // Whether the rows are linearised at the best guess.
+        let mut at_best = false;
+        // Whether the answer is surely right: by steps that contracted, or the same from both guesses.
+        let mut settled = false;
+        let soft = self.soft();
+        for start in [Some(&*pointwise), last].into_iter().flatten() {
+            // The last input may come from a state that was made under other bounds.
+            for i in 0..m {
+                guess[i] = self.bounds.clamp(i, start[i]);
+            }
+            at_best = false;
+            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme)
+            {
+                let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
+                    && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
+                settled |= same;
+                if !best.as_ref().is_none_or(|b| found.better_than(b)) {
+                    continue;
+                }
+                u.copy_from_slice(&guess[..m]);
+                let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
+                let (found_sure, sure) = (found.sure, found.sure && near);
+                (best, at_best) = (Some(found), true);
+                settled |= found_sure;
+                if sure {
+                    break;
+                }
+            }
+        }
+        let mut best = best?;
+        if !settled && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme) {
+            (best, at_best) = (found, false);
+        }
+        at_best &= settled;
+        if !at_best {
+            self.judge(u, &mut at)?;
+            // What is active at the answer.
+            programme.solve(&self.problem(at.rows), &mut guess[..m]);
+        }
+        let outcome = match best.outcome {
+            Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
+            // The linearised rows can be met, the rows themselves could not.
+            Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
+            Outcome::Optimal => Outcome::Degenerate,
+            // What was given up on the way has been met after all.
+            Outcome::Infeasible | Outcome::Degenerate if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
+            other => other,
+        };
+        Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
+    }
+
+    fn problem<'b>(&'b self, rows: &'b [Row]) -> Problem<'b> {
+        let plain = Problem::new(rows, self.bounds, self.u_ref, self.correction_limit);
+        Problem { enforcement: self.enforcement, ..plain }
+    }
+
+    /// The soft rows, one bit each.
+    fn soft(&self) -> u64 {
+        let soft = |e: &Enforcement| matches!(e, Enforcement::Soft { .. });
+        self.enforcement.iter().enumerate().filter(|(_, e)| soft(e)).fold(0, |bits, (i, _)| bits | 1 << i)
+    }
+
+    fn distance(&self, u: &[f64]) -> f64 {
+        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r))
+    }
+
+    /// Linearises the sampled rows of the bits `anew` at `u`, and evaluates the models of the others there.
+    /// `None` where there is no finite prediction.
+    fn linearise(&self, u: &[f64], anew: u64, at: &mut Linearised) -> Option<()> {
+        let mut ahead = Ahead::ZERO;
+        let states = self.x.len() / self.channels.len();
+        let rows = at.rows.iter_mut().zip(&mut at.violations);
+        for (i, (condition, (row, violation))) in self.conditions.iter().zip(rows).enumerate() {
+            let Condition { channel: number, demand, duration } = condition;
+            let (channel, x) = (&self.channels[*number], &self.x[number * states..][..states]);
+            *violation = 0.0;
+            if demand.is_zero() {
+                *row = Row::ZERO;
+                continue;
+            }
+            if anew >> i & 1 == 0 {
+                let (slack, terms) = (row.slack(u), row.size(u));
+                if slack < -MET * terms {
+                    *violation = -slack / terms;
+                }
+                continue;
+            }
+            let known = channel.source.ahead(self.t, x, u, *duration, &mut ahead);
+            if !known || !ahead.is_finite() {
+                return None;
+            }
+            let n = channel.source.relative_degree();
+            let divisor = condition.divisor(n);
+            let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
+            let mut normal = [0.0; MAX_INPUTS];
+            for k in 0..n {
+                let weight = demand.weights[k];
+                value += weight * ahead.value[k];
+                terms += (weight * ahead.value[k]).abs();
+                for (a, d) in normal[..u.len()].iter_mut().zip(&ahead.gradient[k]) {
+                    *a += weight * d / divisor;
+                }
+            }
+            // The row is one on h⁽ⁿ⁾ as the pointwise one.
+            value /= divisor;
+            terms /= divisor;
+            if !self.errors.is_exact() {
+                let slopes = &self.slopes[number * self.errors.count()..][..self.errors.count()];
+                let held = (self.t, x, u, *duration);
+                let Uncertainty { size, gradient } =
+                    self.errors.of_row(&*channel.source, held, (demand, divisor), slopes)?;
+                value -= size;
+                terms += size;
+                for (a, d) in normal.iter_mut().zip(&gradient) {
+                    *a -= d;
+                }
+            }
+            let (mut at_u, mut moved) = (0.0, 0.0);
+            for (a, v) in normal.iter().zip(u) {
+                at_u += a * v;
+                moved += (a * v).abs();
+            }
+            *row = Row { normal, floor: at_u - value };
+            if !row.floor.is_finite() {
+                return None;
+            }
+            // Near a floor of 0 the ends are small differences of what the input moves.
+            let terms = terms + moved;
+            if value < -MET * terms {
+                *violation = -value / terms;
+            }
+        }
+        Some(())
+    }
+
+    /// As [`Self::linearise`] of all rows, where violations that are round-off count as met.
+    fn judge(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
+        self.linearise(u, ALL, at)?;
+        for i in 0..at.rows.len() {
+            if at.violations[i] > 0.0 && at.violations[i].is_finite() {
+                let (condition, row) = (&self.conditions[i], &at.rows[i]);
+                if -row.slack(u) <= ROUND_OFF * self.size(condition, u) {
+                    at.violations[i] = 0.0;
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// The size of the terms whose sum the row of a condition is.
+    ///
+    /// A sum that cancels says nothing about it: 10 − p on the boundary. But a change of every state and of the
+    /// time by a small part of itself shows it, as the terms no longer cancel: each part is another one, of
+    /// either sign, so that sums of states do not cancel again.
+    fn size(&self, condition: &Condition, u: &[f64]) -> f64 {
+        const STATES: usize = 64;
+        const PART: f64 = 1e-6;
+        let channel = &self.channels[condition.channel];
+        let states = self.x.len() / self.channels.len();
+        let x = &self.x[condition.channel * states..][..states];
+        if states > STATES {
+            return 0.0;
+        }
+        let mut moved = [0.0; STATES];
+        for (i, (moved, x)) in moved.iter_mut().zip(x).enumerate() {
+            let part = if i % 2 == 0 { PART } else { -PART };
+            *moved = x * (1.0 + part * (1.0 + i as f64 / states as f64));
+        }
+        let mut ahead = [Ahead::ZERO; 2];
+        let [here, there] = &mut ahead;
+        let known = channel.source.ahead(self.t, x, u, condition.duration, here)
+            && channel.source.ahead(
+                self.t * (1.0 + 0.7 * PART),
+                &moved[..states],
+                u,
+                condition.duration,
+                there,
+            );
+        let n = channel.source.relative_degree();
+        let change = |k: usize| (condition.demand.weights[k] * (there.value[k] - here.value[k])).abs() / PART;
+        let size = (0..n).map(change).sum::<f64>() / condition.divisor(n);
+        if known && size.is_finite() { size } else { 0.0 }
+    }
+
+    /// Newton's method from `u`, on the rows that the linearised programme does not give up; those of the bits
+    /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
+    fn newton(
+        &self,
+        u: &mut [f64],
+        mut watched: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) -> Option<Guess> {
+        let m = u.len();
+        self.linearise(u, watched, at)?;
+        let soft = self.soft();
+        let mut found = Guess {
+            given_up: 0,
+            violation: at.worst(soft),
+            distance: 0.0,
+            outcome: Outcome::Optimal,
+            solver: Solver::Unchanged,
+            iterations: 0,
+            sure: true,
+        };
+        let mut target = [0.0; MAX_INPUTS];
+        let mut last_way = f64::INFINITY;
+        let mut ended = false;
+        for _ in 0..ITERATIONS {
+            let target = &mut target[..m];
+            let solution = programme.solve(&self.problem(at.rows), target);
+            let lost = |i: usize| programme.is_relaxed(i) || programme.is_degenerate(i);
+            found.given_up = (0..at.rows.len()).filter(|i| lost(*i)).fold(soft, |bits, i| bits | 1 << i);
+            found.outcome = solution.outcome;
+            found.solver = solution.solver;
+            found.iterations += solution.iterations;
+            let violation = at.worst(found.given_up);
+            let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+            let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
+            let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
+            found.violation = violation;
+            if violation <= 0.0 && way <= MET * size {
+                if watched == ALL {
+                    ended = true;
+                    break;
+                }
+                self.linearise(u, ALL, at)?;
+                watched = ALL;
+                found.violation = at.worst(found.given_up);
+                if found.violation <= 0.0 {
+                    ended = true;
+                    break;
+                }
+                continue;
+            }
+            found.sure &= way <= CONTRACTION * last_way;
+            last_way = way;
+            watched |= active(programme) | at.violated();
+            let mut part = 1.0;
+            let mut moved = false;
+            for _ in 0..=HALVINGS {
+                for i in 0..m {
+                    // Between two points within the bounds, but for round-off.
+                    u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
+                }
+                if self.linearise(u, watched, at).is_some() {
+                    let there = at.worst(found.given_up);
+                    if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
+                        found.violation = there;
+                        moved = true;
+                        break;
+                    }
+                }
+                part /= 2.0;
+                found.sure = false;
+            }
+            if !moved {
+                u.copy_from_slice(&from[..m]);
+                break;
+            }
+        }
+        if !ended {
+            self.judge(u, at)?;
+            found.violation = at.worst(found.given_up);
+        }
+        found.sure &= ended && found.given_up == soft;
+        found.distance = self.distance(u);
+        Some(found)
+    }
+}
+
+/// What a search came to.
+struct Guess {
+    /// The rows that are not among those counted in `violation`, one bit each.
+    given_up: u64,
+    violation: f64,
+    distance: f64,
+    outcome: Outcome,
+    solver: Solver,
+    iterations: u32,
+    /// Whether it met every row by steps that contracted: there is no other answer near.
+    sure: bool,
+}
+
+impl Guess {
+    /// Whether it meets all rows but the `soft` ones.
+    fn is_met(&self, soft: u64) -> bool {
+        self.given_up == soft && self.violation <= 0.0
+    }
+
+    fn better_than(&self, other: &Self) -> bool {
+        let key = |g: &Self| (g.given_up.count_ones(), g.violation);
+        key(self) < key(other) || key(self) == key(other) && self.distance < (1.0 - MET) * other.distance
+    }
+}

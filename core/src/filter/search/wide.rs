@@ -1,0 +1,351 @@
+//! The wide search: where Newton's method from its two guesses does not end at an answer that is surely right.
+//!
+//! A row is F(u) ≥ 0 with F smooth, and what makes it hard is that it turns with some inputs: a unicycle that
+//! stands across the line of sight gains by turning either way and then by driving either way. Three parts find
+//! the nearest of these answers.
+//!
+//! **Scan.** One component of u is moved over a grid around u_ref; for each of its values another one is found
+//! for which all rows hold, by Newton's method along that axis. An acceleration enters all but affinely, so one
+//! or two steps are exact. The grid is as wide as the bounds allow, and first fine, then coarse: widths grow by
+//! a factor until they exceed the distance of an input that is known to meet the rows. What is kept are the
+//! local minima over the grid: of the distance where the rows hold, of the violation elsewhere.
+//!
+//! **Restoration.** From there to the rows by the shortest way: the linearised programme with u in place of
+//! u_ref, and back half the way as long as the violation does not decrease.
+//!
+//! **Polishing.** From an input that meets the rows towards the answer of the linearised programme. Each trial is
+//! restored (the correction of second order), and taken where it is nearer to u_ref by a part of what the
+//! programme promises. So every iterate meets the rows, and the distance only falls.
+//!
+//! All numbers of steps are fixed: the cost is bounded, and the same input gives the same bits.
+
+use super::{Guess, Held, Linearised, MET};
+use crate::MAX_INPUTS;
+use crate::qp::{Outcome, Problem, Solver, Workspace};
+
+/// Parts of the grid of one scan.
+const GRID: usize = 16;
+/// Half the width of the finest grid, in units of u.
+const FINEST: f64 = 1.0;
+/// How much wider each grid is than the one before.
+const WIDER: f64 = 8.0;
+/// Grids of one component, at most.
+const WIDTHS: usize = 6;
+/// Steps of Newton's method along one axis.
+const ALONG: usize = 3;
+/// Starting points that are kept.
+const STARTS: usize = 6;
+/// Steps of a restoration, and of one within a trial of the polishing.
+const RESTORING: [usize; 2] = [10, 4];
+/// Steps of a polishing.
+const POLISHING: usize = 12;
+/// Trials of one step.
+const TRIALS: usize = 6;
+/// The part of what the linearised programme promises that must come true.
+const SUFFICIENT: f64 = 0.1;
+/// Starts are looked at up to this part of the distance of the answer that is known.
+const NEAR: f64 = 1.2;
+/// An answer takes the place of another one where it is nearer by this part.
+const NEARER: f64 = 2e-3;
+
+type Input = [f64; MAX_INPUTS];
+
+/// An input, how far it is from meeting the rows and how far from u_ref.
+#[derive(Clone, Copy)]
+struct Start {
+    u: Input,
+    violation: f64,
+    distance: f64,
+}
+
+impl Start {
+    const NONE: Self = Self { u: [0.0; MAX_INPUTS], violation: f64::INFINITY, distance: f64::INFINITY };
+
+    fn better_than(&self, other: &Self) -> bool {
+        (self.violation, self.distance) < (other.violation, other.distance)
+    }
+}
+
+/// The best starting points, the best first.
+struct Starts([Start; STARTS]);
+
+impl Starts {
+    fn insert(&mut self, start: Start) {
+        let Some(at) = self.0.iter().position(|other| start.better_than(other)) else { return };
+        self.0[at..].rotate_right(1);
+        self.0[at] = start;
+    }
+
+    /// The distance of the nearest one that meets the rows.
+    fn nearest(&self) -> f64 {
+        if self.0[0].violation <= 0.0 { self.0[0].distance } else { f64::INFINITY }
+    }
+}
+
+impl Held<'_> {
+    /// Looks for a better answer than `best`, which is `u`, that meets all rows but those of the bits `given_up`.
+    /// Where one is found it is written to `u`.
+    pub(super) fn widen(
+        &self,
+        u: &mut [f64],
+        guesses: &[Option<&[f64]>],
+        best: &Guess,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) -> Option<Guess> {
+        let m = u.len();
+        let given_up = self.soft();
+        let mut nearest = Start::NONE;
+        if best.is_met(given_up) {
+            nearest.distance = best.distance * (1.0 - NEARER);
+        }
+        let known = nearest.distance.is_finite();
+        let mut starts = Starts([Start::NONE; STARTS]);
+        let zero = [0.0; MAX_INPUTS];
+        for guess in [Some(&*u), Some(self.u_ref), Some(&zero[..m])].iter().chain(guesses).flatten() {
+            let mut start = Start::NONE;
+            for i in 0..m {
+                start.u[i] = self.bounds.clamp(i, guess[i]);
+            }
+            self.measure(&mut start, m, given_up, at);
+            starts.insert(start);
+        }
+        let iterations = best.iterations;
+        let mut found = false;
+        if !known {
+            found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+        }
+        let mut starts = Starts([Start::NONE; STARTS]);
+        self.scan_all(nearest.distance, given_up, at, &mut starts);
+        found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+        if !found {
+            return None;
+        }
+        let mut exact = nearest.u;
+        if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, programme)
+            && guess.given_up == given_up
+            && guess.violation <= 0.0
+            && guess.distance <= (1.0 + NEARER) * nearest.distance
+        {
+            u.copy_from_slice(&exact[..m]);
+            return Some(Guess { iterations: iterations + guess.iterations, ..guess });
+        }
+        u.copy_from_slice(&nearest.u[..m]);
+        Some(Guess {
+            given_up,
+            violation: 0.0,
+            distance: nearest.distance,
+            outcome: Outcome::Optimal,
+            solver: Solver::DualActiveSet,
+            iterations,
+            sure: false,
+        })
+    }
+
+    /// Restores and polishes the starts, and keeps an answer that is nearer than `nearest`. Returns whether there is
+    /// one.
+    fn finish(
+        &self,
+        starts: &mut Starts,
+        nearest: &mut Start,
+        given_up: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) -> bool {
+        let m = self.u_ref.len();
+        let mut found = false;
+        for start in &mut starts.0 {
+            // Where an answer is known, one that is to be nearer begins near.
+            let near = |start: &Start| start.distance < NEAR * nearest.distance;
+            if !start.distance.is_finite() || !near(start) {
+                continue;
+            }
+            self.restore(start, RESTORING[0], given_up, at, programme);
+            if start.violation <= 0.0 && near(start) {
+                self.polish(start, m, given_up, at, programme);
+                if start.distance < nearest.distance {
+                    (*nearest, found) = (*start, true);
+                    nearest.distance *= 1.0 - NEARER;
+                }
+            }
+        }
+        found
+    }
+
+    /// Linearises all rows at the start, and writes its violation and distance.
+    fn measure(&self, start: &mut Start, m: usize, given_up: u64, at: &mut Linearised) {
+        start.violation = match self.judge(&start.u[..m], at) {
+            Some(()) => at.worst(given_up),
+            None => f64::INFINITY,
+        };
+        start.distance = self.distance(&start.u[..m]);
+        if start.distance > self.correction_limit {
+            start.violation = f64::INFINITY;
+        }
+    }
+
+    /// Scans every component, with wider and wider grids.
+    fn scan_all(&self, limit: f64, given_up: u64, at: &mut Linearised, starts: &mut Starts) {
+        let m = self.u_ref.len();
+        for vary in 0..m {
+            let centre = self.bounds.clamp(vary, self.u_ref[vary]);
+            let mut width = if limit.is_finite() { limit / WIDER } else { FINEST };
+            for _ in 0..WIDTHS {
+                let low = (centre - width).max(self.bounds.min[vary]);
+                let high = (centre + width).min(self.bounds.max[vary]);
+                self.scan((vary, (vary + 1) % m), [low, high], given_up, at, starts);
+                let whole = low <= self.bounds.min[vary] && high >= self.bounds.max[vary];
+                if whole || width >= limit.min(starts.nearest()) {
+                    break;
+                }
+                width *= WIDER;
+            }
+        }
+    }
+
+    /// Moves the component `vary` from `low` to `high`, finds the component `solve` for each value, and keeps the
+    /// local minima.
+    fn scan(
+        &self,
+        (vary, solve): (usize, usize),
+        [low, high]: [f64; 2],
+        given_up: u64,
+        at: &mut Linearised,
+        starts: &mut Starts,
+    ) {
+        let m = self.u_ref.len();
+        let mut before = [Start::NONE; 2];
+        for k in 0..=GRID {
+            let mut next = Start::NONE;
+            for i in 0..m {
+                next.u[i] = self.bounds.clamp(i, self.u_ref[i]);
+            }
+            next.u[vary] = self.bounds.clamp(vary, low + (high - low) * (k as f64 / GRID as f64));
+            self.along(&mut next, solve, given_up, at, vary != solve);
+            if before[1].better_than(&before[0]) && !next.better_than(&before[1]) {
+                starts.insert(before[1]);
+            }
+            before = [before[1], next];
+        }
+        if before[1].better_than(&before[0]) {
+            starts.insert(before[1]);
+        }
+    }
+
+    /// Moves the component `axis` to where the rows hold, as near to its reference as they allow.
+    fn along(&self, start: &mut Start, axis: usize, given_up: u64, at: &mut Linearised, solve: bool) {
+        let m = self.u_ref.len();
+        let mut best = Start::NONE;
+        for _ in 0..=ALONG {
+            self.measure(start, m, given_up, at);
+            if start.better_than(&best) {
+                best = *start;
+            }
+            let target = self.on_axis(start, axis, given_up, at);
+            let moved = (target - start.u[axis]).abs();
+            if !solve || best.violation <= 0.0 || moved.is_nan() || moved <= MET * target.abs() {
+                break;
+            }
+            start.u[axis] = target;
+        }
+        *start = best;
+    }
+
+    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; between what
+    /// they ask for where they contradict.
+    fn on_axis(&self, start: &Start, axis: usize, given_up: u64, at: &Linearised) -> f64 {
+        let m = self.u_ref.len();
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (i, row) in at.rows.iter().enumerate() {
+            let slope = row.normal[axis];
+            if given_up >> i & 1 == 1 || slope == 0.0 {
+                continue;
+            }
+            let on_row = start.u[axis] - row.slack(&start.u[..m]) / slope;
+            if slope > 0.0 {
+                low = low.max(on_row);
+            } else {
+                high = high.min(on_row);
+            }
+        }
+        let wanted = if low <= high { self.u_ref[axis].max(low).min(high) } else { low + (high - low) / 2.0 };
+        self.bounds.clamp(axis, wanted)
+    }
+
+    /// Moves towards the rows by at most `steps` steps. The rows are linearised at the start, before and after.
+    fn restore(
+        &self,
+        start: &mut Start,
+        steps: usize,
+        given_up: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) {
+        let m = self.u_ref.len();
+        self.measure(start, m, given_up, at);
+        for _ in 0..steps {
+            if start.violation <= 0.0 || !start.violation.is_finite() {
+                return;
+            }
+            let mut target = [0.0; MAX_INPUTS];
+            let nearest = Problem { u_ref: &start.u[..m], ..self.problem(at.rows) };
+            programme.solve(&nearest, &mut target[..m]);
+            let (mut part, mut moved) = (1.0, false);
+            for _ in 0..TRIALS {
+                let mut trial = self.between(start, &target, part);
+                self.measure(&mut trial, m, given_up, at);
+                if trial.violation <= (1.0 - SUFFICIENT * part) * start.violation {
+                    (*start, moved) = (trial, true);
+                    break;
+                }
+                part /= 2.0;
+            }
+            if !moved {
+                self.measure(start, m, given_up, at);
+                return;
+            }
+        }
+    }
+
+    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill.
+    fn polish(
+        &self,
+        start: &mut Start,
+        m: usize,
+        given_up: u64,
+        at: &mut Linearised,
+        programme: &mut Workspace,
+    ) {
+        for _ in 0..POLISHING {
+            self.measure(start, m, given_up, at);
+            let mut target = [0.0; MAX_INPUTS];
+            programme.solve(&self.problem(at.rows), &mut target[..m]);
+            let promised = start.distance - self.distance(&target[..m]);
+            if promised <= MET * start.distance {
+                return;
+            }
+            let (mut part, mut moved) = (1.0, false);
+            for _ in 0..TRIALS {
+                let mut trial = self.between(start, &target, part);
+                self.restore(&mut trial, RESTORING[1], given_up, at, programme);
+                if trial.violation <= 0.0 && trial.distance <= start.distance - SUFFICIENT * part * promised {
+                    (*start, moved) = (trial, true);
+                    break;
+                }
+                part /= 2.0;
+            }
+            if !moved {
+                return;
+            }
+        }
+    }
+
+    /// The `part` of the way from the start to the target.
+    fn between(&self, start: &Start, target: &Input, part: f64) -> Start {
+        let mut u = start.u;
+        for i in 0..self.u_ref.len() {
+            u[i] = self.bounds.clamp(i, u[i] + part * (target[i] - u[i]));
+        }
+        Start { u, ..Start::NONE }
+    }
+}

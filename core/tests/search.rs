@@ -1,0 +1,400 @@
+//! The search for a held input against brute force: where an input exists that meets every row, one is found, and
+//! no other is nearer to u_ref by more than a hundredth.
+//!
+//! The oracle shares no part with the search. It has the rows' demands from the promises, evaluates them with
+//! `DerivativeSource::ahead` over grids of inputs, and refines what is nearest by a pattern search. With
+//! `PUNCTUAL_TABLES=1` and `--nocapture` there are more than 100,000 states, and a table.
+
+#![allow(clippy::print_stdout, reason = "it prints tables")]
+
+use std::time::Instant;
+
+use punctual_core::barrier::Barrier;
+use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
+use punctual_core::convergence::FixedTime;
+use punctual_core::convergence::sampled::SampledDemand;
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
+use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
+use punctual_core::nalgebra::SVector;
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::scalar::Scalar;
+
+/// xorshift64*: the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn part(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.part()
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        ((self.part() * count as f64) as usize).min(count - 1)
+    }
+}
+
+/// A goal of either shape, or an obstacle.
+#[derive(Clone, Copy)]
+enum Set {
+    Distance(DistanceDisc),
+    Quadratic(QuadraticDisc),
+    Obstacle(Outside<DistanceDisc>),
+}
+
+impl Barrier<4> for Set {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 4>) -> S {
+        match self {
+            Self::Distance(disc) => disc.value(t, x),
+            Self::Quadratic(disc) => disc.value(t, x),
+            Self::Obstacle(disc) => disc.value(t, x),
+        }
+    }
+}
+
+/// One row as the oracle sees it.
+struct Asked<'a> {
+    source: &'a dyn DerivativeSource,
+    demand: SampledDemand,
+}
+
+/// One sample: what is asked, and of which inputs.
+struct Case<'a> {
+    rows: Vec<Asked<'a>>,
+    t: f64,
+    x: [f64; 4],
+    period: f64,
+    bound: Option<[f64; 2]>,
+    u_ref: [f64; 2],
+}
+
+impl Case<'_> {
+    /// The largest violation of a row, as a part of its terms; ≤ 0 where all hold.
+    fn violation(&self, u: [f64; 2]) -> f64 {
+        let mut worst = f64::NEG_INFINITY;
+        let mut ahead = Ahead::ZERO;
+        for Asked { source, demand } in &self.rows {
+            assert!(source.ahead(self.t, &self.x, &u, self.period, &mut ahead));
+            let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
+            for k in 0..2 {
+                value += demand.weights[k] * ahead.value[k];
+                terms += (demand.weights[k] * ahead.value[k]).abs();
+            }
+            worst = worst.max(-value / terms.max(1e-300));
+        }
+        worst
+    }
+
+    fn distance(&self, u: [f64; 2]) -> f64 {
+        (u[0] - self.u_ref[0]).hypot(u[1] - self.u_ref[1])
+    }
+
+    fn clamp(&self, u: [f64; 2]) -> [f64; 2] {
+        match self.bound {
+            Some(b) => [u[0].clamp(-b[0], b[0]), u[1].clamp(-b[1], b[1])],
+            None => u,
+        }
+    }
+
+    /// (violation, distance), the former 0 where the rows hold.
+    fn key(&self, u: [f64; 2]) -> (f64, f64) {
+        (self.violation(u).max(0.0), self.distance(u))
+    }
+
+    /// A pattern search with shrinking steps, from a grid point.
+    fn refine(&self, mut u: [f64; 2], mut step: [f64; 2]) -> ([f64; 2], (f64, f64)) {
+        const DIRECTIONS: usize = 8;
+        let mut key = self.key(u);
+        for _ in 0..400 {
+            let mut best = (u, key);
+            for d in 0..DIRECTIONS {
+                let (sin, cos) = (d as f64 * std::f64::consts::TAU / DIRECTIONS as f64).sin_cos();
+                let to = self.clamp([u[0] + cos * step[0], u[1] + sin * step[1]]);
+                let found = self.key(to);
+                if found < best.1 {
+                    best = (to, found);
+                }
+            }
+            if best.1 < key {
+                (u, key) = best;
+            } else {
+                step = step.map(|s| s * 0.5);
+                if step[0].max(step[1]) < 1e-5 * (1.0 + key.1) {
+                    break;
+                }
+            }
+        }
+        (u, key)
+    }
+
+    /// The nearest input that meets the rows, if there is one within the `reach` of u_ref. `fine` is the number of
+    /// grid points of an axis.
+    fn oracle(&self, reach: f64, fine: usize) -> Option<([f64; 2], f64)> {
+        let centre = self.clamp(self.u_ref);
+        let mut best: Option<([f64; 2], f64)> = None;
+        let mut width = reach;
+        // Wide grids miss what is near, fine ones what is far.
+        for _ in 0..3 {
+            let mut points: Vec<((f64, f64), [f64; 2])> = Vec::new();
+            let range = |i: usize| {
+                let (low, high) = (centre[i] - width, centre[i] + width);
+                let bound = self.bound.map_or(f64::INFINITY, |b| b[i]);
+                (low.max(-bound), high.min(bound))
+            };
+            let (a, w) = (range(0), range(1));
+            let step = [(a.1 - a.0) / (fine - 1) as f64, (w.1 - w.0) / (fine - 1) as f64];
+            for i in 0..fine {
+                for j in 0..fine {
+                    let u = self.clamp([a.0 + step[0] * i as f64, w.0 + step[1] * j as f64]);
+                    points.push((self.key(u), u));
+                }
+            }
+            points.sort_by(|p, q| p.0.partial_cmp(&q.0).expect("numbers"));
+            // The best ones that are not neighbours of a better one.
+            let mut chosen: Vec<[f64; 2]> = Vec::new();
+            for (_, u) in &points {
+                let near =
+                    |v: &[f64; 2]| (u[0] - v[0]).abs() < 4.0 * step[0] && (u[1] - v[1]).abs() < 4.0 * step[1];
+                if chosen.iter().any(near) {
+                    continue;
+                }
+                chosen.push(*u);
+                if chosen.len() == 2 {
+                    break;
+                }
+            }
+            for u in chosen {
+                let (u, (violation, distance)) = self.refine(u, step);
+                if violation <= 0.0 && best.is_none_or(|(_, d)| distance < d) {
+                    best = Some((u, distance));
+                }
+            }
+            width /= 8.0;
+        }
+        best
+    }
+}
+
+/// What became of the samples of one kind.
+#[derive(Default)]
+struct Tally {
+    samples: usize,
+    /// The filter met its rows.
+    met: usize,
+    /// It did not, and the oracle could.
+    missed: usize,
+    /// Both could, and the oracle by a hundredth nearer.
+    far: usize,
+    worst: f64,
+    /// The longest step in µs, and the sum.
+    longest: f64,
+    sum: f64,
+}
+
+const BOUNDS: [&str; 3] = ["none", "loose", "tight"];
+const PERIODS: [f64; 5] = [0.001, 0.003, 0.01, 0.03, 0.1];
+
+/// A filter and its rows' promises and sources.
+type Built = (SafetyFilter, Vec<(FixedTime, Box<dyn DerivativeSource>)>);
+
+fn build<P>(plant: P, sets: &[(Set, BarrierSettings)], bound: Option<[f64; 2]>, period: f64) -> Built
+where
+    P: ControlAffine<4, 2> + Copy + Send + 'static,
+{
+    let mut builder = SafetyFilter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
+    let mut promises: Vec<(FixedTime, Box<dyn DerivativeSource>)> = Vec::new();
+    for (i, (set, settings)) in sets.iter().enumerate() {
+        builder = builder.barrier(&format!("set {i}"), plant, *set, settings.clone()).expect("valid barrier");
+        promises.push((
+            FixedTime::new(2, settings.clone()).expect("valid promise"),
+            lie::along(plant, *set, 2).expect("in range"),
+        ));
+    }
+    if let Some(b) = bound {
+        builder = builder.bounds(&b.map(|b| -b), &b).expect("valid bounds");
+    }
+    (FilterBuilder::build(builder).expect("valid filter"), promises)
+}
+
+fn sets(random: &mut Random, with_obstacles: bool, inside: Option<[f64; 4]>) -> Vec<(Set, BarrierSettings)> {
+    let mut place = || [random.between(-30.0, 30.0), random.between(-30.0, 30.0)];
+    let (centre, others) = (place(), [place(), place(), place()]);
+    let radius = random.between(0.5, 8.0);
+    let centre = match inside {
+        Some(x) => [x[0] + 0.5 * radius * random.between(-1.0, 1.0), x[1]],
+        None => centre,
+    };
+    let smoothing = radius * random.between(0.2, 1.0);
+    let goal = if random.below(3) == 0 {
+        Set::Quadratic(QuadraticDisc::new(centre, radius).expect("valid disc"))
+    } else {
+        Set::Distance(DistanceDisc::new(centre, radius, smoothing).expect("valid disc"))
+    };
+    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(2.0, 10.0)) };
+    let mut sets = vec![(goal, settings.clone())];
+    if with_obstacles {
+        for other in &others[..1 + random.below(3)] {
+            let radius = random.between(0.5, 4.0);
+            let disc = DistanceDisc::new(*other, radius, radius).expect("valid disc");
+            sets.push((Set::Obstacle(Outside(disc)), settings.clone()));
+        }
+    }
+    sets
+}
+
+/// Runs one start for `steps` samples and checks each of them.
+fn run<P>(
+    (plant, scale): (P, f64),
+    random: &mut Random,
+    (kind, with_obstacles, period): (usize, bool, f64),
+    (steps, fine): (usize, usize),
+    tally: &mut Tally,
+    name: &str,
+) where
+    P: ControlAffine<4, 2> + Copy + Send + 'static,
+{
+    let bound = match kind {
+        0 => None,
+        1 => Some([40.0, 10.0 * scale]),
+        _ => Some([6.0, scale]),
+    };
+    let mut x = SVector::from([
+        random.between(-40.0, 40.0),
+        random.between(-40.0, 40.0),
+        random.between(-3.2, 3.2),
+        random.between(-12.0, 12.0),
+    ]);
+    let inside = (random.below(4) == 0).then_some(x.into());
+    let (mut filter, promises) = build(plant, &sets(random, with_obstacles, inside), bound, period);
+    let hostile = random.below(3);
+    let mut t = 0.0;
+    // Somewhere on the way, not only near the anchor.
+    let stride = 1 + random.below((1.0 / period) as usize / 4 + 1);
+    for k in 0..steps * stride {
+        let u_ref = match hostile {
+            0 => [0.0, 0.0],
+            1 => [random.between(-10.0, 10.0), random.between(-3.0, 3.0) * scale],
+            _ => [-20.0 * x[3].signum(), 6.0 * scale],
+        };
+        let mut u = [0.0; 2];
+        let start = Instant::now();
+        let report = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("right dimensions");
+        let micros = start.elapsed().as_secs_f64() * 1e6;
+        let (status, predicted) = (report.status, report.predicted);
+        if k % stride == stride - 1 && predicted && status != Status::Singular {
+            tally.longest = tally.longest.max(micros);
+            tally.sum += micros;
+            let states = filter.state().barriers.clone();
+            let mut case = Case { rows: Vec::new(), t, x: x.into(), period, bound, u_ref };
+            for ((promise, source), state) in promises.iter().zip(&states) {
+                let mut derivatives = Derivatives::ZERO;
+                source.evaluate(t, x.as_slice(), &mut derivatives);
+                let Some(demand) = promise.over_period(state, t, &derivatives.drift[..2], period) else {
+                    return;
+                };
+                case.rows.push(Asked { source: &**source, demand });
+            }
+            check(&case, status, u, fine, tally, name);
+        }
+        x = rk4_step(&plant, &x, &SVector::from(u), period);
+        t += period;
+    }
+}
+
+/// Compares the filter's answer `u` with the oracle's.
+fn check(case: &Case, status: Status, u: [f64; 2], fine: usize, tally: &mut Tally, name: &str) {
+    tally.samples += 1;
+    let distance = case.distance(u);
+    let met = status.is_satisfied();
+    tally.met += usize::from(met);
+    if met {
+        // What the filter claims holds, to its tolerance.
+        let violation = case.violation(u);
+        assert!(violation <= 1e-8, "{name}: {status:?} with {violation} at {:?}", case.x);
+    }
+    if met && distance <= 1e-9 {
+        return;
+    }
+    let whole = case.bound.map_or(1e4, |b| case.u_ref[0].abs() + case.u_ref[1].abs() + b[0] + b[1]);
+    let reach = if met { 1.05 * distance } else { whole };
+    let Some((other, nearest)) = case.oracle(reach, fine) else { return };
+    let details = || {
+        format!(
+            "{name}: {status:?} {u:?} at {distance}, oracle {other:?} at {nearest}; x {:?}, u_ref {:?}, period {}, {} rows",
+            case.x,
+            case.u_ref,
+            case.period,
+            case.rows.len()
+        )
+    };
+    let tables = std::env::var_os("PUNCTUAL_TABLES").is_some();
+    if !met {
+        tally.missed += 1;
+        if tables {
+            println!("missed, {}", details());
+        }
+    } else {
+        let ratio = distance / nearest;
+        tally.worst = tally.worst.max(ratio);
+        if distance > 1.01 * nearest + 1e-6 {
+            tally.far += 1;
+            if tables {
+                println!("far, {ratio}: {}", details());
+            }
+        }
+    }
+}
+
+#[test]
+fn an_input_is_found_where_one_exists() {
+    let tables = std::env::var_os("PUNCTUAL_TABLES");
+    let runs = match &tables {
+        Some(count) => count.to_str().and_then(|c| c.parse::<usize>().ok()).filter(|c| *c > 1).unwrap_or(90),
+        None => 2,
+    };
+    let (mut missed, mut far, mut samples) = (0, 0, 0);
+    if tables.is_some() {
+        println!(
+            "plant, bounds, obstacles, period: samples, met, missed, far, worst ratio, µs mean, longest"
+        );
+    }
+    for plant in 0..4 {
+        let name = ["point mass", "unicycle", "bicycle 2.5", "bicycle 10"][plant];
+        for kind in 0..3 {
+            for with_obstacles in [false, true] {
+                for period in PERIODS {
+                    let mut tally = Tally::default();
+                    for i in 0..runs {
+                        let random = &mut Random(0x9e37_79b9 + 7919 * (i as u64 + 1));
+                        let what = (kind, with_obstacles, period);
+                        let bicycle = |l_r: f64| Bicycle::new(l_r).expect("valid bicycle");
+                        let size = (10, 33);
+                        match plant {
+                            0 => run((PointMass, 6.0), random, what, size, &mut tally, name),
+                            1 => run((Unicycle, 1.0), random, what, size, &mut tally, name),
+                            2 => run((bicycle(2.5), 0.6), random, what, size, &mut tally, name),
+                            _ => run((bicycle(10.0), 1.0), random, what, size, &mut tally, name),
+                        }
+                    }
+                    let Tally { samples: n, met, missed: m, far: f, worst, longest, sum } = tally;
+                    if tables.is_some() {
+                        let mean = sum / n as f64;
+                        println!(
+                            "{name}, {}, {with_obstacles}, {period}: {n}, {met}, {m}, {f}, {worst:.4}, {mean:.1}, {longest:.0}",
+                            BOUNDS[kind]
+                        );
+                    }
+                    (missed, far, samples) = (missed + m, far + f, samples + n);
+                }
+            }
+        }
+    }
+    println!("{samples} samples: {missed} missed, {far} too far");
+    assert!(missed == 0 && far == 0, "{samples} samples: {missed} missed, {far} too far");
+}
