@@ -155,6 +155,11 @@ impl Case {
         }
     }
 
+    /// The same with another step in s.
+    pub(crate) fn at(&self, step: f64) -> Self {
+        Self { step, ..self.clone() }
+    }
+
     pub(crate) fn filter(&self) -> SafetyFilter {
         let inputs = self.plant.inputs();
         let mut builder = SafetyFilter::builder(self.plant.states(), inputs);

@@ -10,14 +10,15 @@ use super::motion::advance;
 const PARTS: f64 = 20.0;
 /// The angle that plant or set may turn by within a part, rad.
 const TURN: f64 = 0.3;
-/// Most parts: what turns faster is watched more coarsely.
-const MOST_PARTS: f64 = 20_000.0;
+/// Most parts: a run that turns faster than they resolve ends there.
+const MOST_PARTS: f64 = 2000.0;
 /// h below this part of the problem's size is outside. The filter meets its rows to 1e-9 of their terms, so
 /// that a promise with no margin can end that far below 0.
 const TOLERANCE: f64 = 1e-9;
 
 /// A promise seen broken.
 #[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "all of it is printed, to run a case again")]
 pub(crate) struct Break {
     /// When, and the sample from which the input was held.
     pub(crate) time: f64,
@@ -63,7 +64,7 @@ impl Promise {
 pub(crate) struct Run {
     pub(crate) promises: Vec<Promise>,
     pub(crate) samples: usize,
-    /// Whether the state ceased to be a number on the way.
+    /// Whether it was thrown so far, or turned so fast, that the rest was not looked at.
     pub(crate) ended: bool,
 }
 
@@ -87,8 +88,8 @@ pub(crate) fn run_seen(case: &Case, mut observe: impl FnMut(f64, &State, &Input,
         x = judge.hold(t, &x, &u, next - t);
         run.samples += 1;
         t = next;
-        if !x.iter().all(|v| v.abs() < 1e12) {
-            run.ended = true;
+        run.ended = judge.spins || !x.iter().all(|v| v.abs() < 1e12);
+        if run.ended {
             break;
         }
     }
@@ -118,6 +119,8 @@ struct Judge<'a> {
     /// The parts of a hold: their ends in s, and the states there.
     grid: Vec<f64>,
     states: Vec<State>,
+    /// Whether the last hold turned faster than is resolved.
+    spins: bool,
 }
 
 impl<'a> Judge<'a> {
@@ -138,6 +141,7 @@ impl<'a> Judge<'a> {
             floors: vec![-TOLERANCE * size; starts.len()],
             grid: Vec::new(),
             states: Vec::new(),
+            spins: false,
         }
     }
 
@@ -187,7 +191,9 @@ impl<'a> Judge<'a> {
         for set in &self.case.sets {
             turning = turning.max(set.shape.turning());
         }
-        let parts = (turning * hold / TURN).clamp(PARTS, MOST_PARTS).ceil() as usize;
+        let parts = turning * hold / TURN;
+        self.spins = parts > MOST_PARTS;
+        let parts = parts.clamp(PARTS, MOST_PARTS).ceil() as usize;
         self.grid.clear();
         self.grid.extend((0..parts).map(|k| hold * k as f64 / parts as f64));
         self.grid.push(hold);
@@ -230,7 +236,7 @@ impl<'a> Judge<'a> {
         let end = self.case.start_time + set.deadline;
         if !set.keeping && end > t && end <= t + hold {
             let at = self.grid.partition_point(|s| *s < end - t).min(h.len() - 1);
-            promise.late = !(h[at] >= floor);
+            promise.late = h[at] < floor || h[at].is_nan();
         }
         promise.least = promise.least.min(least);
         promise.out_after_arrival |= arrived && least < floor;
