@@ -26,18 +26,17 @@ fn line(sign: f64, at: f64) -> Shape {
     Shape::Line { sign, at }
 }
 
-/// How many runs broke a promise under the flag, and the worst of them.
-#[track_caller]
-fn assert_none_broken(name: &str, cases: &[Case]) {
+/// How many runs broke a promise under the flag; prints the worst of them.
+fn broken(name: &str, cases: &[Case]) -> usize {
     let runs = on_every_core(cases.len() as u64, |i| run(&cases[i as usize]));
-    let broken = |run: &Run| run.promises.iter().filter_map(|p| p.broken).map(|b| b.size).fold(0.0, f64::max);
-    let mut worst: Vec<(f64, usize)> =
-        runs.iter().map(broken).zip(0..).filter(|(size, _)| *size > 0.0).collect();
-    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!("{name}: {} of {} broken under the flag", worst.len(), cases.len());
-    if let Some((_, i)) = worst.first() {
-        panic!("{name}: {} of {}, worst {:?}\n{:?}", worst.len(), cases.len(), runs[*i], cases[*i]);
+    let size = |run: &Run| run.promises.iter().filter_map(|p| p.broken).map(|b| b.size).fold(0.0, f64::max);
+    let broken = runs.iter().map(size).enumerate().filter(|(_, size)| *size > 0.0);
+    let count = broken.clone().count();
+    println!("{name}: {count} of {} broken under the flag", cases.len());
+    if let Some((i, _)) = broken.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        println!("  {:?}\n  {:?}", runs[i].promises, cases[i]);
     }
+    count
 }
 
 /// A point mass at the origin that is to be kept out of a disc; u_ref = 0, 10 ms.
@@ -51,7 +50,7 @@ fn an_obstacle_straight_ahead() {
     if waiting() {
         return;
     }
-    assert_none_broken("as found", &[towards([4.27, 0.0], [2.88, 0.0], 2.0)]);
+    let mut count = broken("as found", &[towards([4.27, 0.0], [2.88, 0.0], 2.0)]);
     let mut numbers = Numbers::new(1);
     let cases: Vec<_> = (0..100)
         .map(|_| {
@@ -60,7 +59,8 @@ fn an_obstacle_straight_ahead() {
             towards([numbers.within(0.5, 3.0) * far, 0.0], [far, 0.0], radius)
         })
         .collect();
-    assert_none_broken("around it", &cases);
+    count += broken("around it", &cases);
+    assert_eq!(count, 0);
 }
 
 /// 536 of them collided.
@@ -78,7 +78,7 @@ fn two_thousand_starts_outside_a_disc() {
             towards(velocity, [far * angle.cos(), far * angle.sin()], radius)
         })
         .collect();
-    assert_none_broken("random starts", &cases);
+    assert_eq!(broken("random starts", &cases), 0);
 }
 
 /// p' = u, h = 10 − p, pushed against the wall; every row can be met, and is.
@@ -123,10 +123,13 @@ fn deadlines_between_samples() {
         let deadline = numbers.scale(0.3, 30.0);
         reach(numbers.scale(0.1, 100.0), deadline, deadline / numbers.scale(1.5, 300.0))
     }));
-    for case in &cases {
-        let promise = run(case).promises[0];
-        assert!(!promise.late && promise.left.is_none(), "{promise:?}: {case:?}");
+    let late = |case: &Case| run(case).promises[0].left;
+    for case in &cases[..3] {
+        println!("T = {}, step {}: {:?}", case.sets[0].deadline, case.step, late(case));
     }
+    let count = cases.iter().filter(|case| late(case).is_some()).count();
+    println!("{count} of {} late at T itself", cases.len());
+    assert_eq!(count, 0);
 }
 
 /// Chains with derivatives of one size in units of the deadline, from outside.
@@ -154,9 +157,8 @@ fn missed_steps() {
     if waiting() {
         return;
     }
-    for n in 1..=3 {
-        assert_none_broken(&format!("n = {n}, missed"), &chains(n, 2000, Steps::Missed));
-    }
+    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, missed"), &chains(n, 2000, Steps::Missed)));
+    assert_eq!(found, [0; 3]);
 }
 
 /// 148, 82 and 37.
@@ -165,9 +167,8 @@ fn steps_of_every_length() {
     if waiting() {
         return;
     }
-    for n in 1..=3 {
-        assert_none_broken(&format!("n = {n}, scattered"), &chains(n, 2000, Steps::Scattered));
-    }
+    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, scattered"), &chains(n, 2000, Steps::Scattered)));
+    assert_eq!(found, [0; 3]);
 }
 
 /// One step of 1e-12 s switched the filter off, and a wall at 10 m was left behind.
@@ -182,20 +183,23 @@ fn a_very_short_step() {
         horizon: 20.0,
         ..Case::plain(Plant::Chain(n), Set::keeping(line(-1.0, 10.0), 10.0), &[0.0; 8][..n], 0.01)
     };
+    let mut left = 0;
     for n in 1..=3 {
         for short in [1e-12, 1e-9, 1e-6] {
             for steps in [Steps::Once(short), Steps::EveryTenth(short), Steps::Alternating(short)] {
                 for push in [1.0, 3.0, 10.0] {
-                    let case = wall(n, push, steps);
-                    let promise = run(&case).promises[0];
-                    assert!(promise.left.is_none(), "{promise:?}: {case:?}");
+                    let promise = run(&wall(n, push, steps)).promises[0];
+                    if let Some(found) = promise.left {
+                        println!("n = {n}, push {push}, {steps:?}: {found:?}");
+                        left += 1;
+                    }
                 }
             }
         }
     }
-    for n in 1..=3 {
-        assert_none_broken(&format!("n = {n}, short steps"), &chains(n, 50, Steps::Tiny));
-    }
+    println!("walls left: {left} of 81");
+    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, short steps"), &chains(n, 500, Steps::Tiny)));
+    assert_eq!((found, left), ([0; 3], 0));
 }
 
 /// Few samples to a deadline: h dipped between two of them, though every sample was well.
@@ -204,7 +208,7 @@ fn dips_between_samples() {
     if waiting() {
         return;
     }
-    for plant in [Plant::PointMass, Plant::Unicycle, Plant::Bicycle { l_r: 2.0 }] {
+    let found = [Plant::PointMass, Plant::Unicycle, Plant::Bicycle { l_r: 2.0 }].map(|plant| {
         let mut numbers = Numbers::new(8);
         let mut draw = || {
             let start = [
@@ -219,9 +223,10 @@ fn dips_between_samples() {
             let reference = references[numbers.below(3)];
             Case { reference, ..Case::plain(plant, set, &start, 5.0 / numbers.within(10.0, 50.0).round()) }
         };
-        let cases: Vec<_> = (0..200).map(|_| draw()).collect();
-        assert_none_broken(&format!("{plant:?}"), &cases);
-    }
+        let cases: Vec<_> = (0..1000).map(|_| draw()).collect();
+        broken(&format!("{plant:?}"), &cases)
+    });
+    assert_eq!(found, [0; 3]);
 }
 
 /// A barrier that was left begins anew, and does not claim that it had been kept.
@@ -231,25 +236,30 @@ fn recovery_does_not_claim_what_was_lost() {
         return;
     }
     let mut numbers = Numbers::new(11);
-    for _ in 0..50 {
-        // Inside and too fast for its bounds.
-        let (at, speed) = (numbers.scale(1.0, 20.0), numbers.within(1.0, 5.0));
+    let (mut claimed, mut recovered) = (0, 0);
+    for i in 0..100 {
+        // Steps longer than it was told of carry it out.
+        let (n, at) = (1 + i % 2, numbers.scale(1.0, 20.0));
         let set = Set { recovery: Some(numbers.within(1.0, 5.0)), ..Set::within(line(-1.0, at), 5.0) };
-        let bound = speed * speed / at / numbers.within(2.5, 20.0);
+        let push = at * numbers.within(1.0, 5.0);
         let case = Case {
-            bounds: [bound; 2],
-            reference: Reference::Outwards(bound),
-            ..Case::plain(Plant::Chain(2), set, &[0.0, speed], 0.01)
+            reference: Reference::Outwards(push),
+            steps: Steps::Missed,
+            told: false,
+            seed: i as u64,
+            ..Case::plain(Plant::Chain(n), set, &[0.0; 2][..n], numbers.within(0.01, 0.1))
         };
         let mut recoveries = 0;
-        run_seen(&case, |t, _, _, report| {
+        run_seen(&case, |_, _, _, report| {
             let b = &report.barriers[0];
-            let claims = b.guaranteed && b.h < 0.0 && b.recoveries > recoveries;
+            let anew = b.recoveries > recoveries;
+            recovered += usize::from(anew);
+            claimed += usize::from(anew && b.guaranteed && b.h < 0.0);
             recoveries = b.recoveries;
-            assert!(!claims, "{b:?} at {t}: {case:?}");
         });
-        assert!(recoveries > 0, "never left: {case:?}");
     }
+    println!("begun anew {recovered} times, {claimed} of them guaranteed with h < 0");
+    assert!(claimed == 0 && recovered > 0);
 }
 
 /// A wall that swings by several radians between samples looks like one that swings slowly.
@@ -266,7 +276,7 @@ fn a_wall_faster_than_the_samples() {
     let mut numbers = Numbers::new(12);
     let mut draw = |i: usize| wall(numbers.scale(0.1, 5.0), numbers.scale(0.5, 50.0), 1 + i % 2);
     cases.extend((0..50).map(&mut draw));
-    assert_none_broken("walls", &cases);
+    assert_eq!(broken("walls", &cases), 0);
 }
 
 /// What is not satisfied says so.
