@@ -9,7 +9,7 @@ use punctual_core::scalar::Scalar;
 use punctual_core::simulation::{Schedule, closed_loop};
 
 /// ẋ₁ = x₂, …, ẋ_N = u.
-struct Chain<const N: usize>;
+pub(super) struct Chain<const N: usize>;
 
 impl<const N: usize> ControlAffine<N, 1> for Chain<N> {
     fn drift<S: Scalar>(&self, x: &SVector<S, N>) -> SVector<S, N> {

@@ -7,9 +7,12 @@
 mod bicycles;
 mod chains;
 mod disturbances;
+mod judge;
 mod measurements;
 mod obstacles;
 mod profiles;
+mod readme;
+mod reproducers;
 mod sampling;
 mod starts;
 

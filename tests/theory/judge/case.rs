@@ -1,0 +1,251 @@
+//! One closed loop: plant, sets, bounds, reference input, samples; all that is needed to run it again.
+
+use punctual::reproduce::starts;
+use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+
+use super::model::{Input, Plant, Shape, State};
+
+/// Numbers that are always the same for a seed.
+pub(crate) struct Numbers(Box<dyn FnMut() -> f64>);
+
+impl Numbers {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Box::new(starts::uniform(seed)))
+    }
+
+    /// Uniform.
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0)()
+    }
+
+    /// Uniform in its logarithm.
+    pub(crate) fn scale(&mut self, low: f64, high: f64) -> f64 {
+        low * (high / low).powf((self.0)())
+    }
+
+    /// 0 … `count` − 1.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        ((self.0)() * count as f64) as usize
+    }
+
+    /// True in that part of the cases.
+    pub(crate) fn chance(&mut self, part: f64) -> bool {
+        (self.0)() < part
+    }
+}
+
+/// A set and what is asked for.
+#[derive(Clone, Debug)]
+pub(crate) struct Set {
+    pub(crate) shape: Shape,
+    /// T in s; of a set that is only kept, what the filter is given where it wants one.
+    pub(crate) deadline: f64,
+    /// Whether nothing is to be reached: only what is safe at the anchor stays so.
+    pub(crate) keeping: bool,
+    pub(crate) rate: Option<f64>,
+    pub(crate) stay_rate: Option<f64>,
+    pub(crate) margin: f64,
+    pub(crate) recovery: Option<f64>,
+}
+
+impl Set {
+    pub(crate) fn within(shape: Shape, deadline: f64) -> Self {
+        Self { shape, deadline, keeping: false, rate: None, stay_rate: None, margin: 0.0, recovery: None }
+    }
+
+    pub(crate) fn keeping(shape: Shape, deadline: f64) -> Self {
+        Self { keeping: true, ..Self::within(shape, deadline) }
+    }
+
+    fn settings(&self) -> BarrierSettings {
+        let asked =
+            if self.keeping { keeping(self.deadline) } else { BarrierSettings::within(self.deadline) };
+        BarrierSettings {
+            rate: self.rate,
+            stay_rate: self.stay_rate,
+            margin: self.margin,
+            recovery: self.recovery,
+            ..asked
+        }
+    }
+}
+
+/// SWITCH 1. A set that is only kept: today it needs a deadline all the same.
+fn keeping(deadline: f64) -> BarrierSettings {
+    BarrierSettings::within(deadline)
+}
+
+/// SWITCH 2. Tells the filter the longest hold in s that may come: today it cannot be told.
+fn told(builder: FilterBuilder, _longest: f64) -> FilterBuilder {
+    builder
+}
+
+/// Who is in control.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Reference {
+    Zero,
+    /// Against the speed, with this gain.
+    Damping(f64),
+    /// Out of the first set, this strong.
+    Outwards(f64),
+    /// Anew at random times, on average so long held.
+    Random {
+        size: Input,
+        held: f64,
+    },
+}
+
+/// When samples come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Steps {
+    Regular,
+    /// Each 0.5 to 1 of the longest.
+    Jittered,
+    /// Each 0.05 to 1 of the longest, uniform in the logarithm.
+    Scattered,
+    /// 10 % of them three times as long.
+    Missed,
+    /// Some of 1e-12, 1e-9 or 1e-6 s between.
+    Tiny,
+    /// After every nine the tenth of so many seconds.
+    EveryTenth(f64),
+    /// One of so many seconds, the fiftieth.
+    Once(f64),
+    /// Every other one of so many seconds.
+    Alternating(f64),
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) plant: Plant,
+    pub(crate) sets: Vec<Set>,
+    /// Of each |u_i|.
+    pub(crate) bounds: Input,
+    pub(crate) start_time: f64,
+    pub(crate) start: State,
+    pub(crate) reference: Reference,
+    pub(crate) steps: Steps,
+    /// The usual step in s, which the filter is told as the first.
+    pub(crate) step: f64,
+    /// Whether it is told the longest.
+    pub(crate) told: bool,
+    /// s from the anchor.
+    pub(crate) horizon: f64,
+    /// Of what is drawn on the way.
+    pub(crate) seed: u64,
+}
+
+impl Case {
+    /// One set, no bounds, no reference input, regular steps, until twice the deadline.
+    pub(crate) fn plain(plant: Plant, set: Set, start: &[f64], step: f64) -> Self {
+        let mut state = [0.0; 8];
+        state[..start.len()].copy_from_slice(start);
+        Self {
+            plant,
+            horizon: 2.0 * set.deadline,
+            sets: vec![set],
+            bounds: [f64::INFINITY; 2],
+            start_time: 0.0,
+            start: state,
+            reference: Reference::Zero,
+            steps: Steps::Regular,
+            step,
+            told: true,
+            seed: 1,
+        }
+    }
+
+    /// The same with another step in s.
+    pub(crate) fn at(&self, step: f64) -> Self {
+        Self { step, ..self.clone() }
+    }
+
+    pub(crate) fn filter(&self) -> SafetyFilter {
+        let inputs = self.plant.inputs();
+        let mut builder = SafetyFilter::builder(self.plant.states(), inputs);
+        for set in &self.sets {
+            let source = self.plant.source(&set.shape);
+            builder = builder.source("set", source, set.settings()).expect("valid settings");
+        }
+        let low = self.bounds.map(|bound| -bound);
+        builder = builder.bounds(&low[..inputs], &self.bounds[..inputs]).expect("valid bounds");
+        builder = builder.sampling(Sampling::Measured { first: Some(self.step) }).expect("a valid step");
+        if self.told {
+            builder = told(builder, self.longest());
+        }
+        builder.build().expect("a valid filter")
+    }
+
+    /// The longest hold there will be.
+    pub(crate) fn longest(&self) -> f64 {
+        if self.steps == Steps::Missed { 3.0 * self.step } else { self.step }
+    }
+
+    /// The longest hold that the filter knows of.
+    pub(crate) fn longest_told(&self) -> f64 {
+        if self.told { self.longest() } else { self.step }
+    }
+
+    /// The time of sample `k` + 1, after `t` of sample `k`.
+    pub(crate) fn next_sample(&self, k: usize, t: f64, numbers: &mut Numbers) -> f64 {
+        let step = self.step;
+        t + match self.steps {
+            // As a clock counts, without the sum of its round-off.
+            Steps::Regular => return self.start_time + (k + 1) as f64 * step,
+            Steps::Jittered => step * numbers.within(0.5, 1.0),
+            Steps::Scattered => step * numbers.scale(0.05, 1.0),
+            Steps::Missed if numbers.chance(0.1) => 3.0 * step,
+            Steps::Tiny if numbers.chance(0.05) => [1e-12, 1e-9, 1e-6][numbers.below(3)],
+            Steps::EveryTenth(short) if k % 10 == 9 => short,
+            Steps::Once(short) if k == 50 => short,
+            Steps::Alternating(short) if k % 2 == 1 => short,
+            _ => step,
+        }
+    }
+
+    /// u_ref; `last` is when it was drawn and what, for [`Reference::Random`].
+    pub(crate) fn wanted(&self, t: f64, x: &State, last: &mut (f64, Input), numbers: &mut Numbers) -> Input {
+        match self.reference {
+            Reference::Zero => [0.0; 2],
+            Reference::Damping(gain) => match self.plant {
+                Plant::PointMass => [-gain * x[2], -gain * x[3]],
+                Plant::Unicycle | Plant::Bicycle { .. } => [-gain * x[3], 0.0],
+                Plant::Chain(1) | Plant::Written(1) => [-gain * x[0], 0.0],
+                Plant::Chain(n) => [-gain * x[n - 1], 0.0],
+                _ => [-gain * x[1], 0.0],
+            },
+            Reference::Outwards(size) => self.outwards(t, x, size),
+            Reference::Random { size, held } => {
+                if t >= last.0 {
+                    *last = (t + numbers.within(0.0, 2.0 * held), size.map(|s| numbers.within(-s, s)));
+                }
+                last.1
+            }
+        }
+    }
+
+    /// Out of the first set: the way down h.
+    fn outwards(&self, t: f64, x: &State, size: f64) -> Input {
+        let shape = &self.sets[0].shape;
+        let &Shape::Disc { start, velocity, outside, .. } = shape else {
+            let falls = match *shape {
+                Shape::Line { sign, .. } => -sign,
+                Shape::Within { .. } => x[0].signum(),
+                Shape::Slow { .. } | Shape::Headway { .. } => 1.0,
+                _ => -1.0,
+            };
+            // The gap shrinks with the speed.
+            let turned = matches!((self.plant, shape), (Plant::Cruise { .. }, Shape::Line { .. }));
+            return [if turned { -falls } else { falls } * size, 0.0];
+        };
+        let sign = if outside { -1.0 } else { 1.0 };
+        let away = [0, 1].map(|i| sign * (x[i] - start[i] - velocity[i] * t));
+        let far = away[0].hypot(away[1]).max(1e-9);
+        if self.plant == Plant::PointMass {
+            return away.map(|d| size * d / far);
+        }
+        let (along, across) =
+            (away[0] * x[2].cos() + away[1] * x[2].sin(), away[1] * x[2].cos() - away[0] * x[2].sin());
+        [size * along.signum(), (2.0 * (across / far) * along.signum()).clamp(-1.0, 1.0)]
+    }
+}
