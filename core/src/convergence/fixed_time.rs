@@ -392,6 +392,16 @@ impl FixedTime {
         (keep.pull - lower_terms(keep.rate, &from_margin::<N>(h, keep.margin)), keep.margin)
     }
 
+    /// Whether the rate and the margin with which the set is kept in `state` are constants, that do not depend on the sample.
+    pub(crate) fn keeps_evenly(&self, state: &FixedTimeState) -> bool {
+        let settings = &self.settings;
+        let rate = settings
+            .stay_rate
+            .or(settings.rate)
+            .or(settings.deadline.map(|deadline| FixedTimeSettings::default_rate(deadline, state.period)));
+        state.stay_margin == state.margin && rate == Some(state.stay_rate)
+    }
+
     /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
     fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
         /// The part of what bounds allow that is used where there is time.

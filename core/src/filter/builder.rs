@@ -425,8 +425,8 @@ impl FilterBuilder {
         let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {
             derivatives: Derivatives::ZERO,
-            rows: vec![Row::ZERO; channels.len()],
-            enforcement: vec![Enforcement::Hard { priority: 0 }; channels.len()],
+            rows: vec![Row::ZERO; MAX_ROWS],
+            enforcement: vec![Enforcement::Hard { priority: 0 }; MAX_ROWS],
             demands: vec![SampledDemand::ZERO; channels.len()],
             conditions: Vec::with_capacity(MAX_ROWS),
             next: state.clone(),

@@ -1,6 +1,6 @@
 //! One barrier of a filter: its derivatives, its promise and when that is in force.
 
-use super::{FixedTimeState, Infeasible, Phase};
+use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD};
 use crate::convergence::FixedTime;
 use crate::lie::DerivativeSource;
 use crate::qp::{Bounds, Enforcement};
@@ -119,8 +119,6 @@ impl Channel {
         h: &[f64],
         (period, measures): (f64, bool),
     ) {
-        /// A period longer by less than this part of it is the same.
-        const SAME_PERIOD: f64 = 1e-6;
         if promise.phase != Phase::Waiting && !measures {
             return;
         }

@@ -36,7 +36,7 @@ pub(super) struct Lowest {
 }
 
 impl Lowest {
-    fn or(self, other: Self) -> Self {
+    pub(super) fn or(self, other: Self) -> Self {
         // Not `<`: what is not a number counts as lowest.
         if self.h >= other.h { other } else { self }
     }

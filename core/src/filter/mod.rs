@@ -22,6 +22,7 @@ pub use builder::FilterBuilder;
 use channel::Channel;
 pub use channel::{Begin, End, Strictness};
 use errors::{MeasurementErrors, Slopes};
+use hold::Lowest;
 pub use integrator::Integrator;
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
@@ -35,7 +36,7 @@ use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{self, Bounds, Enforcement, Outcome, Problem, Residuals, Row};
 use crate::reach;
 use crate::scalar::all_finite;
-use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 use search::{Condition, Held};
 
 /// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
@@ -63,6 +64,12 @@ impl Clone for FilterState {
         (self.time, self.period, self.input) = (*time, *period, *input);
     }
 }
+
+/// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
+const ROUNDS: u32 = 3;
+
+/// Periods that differ by less than this part of them are one.
+const SAME_PERIOD: f64 = 1e-6;
 
 /// Scratch memory of a step; what it holds from the step before changes no bit of the next.
 struct Workspace {
@@ -200,10 +207,11 @@ impl SafetyFilter {
         let hold = period.unwrap_or(since).max(self.period_max);
         let measures = matches!(self.sampling, Sampling::Measured { .. });
         let mut sampled = period;
+        // Within the capacity: a step does not allocate.
+        conditions.clear();
         // Slices of one length, so that indices need no check.
         let count = self.channels.len();
-        let (rows, enforcement, demands) =
-            (&mut rows[..count], &mut enforcement[..count], &mut demands[..count]);
+        let demands = &mut demands[..count];
         let (promises, reports) = (&mut next.barriers[..count], &mut report.barriers[..count]);
         for i in 0..count {
             let channel = &self.channels[i];
@@ -221,7 +229,10 @@ impl SafetyFilter {
                 from = own;
             }
             if !channel.in_force(promises, i, t, h) {
-                (rows[i], demands[i]) = (Row::ZERO, SampledDemand::ZERO);
+                (rows[i], demands[i], outlooks[i]) = (Row::ZERO, SampledDemand::ZERO, Outlook::NONE);
+                if let Some(duration) = period {
+                    conditions.push(Condition { channel: i, demand: SampledDemand::ZERO, duration });
+                }
                 reports[i] = BarrierReport { h, ..BarrierReport::BLANK };
                 reports[i].remember(&promises[i]);
                 continue;
@@ -271,6 +282,7 @@ impl SafetyFilter {
                     Some(demand) => demands[i] = demand,
                     None => sampled = None,
                 }
+                conditions.push(Condition { channel: i, demand: demands[i], duration: period });
             }
             outlooks[i] = Outlook::new(derivatives, n);
             reports[i] = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
@@ -283,45 +295,89 @@ impl SafetyFilter {
             return Ok(());
         }
 
-        // Solve, and report what came of it.
-        let (bounds, correction_limit) = (&self.bounds, self.correction_limit);
-        let mut held = None;
-        if let Some(period) = sampled {
-            report.period = period;
-            let (channels, enforcement) = (&self.channels[..], &*enforcement);
-            let (t, x) = (begin, &predicted[..]);
-            let (errors, slopes) = (&self.errors, &slopes[..]);
-            // Within the capacity: a step does not allocate.
+        // Solve; where h would break its promise between the samples, once more with that instant as a row.
+        if sampled.is_none() {
             conditions.clear();
-            for (channel, demand) in demands.iter().enumerate() {
-                conditions.push(Condition { channel, demand: *demand, duration: period });
-            }
-            let problem = Held {
-                channels,
-                conditions: &*conditions,
-                t,
-                x,
-                bounds,
-                u_ref,
-                enforcement,
-                correction_limit,
-                errors,
-                slopes,
-            };
-            let last = self.state.time.map(|_| &self.state.input[..u.len()]);
-            held = problem.solve(rows, last, programme, u);
-            if held.is_none() {
-                rows.iter_mut().zip(&*reports).for_each(|(row, b)| *row = b.row);
+        }
+        let held_from = |i: usize| match self.delay > 0.0 || period.is_some() {
+            true => &predicted[i * x.len()..][..x.len()],
+            false => x,
+        };
+        if let Some(period) = sampled.filter(|period| self.period_max > *period * (1.0 + SAME_PERIOD)) {
+            // The next sample may come then, or at the end of the longest step.
+            for i in 0..count.min(MAX_ROWS - count) {
+                let Outlook { n, drift, .. } = &outlooks[i];
+                let demand =
+                    self.channels[i].promise.over_period(&promises[i], begin, &drift[..*n], self.period_max);
+                if let Some(demand) = demand.filter(|_| *n > 0 && period > 0.0) {
+                    conditions.push(Condition { channel: i, demand, duration: self.period_max });
+                }
             }
         }
-        report.predicted = held.is_some();
-        let solution = match held {
-            Some(solution) => solution,
-            None => {
-                let problem = Problem { enforcement, ..Problem::new(rows, bounds, u_ref, correction_limit) };
-                programme.solve(&problem, u)
+        let last = self.state.time.map(|_| &self.state.input[..u.len()]);
+        let listed = conditions.len();
+        let mut solution;
+        let mut round = 0;
+        loop {
+            let total = conditions.len().max(count);
+            for (i, condition) in conditions.iter().enumerate() {
+                let channel = condition.channel;
+                enforcement[i] = enforcement[channel];
+                rows[i] = match i < listed {
+                    true => reports[channel].row,
+                    false => outlooks[channel].row_at(condition, &reports[channel].row.normal),
+                };
             }
-        };
+            let (rows, enforcement) = (&mut rows[..total], &enforcement[..total]);
+            let (bounds, correction_limit) = (&self.bounds, self.correction_limit);
+            let found = (!conditions.is_empty()).then(|| {
+                let problem = Held {
+                    channels: &self.channels,
+                    conditions: &*conditions,
+                    t: begin,
+                    x: &predicted[..],
+                    bounds,
+                    u_ref,
+                    enforcement,
+                    correction_limit,
+                    errors: &self.errors,
+                    slopes: &slopes[..],
+                };
+                problem.solve(rows, last, programme, u)
+            });
+            report.predicted = matches!(found, Some(Some(_)));
+            solution = match found.flatten() {
+                Some(solution) => solution,
+                None => {
+                    (0..count).for_each(|i| rows[i] = reports[i].row);
+                    let (rows, enforcement) = (&rows[..count], &enforcement[..count]);
+                    let problem =
+                        Problem { enforcement, ..Problem::new(rows, bounds, u_ref, correction_limit) };
+                    programme.solve(&problem, u)
+                }
+            };
+            for i in 0..count {
+                let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: held_from(i), u };
+                outlooks[i].look(&promises[i], &held, &reports[i].row.normal, hold, scratch);
+            }
+            let met = matches!(solution.outcome, Outcome::Optimal);
+            if conditions.len() > listed && !met {
+                // That instant cannot be had as well: the flag says so.
+                conditions.truncate(listed);
+                round = ROUNDS;
+                continue;
+            }
+            let before = conditions.len();
+            if round < ROUNDS && met && report.predicted {
+                for (i, outlook) in outlooks[..count].iter().enumerate() {
+                    conditions.extend(outlook.condition(i, &promises[i]).filter(|_| before + i < MAX_ROWS));
+                }
+            }
+            if conditions.len() == before {
+                break;
+            }
+            round += 1;
+        }
         if matches!(self.sampling, Sampling::Measured { .. }) && self.state.time.is_some_and(|last| t > last)
         {
             next.period = period;
@@ -343,13 +399,7 @@ impl SafetyFilter {
             if matches!(promise.phase, Phase::Waiting | Phase::Released) {
                 continue;
             }
-            let states =
-                if self.delay > 0.0 || period.is_some() { &predicted[i * x.len()..][..x.len()] } else { x };
-            let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: states, u };
-            let normal = &report_b.row.normal;
-            if promise.guaranteed && !is_kept_over(promise, &outlooks[i], &held, normal, hold, scratch) {
-                promise.guaranteed = false;
-            }
+            promise.guaranteed &= outlooks[i].lowest.is_none();
             if let Some(period) = period.filter(|_| report.predicted) {
                 report_b.sampling_loss = demands[i].loss(report_b.row.slack(u), period);
             }
@@ -450,13 +500,13 @@ impl SafetyFilter {
     pub fn residuals(&mut self, u_ref: &[f64], u: &[f64]) -> Result<Option<Residuals>, Error> {
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        let Workspace { rows, enforcement, report, programme, .. } = &mut self.workspace;
+        let Workspace { rows, enforcement, conditions, report, programme, .. } = &mut self.workspace;
         use Status::{InvalidInput, Singular, SolverFailed, WrongRelativeDegree};
         let unsolved = matches!(report.status, InvalidInput | Singular | WrongRelativeDegree | SolverFailed);
         if unsolved || report.time.is_nan() {
             return Ok(None);
         }
-        let count = self.channels.len();
+        let count = conditions.len().max(self.channels.len());
         let problem = Problem {
             enforcement: &enforcement[..count],
             ..Problem::new(&rows[..count], &self.bounds, u_ref, self.correction_limit)
@@ -565,19 +615,21 @@ fn means(
     Means { drift: derivatives.drift[n], reach, weight, hold }
 }
 
-/// What the derivatives at a sample say of h until the next.
+/// What is foreseen of h until the next sample.
 #[derive(Clone, Copy)]
 struct Outlook {
     n: usize,
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, then L_fⁿh.
     drift: [f64; MAX_RELATIVE_DEGREE + 1],
+    /// Where the input held breaks the promise, if it does.
+    lowest: Option<Lowest>,
 }
 
 impl Outlook {
-    const NONE: Self = Self { n: 0, drift: [0.0; MAX_RELATIVE_DEGREE + 1] };
+    const NONE: Self = Self { n: 0, drift: [0.0; MAX_RELATIVE_DEGREE + 1], lowest: None };
 
     fn new(derivatives: &Derivatives, n: usize) -> Self {
-        Self { n, drift: derivatives.drift }
+        Self { n, drift: derivatives.drift, lowest: None }
     }
 
     /// The Taylor polynomial of order n of h, `s` seconds later; every term but the first as `sign` says.
@@ -589,47 +641,76 @@ impl Outlook {
         }
         sum
     }
-}
 
-/// Whether the promise holds at every instant of the `hold` that begins, along the model.
-fn is_kept_over(
-    promise: &FixedTimeState,
-    outlook: &Outlook,
-    held: &hold::Hold,
-    normal: &[f64; MAX_INPUTS],
-    hold: f64,
-    scratch: &mut [f64],
-) -> bool {
-    /// Round-off, as a part of the size of h.
-    const ROUND_OFF: f64 = 1e-12;
-    /// The part of h that must be left for the model not to be asked.
-    const CLEAR: f64 = 0.5;
-    /// Instants at which a source that cannot predict is looked at.
-    const INSTANTS: u32 = 16;
-    let from = match promise.phase {
-        Phase::Stay => 0.0,
-        Phase::Approach => (promise.anchor_time + promise.deadline - held.t).max(0.0),
-        _ => return true,
-    };
-    // Also where the end is not a number.
-    if !(from < hold) {
-        return true;
+    /// The row that `condition`, on h alone, is to the order n; `normal` is that of h⁽ⁿ⁾.
+    fn row_at(&self, condition: &Condition, normal: &[f64; MAX_INPUTS]) -> Row {
+        let s = condition.duration;
+        let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
+        let floor = (condition.demand.floor - self.polynomial(self.drift[self.n], s, |term| term)) / power;
+        Row { normal: *normal, floor }
     }
-    let highest = outlook.drift[outlook.n] + qp::dot(normal, held.u);
-    // With n = 1 a set that moves faster than the samples shows in no derivative that is known here.
-    let h = outlook.drift[0];
-    if outlook.n > 1 && h > 0.0 && outlook.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h {
-        return true;
+
+    /// Finds out whether the promise holds at every instant of the `hold` (s) that begins, along the model.
+    fn look(
+        &mut self,
+        promise: &FixedTimeState,
+        held: &hold::Hold,
+        normal: &[f64; MAX_INPUTS],
+        hold: f64,
+        scratch: &mut [f64],
+    ) {
+        /// Round-off, as a part of the size of h.
+        const ROUND_OFF: f64 = 1e-12;
+        /// The part of h that must be left for the model not to be asked.
+        const CLEAR: f64 = 0.5;
+        self.lowest = None;
+        let from = match promise.phase {
+            Phase::Stay => 0.0,
+            Phase::Approach => (promise.anchor_time + promise.deadline - held.t).max(0.0),
+            _ => return,
+        };
+        let h = self.drift[0];
+        let highest = self.drift[self.n] + qp::dot(normal, held.u);
+        // With n = 1 a set that moves faster than the samples shows in no derivative that is known here.
+        let is_clear = |hold: f64| {
+            self.n > 1 && h > 0.0 && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
+        };
+        let begins = from < hold;
+        if !begins || is_clear(hold) {
+            return;
+        }
+        let lowest = held
+            .lowest(from, hold, scratch)
+            .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
+        let size = promise.anchor[0].abs() + promise.margin + h.abs();
+        // Not `<`: what is not a number is no promise.
+        self.lowest = (!(lowest.h >= -ROUND_OFF * size)).then_some(lowest);
     }
-    let least = match held.lowest(from, hold, scratch) {
-        Some(lowest) => lowest.h,
-        None => (0..=INSTANTS)
-            .map(|i| from + (hold - from) * f64::from(i) / f64::from(INSTANTS))
-            .map(|s| outlook.polynomial(highest, s, |term| term))
-            .fold(f64::INFINITY, f64::min),
-    };
-    let size = promise.anchor[0].abs() + promise.margin + h.abs();
-    least >= -ROUND_OFF * size
+
+    /// The same without a model, to the order n.
+    fn lowest_of_polynomial(&self, highest: f64, from: f64, to: f64) -> Lowest {
+        const INSTANTS: u32 = 16;
+        let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
+        (0..=INSTANTS)
+            .map(|i| Lowest { h: self.polynomial(highest, at(i), |term| term), at: at(i) })
+            .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
+    }
+
+    /// What would keep the promise at the instant at which it is broken.
+    fn condition(&self, channel: usize, promise: &FixedTimeState) -> Option<Condition> {
+        let at = self.lowest.map(|lowest| lowest.at).filter(|at| *at > 0.0)?;
+        let mut weights = [0.0; MAX_RELATIVE_DEGREE];
+        weights[0] = 1.0;
+        let floor = match promise.phase {
+            Phase::Stay => 0.5 * promise.margin.min(self.drift[0]).max(0.0),
+            _ => promise.margin,
+        };
+        Some(Condition {
+            channel,
+            demand: SampledDemand { weights, floor, ..SampledDemand::ZERO },
+            duration: at,
+        })
+    }
 }
 
 /// A sample that enforces nothing: the admissible input nearest 0. The promises stay as they were in

@@ -70,6 +70,11 @@ pub enum NoDerivative {
     Condition(usize),
     /// Its deadline is given up at this sample for a later one, which a search found.
     Postponed(usize),
+    /// The set of the barrier is kept with a rate or margin that is chosen at this sample
+    /// ([`stay::keep`](crate::convergence::stay::keep)).
+    Kept(usize),
+    /// The answer keeps a promise at an instant between the samples, or for steps of several lengths.
+    Instants,
     /// The search over the period ended more than 1e-3 of its size (1e-6 where the rows are not met) away from
     /// the input that is nearest to u_ref on the rows linearised there.
     NotConverged,
@@ -87,6 +92,8 @@ impl fmt::Display for NoDerivative {
             Self::Profile(i) => write!(f, "the profile of barrier {i} gives no derivative by its anchor"),
             Self::Condition(i) => write!(f, "the condition of barrier {i} gives no derivative"),
             Self::Postponed(i) => write!(f, "the deadline of barrier {i} is given up at this sample"),
+            Self::Kept(i) => write!(f, "the rate with which barrier {i} is kept is chosen at this sample"),
+            Self::Instants => f.write_str("the answer keeps a promise between the samples"),
             Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
             Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
             Self::MeasurementErrors => f.write_str("not with measurement errors"),
@@ -212,14 +219,18 @@ impl SafetyFilter {
         let du = &mut du[..u.len()];
         scratch[2].clear();
         scratch[2].resize(self.state_dim, 0.0);
+        if self.workspace.conditions.len() > self.channels.len() {
+            return Err(NoDerivative::Instants);
+        }
         let mut motions = [Motion::NONE; MAX_ROWS];
         for (i, motion) in motions[..self.channels.len()].iter_mut().enumerate() {
             (*motion, barriers[i]) = self.motion(i, t, state, u, scratch)?;
         }
 
         // The active rows of the sample, whichever method found it.
-        let workspace = &self.workspace;
-        let (rows, enforcement, report) = (&workspace.rows, &workspace.enforcement, &workspace.report);
+        let (workspace, count) = (&self.workspace, self.channels.len());
+        let (rows, enforcement) = (&workspace.rows[..count], &workspace.enforcement[..count]);
+        let report = &workspace.report;
         let limit = self.correction_limit;
         let problem = Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) };
         let mut programme = qp::Workspace::default();
@@ -324,6 +335,9 @@ impl SafetyFilter {
         let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
         if matches!(promise.phase, Phase::Waiting | Phase::Released) {
             return Ok((Motion::NONE, derivative));
+        }
+        if promise.phase == Phase::Stay && !channel.promise.keeps_evenly(promise) {
+            return Err(NoDerivative::Kept(i));
         }
         if promise.postponed != before.postponed {
             return Err(NoDerivative::Postponed(i));

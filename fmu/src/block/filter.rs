@@ -63,6 +63,8 @@ impl FilterBlock {
     fn sample(&mut self, t: f64, step: Option<f64>, values: &mut Values) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
+        // The master says how long its step is.
+        self.filter.expect_hold(step.filter(|h| *h > 0.0)).map_err(|e| e.to_string())?;
         let [x, u_ref] = self.inputs(&values.reals);
         let (filter, u) = (&mut self.filter, &mut self.u);
         let mut integrated = self.integrator.as_ref().map_or(0.0, Integrator::value);
@@ -92,9 +94,10 @@ impl FilterBlock {
     /// Why there is no derivative, the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
-            NoDerivative::Source(i) | NoDerivative::Profile(i) | NoDerivative::Postponed(i) => {
-                self.filter.barrier_names().nth(i)
-            }
+            NoDerivative::Source(i)
+            | NoDerivative::Profile(i)
+            | NoDerivative::Postponed(i)
+            | NoDerivative::Kept(i) => self.filter.barrier_names().nth(i),
             _ => None,
         };
         match barrier {
@@ -156,6 +159,7 @@ impl Block for FilterBlock {
     ) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = self.hold();
+        self.filter.expect_hold(None).map_err(|e| e.to_string())?;
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
         let (filter, change) = (&mut self.filter, &mut self.change);
         let unknown = match &mut self.integrator {
