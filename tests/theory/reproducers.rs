@@ -146,7 +146,13 @@ fn chains(n: usize, count: usize, steps: Steps) -> Vec<Case> {
         start[0] = -start[0].abs();
         let step = deadline / numbers.scale(20.0, 500.0);
         let set = Set::within(line(1.0, 0.0), deadline);
-        Case { steps, seed: i as u64, ..Case::plain(Plant::Chain(n), set, &start, step) }
+        let (push, held) = (10.0 * unit * numbers.within(0.0, 2.0), deadline / numbers.scale(3.0, 100.0));
+        let reference = match numbers.below(3) {
+            0 => Reference::Zero,
+            1 => Reference::Outwards(push),
+            _ => Reference::Random { size: [push; 2], held },
+        };
+        Case { steps, reference, seed: i as u64, ..Case::plain(Plant::Chain(n), set, &start, step) }
     };
     (0..count).map(draw).collect()
 }
@@ -240,14 +246,16 @@ fn recovery_does_not_claim_what_was_lost() {
     for i in 0..100 {
         // Steps longer than it was told of carry it out.
         let (n, at) = (1 + i % 2, numbers.scale(1.0, 20.0));
-        let set = Set { recovery: Some(numbers.within(1.0, 5.0)), ..Set::within(line(-1.0, at), 5.0) };
+        let step = numbers.within(0.01, 0.1);
+        let (rate, recovery) = (Some(1.0 / step), Some(numbers.within(1.0, 5.0)));
+        let set = Set { rate, recovery, ..Set::within(line(-1.0, at), 5.0) };
         let push = at * numbers.within(1.0, 5.0);
         let case = Case {
             reference: Reference::Outwards(push),
             steps: Steps::Missed,
             told: false,
             seed: i as u64,
-            ..Case::plain(Plant::Chain(n), set, &[0.0; 2][..n], numbers.within(0.01, 0.1))
+            ..Case::plain(Plant::Chain(n), set, &[0.0; 2][..n], step)
         };
         let mut recoveries = 0;
         run_seen(&case, |_, _, _, report| {
