@@ -59,7 +59,7 @@ impl Set {
 
     fn settings(&self) -> BarrierSettings {
         let asked =
-            if self.keeping { keeping(self.deadline) } else { BarrierSettings::within(self.deadline) };
+            if self.keeping { keeping() } else { BarrierSettings::within(self.deadline) };
         BarrierSettings {
             rate: self.rate,
             stay_rate: self.stay_rate,
@@ -70,14 +70,14 @@ impl Set {
     }
 }
 
-/// SWITCH 1. A set that is only kept: today it needs a deadline all the same.
-fn keeping(deadline: f64) -> BarrierSettings {
-    BarrierSettings::within(deadline)
+/// A set that is only kept.
+fn keeping() -> BarrierSettings {
+    BarrierSettings::keeping()
 }
 
-/// SWITCH 2. Tells the filter the longest hold in s that may come: today it cannot be told.
-fn told(builder: FilterBuilder, _longest: f64) -> FilterBuilder {
-    builder
+/// Tells the filter the longest hold in s that may come.
+fn told(builder: FilterBuilder, longest: f64) -> FilterBuilder {
+    builder.period_max(longest).expect("a valid period")
 }
 
 /// Who is in control.
