@@ -157,8 +157,7 @@ impl Held<'_> {
                 guess[i] = self.bounds.clamp(i, start[i]);
             }
             at_best = false;
-            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme)
-            {
+            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme) {
                 let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
                     && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
                 settled |= same;
