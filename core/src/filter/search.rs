@@ -160,7 +160,7 @@ impl Held<'_> {
             if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme) {
                 let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
                     && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
-                settled |= same;
+                settled |= same && found.ended;
                 if !best.as_ref().is_none_or(|b| found.better_than(b)) {
                     continue;
                 }
@@ -348,6 +348,7 @@ impl Held<'_> {
             outcome: Outcome::Optimal,
             solver: Solver::Unchanged,
             iterations: 0,
+            ended: false,
             sure: true,
         };
         let mut target = [0.0; MAX_INPUTS];
@@ -410,6 +411,7 @@ impl Held<'_> {
             self.judge(u, at)?;
             found.violation = at.worst(found.given_up);
         }
+        found.ended = ended;
         found.sure &= ended && found.given_up == soft;
         found.distance = self.distance(u);
         Some(found)
@@ -425,6 +427,8 @@ struct Guess {
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
+    /// Whether the programme linearised at it does not move it any more.
+    ended: bool,
     /// Whether it met every row by steps that contracted: there is no other answer near.
     sure: bool,
 }

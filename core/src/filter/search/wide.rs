@@ -105,7 +105,7 @@ impl Held<'_> {
         let given_up = self.soft();
         let mut nearest = Start::NONE;
         if best.is_met(given_up) {
-            nearest.distance = best.distance * (1.0 - NEARER);
+            nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
         let mut starts = Starts([Start::NONE; STARTS]);
@@ -126,13 +126,18 @@ impl Held<'_> {
         let mut starts = Starts([Start::NONE; STARTS]);
         self.scan_all(nearest.distance, given_up, at, &mut starts);
         found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
-        if !found {
+        if !found && (!known || best.ended) {
             return None;
+        }
+        if !found {
+            // The answer is the one that is known, but not where it ends.
+            nearest.u[..m].copy_from_slice(u);
+            nearest.distance = best.distance;
         }
         let mut exact = nearest.u;
         if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, programme)
-            && guess.given_up == given_up
-            && guess.violation <= 0.0
+            && guess.is_met(given_up)
+            && guess.ended
             && guess.distance <= (1.0 + NEARER) * nearest.distance
         {
             u.copy_from_slice(&exact[..m]);
@@ -147,6 +152,7 @@ impl Held<'_> {
             outcome: Outcome::Optimal,
             solver: Solver::DualActiveSet,
             iterations,
+            ended: false,
             sure: false,
         })
     }
@@ -170,10 +176,10 @@ impl Held<'_> {
             }
             self.restore(start, RESTORING[0], given_up, at, programme);
             if start.violation <= 0.0 && near(start) {
-                self.polish(start, nearest.distance, given_up, at, programme);
-                if start.distance < nearest.distance {
+                let wanted = (1.0 - NEARER) * nearest.distance;
+                self.polish(start, wanted, given_up, at, programme);
+                if start.distance < wanted || nearest.distance.is_infinite() {
                     (*nearest, found) = (*start, true);
-                    nearest.distance *= 1.0 - NEARER;
                 }
             }
         }
