@@ -33,6 +33,8 @@ const MET: f64 = 1e-9;
 const ROUND_OFF: f64 = 1e-12;
 /// Answers that differ by no more than this, as a part of their size, are one.
 const SAME: f64 = 1e-6;
+/// An answer further from u_ref than this many times the size of that, or of 1, is looked at by the wide search.
+const FAR: f64 = 8.0;
 /// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
@@ -175,6 +177,10 @@ impl Held<'_> {
             }
         }
         let mut best = best?;
+        // An input that far out turns the plant by an angle: there the rows have other answers, which steps that
+        // contract do not see.
+        let size = self.u_ref.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
+        settled &= best.distance <= FAR * size;
         if !settled && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme) {
             (best, at_best) = (found, false);
         }
