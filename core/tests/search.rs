@@ -210,9 +210,9 @@ where
     let mut builder = SafetyFilter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
     let mut promises: Vec<(FixedTime, Box<dyn DerivativeSource>)> = Vec::new();
     for (i, (set, settings)) in sets.iter().enumerate() {
-        builder = builder.barrier(&format!("set {i}"), plant, *set, settings.clone()).expect("valid barrier");
+        builder = builder.barrier(&format!("set {i}"), plant, *set, *settings).expect("valid barrier");
         promises.push((
-            FixedTime::new(2, settings.clone()).expect("valid promise"),
+            FixedTime::new(2, *settings).expect("valid promise"),
             lie::along(plant, *set, 2).expect("in range"),
         ));
     }
@@ -237,12 +237,12 @@ fn sets(random: &mut Random, with_obstacles: bool, inside: Option<[f64; 4]>) -> 
         Set::Distance(DistanceDisc::new(centre, radius, smoothing).expect("valid disc"))
     };
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(2.0, 10.0)) };
-    let mut sets = vec![(goal, settings.clone())];
+    let mut sets = vec![(goal, settings)];
     if with_obstacles {
         for other in &others[..1 + random.below(3)] {
             let radius = random.between(0.5, 4.0);
             let disc = DistanceDisc::new(*other, radius, radius).expect("valid disc");
-            sets.push((Set::Obstacle(Outside(disc)), settings.clone()));
+            sets.push((Set::Obstacle(Outside(disc)), settings));
         }
     }
     sets

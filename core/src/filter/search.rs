@@ -16,6 +16,15 @@
 //! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
 //! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
 //! count as equal: a sample taken again gives the same bits.
+//!
+//! An answer is settled where its steps contracted like that, or where both guesses end at it, and it is not far
+//! out against u_ref, where the plant turns and other answers exist. Any other one, above all one that does not meet
+//! the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
+//! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
+//! programme says, by priority.
+//!
+//! Violations are round-off where they are small against the terms that h and its derivatives are made of, not
+//! against what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
 mod wide;
 
