@@ -16,7 +16,7 @@ use punctual_core::convergence::sampled::SampledDemand;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
-use punctual_core::nalgebra::SVector;
+use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
 
@@ -210,9 +210,9 @@ where
     let mut builder = SafetyFilter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
     let mut promises: Vec<(FixedTime, Box<dyn DerivativeSource>)> = Vec::new();
     for (i, (set, settings)) in sets.iter().enumerate() {
-        builder = builder.barrier(&format!("set {i}"), plant, *set, settings.clone()).expect("valid barrier");
+        builder = builder.barrier(&format!("set {i}"), plant, *set, *settings).expect("valid barrier");
         promises.push((
-            FixedTime::new(2, settings.clone()).expect("valid promise"),
+            FixedTime::new(2, *settings).expect("valid promise"),
             lie::along(plant, *set, 2).expect("in range"),
         ));
     }
@@ -237,12 +237,12 @@ fn sets(random: &mut Random, with_obstacles: bool, inside: Option<[f64; 4]>) -> 
         Set::Distance(DistanceDisc::new(centre, radius, smoothing).expect("valid disc"))
     };
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(2.0, 10.0)) };
-    let mut sets = vec![(goal, settings.clone())];
+    let mut sets = vec![(goal, settings)];
     if with_obstacles {
         for other in &others[..1 + random.below(3)] {
             let radius = random.between(0.5, 4.0);
             let disc = DistanceDisc::new(*other, radius, radius).expect("valid disc");
-            sets.push((Set::Obstacle(Outside(disc)), settings.clone()));
+            sets.push((Set::Obstacle(Outside(disc)), settings));
         }
     }
     sets
@@ -351,14 +351,57 @@ fn check(case: &Case, status: Status, u: [f64; 2], fine: usize, tally: &mut Tall
     }
 }
 
+/// ṗ = u on its way to the boundary of h = 10 − p, with u_ref across it: the row there is a sum of round-off.
+struct Line;
+
+impl ControlAffine<1, 1> for Line {
+    fn drift<S: Scalar>(&self, _x: &SVector<S, 1>) -> SVector<S, 1> {
+        SVector::from([S::zero()])
+    }
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
+        SMatrix::from_element(S::one())
+    }
+}
+
+struct Below;
+
+impl Barrier<1> for Below {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 1>) -> S {
+        -x[0] + 10.0
+    }
+}
+
+#[test]
+fn round_off_at_the_boundary_is_no_violation() {
+    for period in [0.001, 0.003, 0.01, 0.03, 0.1] {
+        for (margin, start) in [(0.0, 0.0), (0.0, 9.0), (0.02, 3.3)] {
+            let settings = BarrierSettings { margin, ..BarrierSettings::within(2.0) };
+            let mut filter = SafetyFilter::builder(1, 1)
+                .barrier("line", Line, Below, settings)
+                .and_then(|b| b.sampling(Sampling::Period(period)))
+                .and_then(FilterBuilder::build)
+                .expect("valid filter");
+            let (mut x, mut u) = ([start], [0.0]);
+            for k in 0..(15.0 / period) as usize {
+                let t = k as f64 * period;
+                let report = filter.step(t, &x, &[1.0], &mut u).expect("right dimensions");
+                assert!(report.status.is_satisfied(), "{period} at {t}: {report:?}");
+                x[0] += period * u[0];
+            }
+            assert!((10.0 - x[0] - margin).abs() < 1e-6, "{x:?}");
+        }
+    }
+}
+
 #[test]
 fn an_input_is_found_where_one_exists() {
     let tables = std::env::var_os("PUNCTUAL_TABLES");
     let runs = match &tables {
         Some(count) => count.to_str().and_then(|c| c.parse::<usize>().ok()).filter(|c| *c > 1).unwrap_or(90),
-        None => 2,
+        None => 1,
     };
     let (mut missed, mut far, mut samples) = (0, 0, 0);
+    let mut seed = 0_u64;
     if tables.is_some() {
         println!(
             "plant, bounds, obstacles, period: samples, met, missed, far, worst ratio, µs mean, longest"
@@ -370,11 +413,12 @@ fn an_input_is_found_where_one_exists() {
             for with_obstacles in [false, true] {
                 for period in PERIODS {
                     let mut tally = Tally::default();
-                    for i in 0..runs {
-                        let random = &mut Random(0x9e37_79b9 + 7919 * (i as u64 + 1));
+                    for _ in 0..runs {
+                        seed += 1;
+                        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
                         let what = (kind, with_obstacles, period);
                         let bicycle = |l_r: f64| Bicycle::new(l_r).expect("valid bicycle");
-                        let size = (10, 33);
+                        let size = (if tables.is_some() { 10 } else { 4 }, 33);
                         match plant {
                             0 => run((PointMass, 6.0), random, what, size, &mut tally, name),
                             1 => run((Unicycle, 1.0), random, what, size, &mut tally, name),

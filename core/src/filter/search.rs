@@ -16,6 +16,15 @@
 //! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
 //! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
 //! count as equal: a sample taken again gives the same bits.
+//!
+//! An answer is settled where its steps contracted like that, or where both guesses end at it, and it is not far
+//! out against u_ref, where the plant turns and other answers exist. Any other one, above all one that does not meet
+//! the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
+//! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
+//! programme says, by priority.
+//!
+//! Violations are round-off where they are small against the terms that h and its derivatives are made of, not
+//! against what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
 mod wide;
 
@@ -33,6 +42,8 @@ const MET: f64 = 1e-9;
 const ROUND_OFF: f64 = 1e-12;
 /// Answers that differ by no more than this, as a part of their size, are one.
 const SAME: f64 = 1e-6;
+/// An answer further from u_ref than this many times the size of that, or of 1, is looked at by the wide search.
+const FAR: f64 = 8.0;
 /// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
@@ -160,7 +171,7 @@ impl Held<'_> {
             if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme) {
                 let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
                     && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
-                settled |= same;
+                settled |= same && found.ended;
                 if !best.as_ref().is_none_or(|b| found.better_than(b)) {
                     continue;
                 }
@@ -175,6 +186,10 @@ impl Held<'_> {
             }
         }
         let mut best = best?;
+        // An input that far out turns the plant by an angle: there the rows have other answers, which steps that
+        // contract do not see.
+        let size = self.u_ref.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
+        settled &= best.distance <= FAR * size;
         if !settled && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme) {
             (best, at_best) = (found, false);
         }
@@ -348,6 +363,7 @@ impl Held<'_> {
             outcome: Outcome::Optimal,
             solver: Solver::Unchanged,
             iterations: 0,
+            ended: false,
             sure: true,
         };
         let mut target = [0.0; MAX_INPUTS];
@@ -410,6 +426,7 @@ impl Held<'_> {
             self.judge(u, at)?;
             found.violation = at.worst(found.given_up);
         }
+        found.ended = ended;
         found.sure &= ended && found.given_up == soft;
         found.distance = self.distance(u);
         Some(found)
@@ -425,6 +442,8 @@ struct Guess {
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
+    /// Whether the programme linearised at it does not move it any more.
+    ended: bool,
     /// Whether it met every row by steps that contracted: there is no other answer near.
     sure: bool,
 }

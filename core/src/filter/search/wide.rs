@@ -1,7 +1,7 @@
 //! The wide search: where Newton's method from its two guesses does not end at an answer that is surely right.
 //!
 //! A row is F(u) ≥ 0 with F smooth, and what makes it hard is that it turns with some inputs: a unicycle that
-//! stands across the line of sight gains by turning either way and then by driving either way. Three parts find
+//! stands across the line of sight gains by turning either way and then by driving either way. Four parts find
 //! the nearest of these answers.
 //!
 //! **Scan.** One component of u is moved over a grid around u_ref; for each of its values another one is found
@@ -11,11 +11,14 @@
 //! local minima over the grid: of the distance where the rows hold, of the violation elsewhere.
 //!
 //! **Restoration.** From there to the rows by the shortest way: the linearised programme with u in place of
-//! u_ref, and back half the way as long as the violation does not decrease.
+//! u_ref, and back to a third of the way as long as the violation does not decrease.
 //!
 //! **Polishing.** From an input that meets the rows towards the answer of the linearised programme. Each trial is
 //! restored (the correction of second order), and taken where it is nearer to u_ref by a part of what the
 //! programme promises. So every iterate meets the rows, and the distance only falls.
+//!
+//! **Sharpening.** The distance is flat at its least, so that polishing ends at about the root of the tolerance. If
+//! Newton's method does not converge from there, steps of the secant method along the row do.
 //!
 //! All numbers of steps are fixed: the cost is bounded, and the same input gives the same bits.
 
@@ -39,8 +42,13 @@ const STARTS: usize = 6;
 const RESTORING: [usize; 2] = [10, 4];
 /// Steps of a polishing.
 const POLISHING: usize = 12;
+/// Steps of a sharpening.
+const SHARPENING: usize = 16;
+/// The part of the way of its first step, and the largest of any.
+const FIRST_PART: f64 = 0.3;
+const LARGEST_PART: f64 = 10.0;
 /// Trials of one step.
-const TRIALS: usize = 6;
+const TRIALS: usize = 4;
 /// The part of what the linearised programme promises that must come true.
 const SUFFICIENT: f64 = 0.1;
 /// Starts are looked at up to this part of the distance of the answer that is known.
@@ -97,7 +105,7 @@ impl Held<'_> {
         let given_up = self.soft();
         let mut nearest = Start::NONE;
         if best.is_met(given_up) {
-            nearest.distance = best.distance * (1.0 - NEARER);
+            nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
         let mut starts = Starts([Start::NONE; STARTS]);
@@ -118,18 +126,24 @@ impl Held<'_> {
         let mut starts = Starts([Start::NONE; STARTS]);
         self.scan_all(nearest.distance, given_up, at, &mut starts);
         found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
-        if !found {
+        if !found && (!known || best.ended) {
             return None;
+        }
+        if !found {
+            // The answer is the one that is known, but not where it ends.
+            nearest.u[..m].copy_from_slice(u);
+            nearest.distance = best.distance;
         }
         let mut exact = nearest.u;
         if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, programme)
-            && guess.given_up == given_up
-            && guess.violation <= 0.0
+            && guess.is_met(given_up)
+            && guess.ended
             && guess.distance <= (1.0 + NEARER) * nearest.distance
         {
             u.copy_from_slice(&exact[..m]);
             return Some(Guess { iterations: iterations + guess.iterations, ..guess });
         }
+        self.sharpen(&mut nearest, given_up, at, programme);
         u.copy_from_slice(&nearest.u[..m]);
         Some(Guess {
             given_up,
@@ -138,6 +152,7 @@ impl Held<'_> {
             outcome: Outcome::Optimal,
             solver: Solver::DualActiveSet,
             iterations,
+            ended: false,
             sure: false,
         })
     }
@@ -152,7 +167,6 @@ impl Held<'_> {
         at: &mut Linearised,
         programme: &mut Workspace,
     ) -> bool {
-        let m = self.u_ref.len();
         let mut found = false;
         for start in &mut starts.0 {
             // Where an answer is known, one that is to be nearer begins near.
@@ -162,10 +176,10 @@ impl Held<'_> {
             }
             self.restore(start, RESTORING[0], given_up, at, programme);
             if start.violation <= 0.0 && near(start) {
-                self.polish(start, m, given_up, at, programme);
-                if start.distance < nearest.distance {
+                let wanted = (1.0 - NEARER) * nearest.distance;
+                self.polish(start, wanted, given_up, at, programme);
+                if start.distance < wanted || nearest.distance.is_infinite() {
                     (*nearest, found) = (*start, true);
-                    nearest.distance *= 1.0 - NEARER;
                 }
             }
         }
@@ -290,6 +304,10 @@ impl Held<'_> {
             let mut target = [0.0; MAX_INPUTS];
             let nearest = Problem { u_ref: &start.u[..m], ..self.problem(at.rows) };
             programme.solve(&nearest, &mut target[..m]);
+            let way = (0..m).fold(0.0, |w: f64, i| w.max((target[i] - start.u[i]).abs()));
+            if way <= MET * start.u.iter().fold(1.0, |s: f64, v| s.max(v.abs())) {
+                return;
+            }
             let (mut part, mut moved) = (1.0, false);
             for _ in 0..TRIALS {
                 let mut trial = self.between(start, &target, part);
@@ -298,7 +316,7 @@ impl Held<'_> {
                     (*start, moved) = (trial, true);
                     break;
                 }
-                part /= 2.0;
+                part /= 3.0;
             }
             if !moved {
                 self.measure(start, m, given_up, at);
@@ -307,21 +325,25 @@ impl Held<'_> {
         }
     }
 
-    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill.
+    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that
+    /// promises to be nearer than `known`.
     fn polish(
         &self,
         start: &mut Start,
-        m: usize,
+        known: f64,
         given_up: u64,
         at: &mut Linearised,
         programme: &mut Workspace,
     ) {
-        for _ in 0..POLISHING {
+        let m = self.u_ref.len();
+        for step in 0..POLISHING {
             self.measure(start, m, given_up, at);
             let mut target = [0.0; MAX_INPUTS];
             programme.solve(&self.problem(at.rows), &mut target[..m]);
-            let promised = start.distance - self.distance(&target[..m]);
-            if promised <= MET * start.distance {
+            let there = self.distance(&target[..m]);
+            let promised = start.distance - there;
+            let hopeless = step > 0 && there >= known && start.distance >= known;
+            if hopeless || promised <= MET * start.distance {
                 return;
             }
             let (mut part, mut moved) = (1.0, false);
@@ -332,11 +354,54 @@ impl Held<'_> {
                     (*start, moved) = (trial, true);
                     break;
                 }
-                part /= 2.0;
+                part /= 3.0;
             }
             if !moved {
                 return;
             }
+        }
+    }
+
+    /// Moves from a polished answer, known to about the root of the tolerance, to where the programme linearised there
+    /// does not move it any more.
+    ///
+    /// Where the rows curve, full steps towards the programme's answer overshoot. With two of them, Δu and the
+    /// change ΔR of what is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the
+    /// row.
+    fn sharpen(&self, start: &mut Start, given_up: u64, at: &mut Linearised, programme: &mut Workspace) {
+        let m = self.u_ref.len();
+        let (mut point, mut least) = (*start, f64::INFINITY);
+        let mut before: Option<(Input, Input)> = None;
+        for _ in 0..SHARPENING {
+            self.measure(&mut point, m, given_up, at);
+            if point.violation > 0.0 {
+                return;
+            }
+            let mut target = [0.0; MAX_INPUTS];
+            programme.solve(&self.problem(at.rows), &mut target[..m]);
+            let left: Input = std::array::from_fn(|i| target[i] - point.u[i]);
+            let way = left.iter().fold(0.0, |w: f64, d| w.max(d.abs()));
+            if way < least && point.distance <= (1.0 + NEARER) * start.distance {
+                (*start, least) = (point, way);
+            }
+            if way <= MET * point.u.iter().fold(1.0, |s: f64, v| s.max(v.abs())) {
+                return;
+            }
+            let mut part = FIRST_PART;
+            if let Some((u, rest)) = before {
+                let (mut moved, mut changed) = (0.0, 0.0);
+                for i in 0..m {
+                    let d = point.u[i] - u[i];
+                    moved += d * d;
+                    changed += d * (left[i] - rest[i]);
+                }
+                if changed < 0.0 && moved > 0.0 {
+                    part = (-moved / changed).min(LARGEST_PART);
+                }
+            }
+            before = Some((point.u, left));
+            point = self.between(&point, &target, part);
+            self.restore(&mut point, RESTORING[1], given_up, at, programme);
         }
     }
 
