@@ -142,7 +142,8 @@ fn a_start_without_a_guarantee_is_code_one() {
 #[test]
 fn a_degenerate_start_is_code_one() {
     let across = format!("theta={}", 0.75 * std::f64::consts::PI);
-    let done = workshop(&[COARSE]).punctual(["check", "filter.toml", "--x0", &across]);
+    let pointwise = ("[plant]", "sampling = \"pointwise\"\n[plant]");
+    let done = workshop(&[COARSE, pointwise]).punctual(["check", "filter.toml", "--x0", &across]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: degenerate\n"), "{done:#?}");
     assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");
