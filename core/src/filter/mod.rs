@@ -68,6 +68,9 @@ impl Clone for FilterState {
 /// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
+/// Of steps in a row that do not meet a constraint, every such one looks far around for an input.
+const WIDE_EVERY: u32 = 64;
+
 /// Periods that differ by less than this part of them are one.
 const SAME_PERIOD: f64 = 1e-6;
 
@@ -315,6 +318,9 @@ impl SafetyFilter {
             }
         }
         let last = self.state.time.map(|_| &self.state.input[..u.len()]);
+        // Where rows have not been met for some steps, looking far around at each would find what it found before.
+        let widens =
+            self.state.barriers.iter().all(|b| b.unmet.is_none_or(|unmet| unmet.steps % WIDE_EVERY == 0));
         let listed = conditions.len();
         let mut solution;
         let mut round = 0;
@@ -342,6 +348,7 @@ impl SafetyFilter {
                     correction_limit,
                     errors: &self.errors,
                     slopes: &slopes[..],
+                    widens,
                 };
                 problem.solve(rows, last, programme, u)
             });
@@ -420,7 +427,8 @@ impl SafetyFilter {
             }
         }
         if blocked {
-            report.find_deadlocks(t, &next.barriers, programme.active());
+            let barrier = |row: usize| conditions.get(row).map_or(row, |condition| condition.channel);
+            report.find_deadlocks(t, &next.barriers, programme.active(), barrier);
         }
         Ok(())
     }
@@ -675,10 +683,12 @@ impl Outlook {
         let is_clear = |hold: f64| {
             self.n > 1 && h > 0.0 && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
         };
-        let begins = from < hold;
+        // The deadline at the very end of the hold is within it.
+        let begins = from <= hold * (1.0 + SAME_PERIOD);
         if !begins || is_clear(hold) {
             return;
         }
+        let from = from.min(hold);
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));

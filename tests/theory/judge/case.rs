@@ -58,8 +58,7 @@ impl Set {
     }
 
     fn settings(&self) -> BarrierSettings {
-        let asked =
-            if self.keeping { keeping() } else { BarrierSettings::within(self.deadline) };
+        let asked = if self.keeping { keeping() } else { BarrierSettings::within(self.deadline) };
         BarrierSettings {
             rate: self.rate,
             stay_rate: self.stay_rate,
