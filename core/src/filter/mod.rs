@@ -299,6 +299,7 @@ impl SafetyFilter {
         }
 
         // Solve; where h would break its promise between the samples, once more with that instant as a row.
+        report.period = sampled.unwrap_or(0.0);
         if sampled.is_none() {
             conditions.clear();
         }
