@@ -6,70 +6,200 @@
 
 use crate::MAX_INPUTS;
 use crate::dynamics::DynPlant;
-use crate::error::{Error, positive};
-use crate::filter::{BarrierSettings, ProfileKind, SafetyFilter};
+use crate::error::{Error, non_negative, positive};
+use crate::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
+use crate::judge::{Course, Judge, Judgement, Standing, Verdict};
 use crate::simulation::Schedule;
 
+/// A closed loop to run.
+#[derive(Clone, Copy)]
+pub struct Loop<'a> {
+    /// The plant; its states are the first of the filter's.
+    pub plant: &'a dyn DynPlant,
+    /// Time in s and the filter's state: what follows the plant's states in it stays as it is.
+    pub start: (f64, &'a [f64]),
+    /// h is looked at after each of its substeps, and at the deadlines themselves.
+    pub schedule: Schedule,
+    /// Of the barriers, in s from the start; infinite where there is none.
+    pub deadlines: &'a [f64],
+    /// How much later than computed an input acts, in s, ≥ 0, at most a step; 0 acts before.
+    pub delay: f64,
+    /// Whether the run goes on where a promise has been broken.
+    pub to_the_end: bool,
+}
+
 /// What a closed loop came to.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// Whether every barrier had h ≥ 0 at every sample from its deadline on. The run ends where one had not.
+    /// Whether no promise was broken, and each barrier had one.
     pub kept: bool,
-    /// Time in s of the last first arrival; `None` where a barrier has not arrived.
+    /// Time in s from the start of the last first arrival; `None` where a barrier has not arrived.
     pub arrival: Option<f64>,
     /// Largest |u_i| of each input; zeros above the number of inputs.
     pub peak: [f64; MAX_INPUTS],
     /// Steps that did not satisfy every constraint.
     pub unmet: usize,
+    /// Of each barrier.
+    pub barriers: Vec<Seen>,
+    /// Smallest and largest value of each of the plant's states; not a number where one became so.
+    pub states: Vec<[f64; 2]>,
+    /// The last instant in s.
+    pub end: f64,
 }
 
-/// Runs `filter` and `plant` in closed loop from time `t` (s) and the filter's state `x0`: the plant's states come
-/// first in it, what follows stays as it is. `deadlines` (s from `t`) are those of the barriers.
-/// `nominal(x, u_ref)` writes u_ref.
+/// What was seen of a barrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Its promise, by h itself.
+    pub judgement: Judgement,
+    /// Steps that did not meet its constraint.
+    pub unmet: usize,
+    /// The first of them, in s.
+    pub first_unmet: Option<f64>,
+}
+
+/// A closed loop on its way.
+struct Running<'a> {
+    setting: &'a Loop<'a>,
+    judges: Vec<Judge>,
+    run: Run,
+    /// Scratch: h of each barrier.
+    h: Vec<f64>,
+}
+
+impl Running<'_> {
+    /// Takes a sample.
+    fn sample(&mut self, t: f64, x: &[f64], u: &[f64], report: &Report) {
+        let run = &mut self.run;
+        run.unmet += usize::from(!report.status.is_satisfied());
+        for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
+            judge.see(t, b.h, standing(b.phase), b.late_certain);
+            let enforced = standing(b.phase) == Standing::InForce;
+            if b.unmet_steps > 0 || enforced && report.status as u8 >= Status::InvalidInput as u8 {
+                seen.unmet += 1;
+                seen.first_unmet.get_or_insert(t);
+            }
+        }
+        for (peak, u) in run.peak.iter_mut().zip(u) {
+            *peak = peak.max(u.abs());
+        }
+        self.bound(x);
+        self.run.end = t;
+    }
+
+    /// Takes an instant between two samples.
+    fn instant(&mut self, filter: &mut SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
+        filter.barrier_values(t, x, &mut self.h)?;
+        let barriers = &filter.report().barriers;
+        for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
+            judge.see(t, *h, standing(b.phase), b.late_certain);
+        }
+        self.bound(x);
+        Ok(())
+    }
+
+    fn bound(&mut self, x: &[f64]) {
+        for (ends, x) in self.run.states.iter_mut().zip(x) {
+            // Once not a number, always so.
+            if x.is_nan() || *x < ends[0] {
+                ends[0] = *x;
+            }
+            if x.is_nan() || *x > ends[1] {
+                ends[1] = *x;
+            }
+        }
+    }
+
+    fn is_broken(&self) -> bool {
+        let lost = |judge: &Judge| matches!(judge.judgement().verdict(), Verdict::Broken | Verdict::Nothing);
+        self.judges.iter().any(lost)
+    }
+
+    /// Moves the plant over the period that begins at `t`, `last` being the input of the one before.
+    fn advance(
+        &mut self,
+        filter: &mut SafetyFilter,
+        t: f64,
+        x: &mut [f64],
+        [last, u]: [&[f64]; 2],
+    ) -> Result<(), Error> {
+        let Loop { plant, schedule, deadlines, delay, start, .. } = *self.setting;
+        let (step, substeps) = (schedule.step, schedule.substeps.max(1));
+        let (same, mut at) = (1e-9 * step, 0.0);
+        for j in 1..=substeps {
+            let end = step * (j as f64 / substeps as f64);
+            while at < end {
+                let cuts = deadlines.iter().map(|deadline| start.0 + deadline - t).chain([delay]);
+                let to = cuts.filter(|cut| *cut > at + same && *cut < end - same).fold(end, f64::min);
+                let u = if to <= delay + same { last } else { u };
+                plant.rk4_step(&mut x[..plant.state_dim()], u, to - at)?;
+                at = to;
+                if at < step {
+                    self.instant(filter, t + at, x)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn standing(phase: Phase) -> Standing {
+    match phase {
+        Phase::Waiting => Standing::Waiting,
+        Phase::Released => Standing::Released,
+        _ => Standing::InForce,
+    }
+}
+
+/// Runs `filter` in the closed loop that `setting` describes. `nominal(x, u_ref)` writes u_ref.
 ///
 /// # Errors
 ///
 /// A step that is not finite or ≤ 0, and misuse of the filter.
 pub fn run(
     filter: &mut SafetyFilter,
-    plant: &dyn DynPlant,
-    (t, x0): (f64, &[f64]),
-    schedule: Schedule,
-    deadlines: &[f64],
+    setting: &Loop<'_>,
     mut nominal: impl FnMut(&[f64], &mut [f64]),
 ) -> Result<Run, Error> {
-    let step = positive("step", schedule.step)?;
-    let substeps = schedule.substeps.max(1);
-    let inputs = plant.input_dim();
+    let step = positive("step", setting.schedule.step)?;
+    non_negative("delay", setting.delay)?;
+    let (states, inputs) = (setting.plant.state_dim(), setting.plant.input_dim());
+    let (t0, x0) = setting.start;
     let mut x = x0.to_vec();
-    let (mut u_ref, mut u) = (vec![0.0; inputs], vec![0.0; inputs]);
-    let mut run = Run { kept: true, arrival: None, peak: [0.0; MAX_INPUTS], unmet: 0 };
-    let mut arrivals = vec![None; deadlines.len()];
-    for k in 0..=schedule.steps {
-        let elapsed = k as f64 * step;
+    let (mut u_ref, mut u, mut last) = (vec![0.0; inputs], vec![0.0; inputs], vec![0.0; inputs]);
+    let count = setting.deadlines.len();
+    let judge = |deadline: &f64| Judge::new(Some(*deadline), Course::Straight);
+    let run = Run {
+        kept: false,
+        arrival: None,
+        peak: [0.0; MAX_INPUTS],
+        unmet: 0,
+        barriers: vec![Seen::default(); count],
+        states: x0.iter().take(states).map(|x| [*x; 2]).collect(),
+        end: t0,
+    };
+    let judges = setting.deadlines.iter().map(judge).collect();
+    let mut running = Running { setting, judges, run, h: vec![0.0; count] };
+    for k in 0..=setting.schedule.steps {
+        let t = t0 + k as f64 * step;
         nominal(&x, &mut u_ref);
-        let report = filter.step(t + elapsed, &x, &u_ref, &mut u)?;
-        run.unmet += usize::from(!report.status.is_satisfied());
-        for ((b, deadline), arrival) in report.barriers.iter().zip(deadlines).zip(&mut arrivals) {
-            // Round-off of the times must not bring a sample before its deadline.
-            run.kept &= b.h >= 0.0 || elapsed < deadline * (1.0 - 1e-12);
-            if b.h >= 0.0 && arrival.is_none() {
-                *arrival = Some(elapsed);
-            }
-        }
-        for (peak, u) in run.peak.iter_mut().zip(&u) {
-            *peak = peak.max(u.abs());
-        }
-        if !run.kept {
+        let report = filter.step(t, &x, &u_ref, &mut u)?;
+        running.sample(t, &x, &u, report);
+        let lost = running.is_broken() && !setting.to_the_end;
+        if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
             break;
         }
-        if k < schedule.steps {
-            for _ in 0..substeps {
-                plant.rk4_step(&mut x[..plant.state_dim()], &u, step / substeps as f64)?;
-            }
-        }
+        running.advance(filter, t, &mut x, [&last, &u])?;
+        last.copy_from_slice(&u);
     }
-    run.arrival = arrivals.into_iter().try_fold(0.0, |last: f64, arrival| Some(last.max(arrival?)));
+    let mut run = running.run;
+    for (seen, judge) in run.barriers.iter_mut().zip(&running.judges) {
+        seen.judgement = judge.judgement();
+    }
+    let lost = |seen: &Seen| matches!(seen.judgement.verdict(), Verdict::Broken | Verdict::Nothing);
+    run.kept = !run.barriers.iter().any(lost) && run.states.iter().flatten().all(|x| x.is_finite());
+    let arrivals = run.barriers.iter().map(|seen| seen.judgement.arrival);
+    run.arrival = arrivals.into_iter().try_fold(0.0, |last: f64, arrival| Some(last.max(arrival? - t0)));
     Ok(run)
 }
 

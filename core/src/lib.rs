@@ -47,7 +47,8 @@
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
 //! bounded inputs can do); [`filter`]; [`plants`], [`barriers`], [`nominal`], [`baselines`] (constraints of the
-//! literature) and [`simulation`] are reference material beside it, and [`effort`] compares what filters need.
+//! literature) and [`simulation`] are reference material beside it, [`judge`] says what became of a promise, and
+//! [`effort`] compares what filters need.
 //!
 //! # References
 //!
@@ -66,6 +67,7 @@ pub mod effort;
 mod error;
 pub mod filter;
 pub mod jet;
+pub mod judge;
 pub mod lie;
 pub mod nominal;
 pub mod plants;

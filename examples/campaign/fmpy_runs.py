@@ -11,8 +11,9 @@ from pathlib import Path
 from fmpy import extract, fmi2, read_model_description
 
 KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
-BARRIER = ["h", "phase", "unmet_steps", "slack", "arrived", "late_certain"]
-SAME_TIME = 1e-9  # s: times that differ by no more are the same communication point
+BARRIER = ["h", "phase", "unmet_steps", "slack", "late_certain"]
+SAME_TIME = 1e-9  # round-off of a time, as a part of it where that is more than 1 s
+TOLERANCE, LEAST_TOLERANCE = 1e-9, 1e-12  # round-off of h, as a part of the largest |h| seen, and at least
 WHOLE = 1e-6  # steps by which an experiment may differ from a whole number of them
 
 
@@ -108,11 +109,125 @@ class Block:
         self.call("fmi2EnterInitializationMode")
 
 
+def powers(unit):
+    """The exponents of a unit such as kg.m/s2."""
+    exponents = {}
+    for part, sign in zip((unit or "1").split("/"), [1, -1]):
+        for factor in part.split("."):
+            symbol = factor.rstrip("0123456789")
+            if symbol:
+                exponents[symbol] = exponents.get(symbol, 0) + sign * int(factor[len(symbol) :] or 1)
+    return {symbol: exponent for symbol, exponent in exponents.items() if exponent}
+
+
+class Judge:
+    """What became of a promise, by h itself: the Judge of the library, line by line (docs/configuration.md)."""
+
+    def __init__(self, deadline, straight):
+        self.after, self.points = deadline if math.isfinite(deadline) else None, 1 if straight else 3
+        self.before, self.size, self.left_before, self.certain = [], 0.0, None, None
+        self.due = self.released = self.began_inside = self.reached = self.outside = False
+        self.began = self.deadline = self.arrival = self.late = self.left = self.least = None
+
+    def inside(self, h):
+        return h >= -max(TOLERANCE * self.size, LEAST_TOLERANCE)
+
+    def see(self, t, h, standing, lost):
+        if self.released or not self.before and not math.isfinite(h):
+            return
+        if not self.before:
+            self.deadline = None if self.after is None else t + self.after
+        if math.isfinite(h):
+            self.size = max(self.size, abs(h))
+        if lost and self.certain is None:
+            self.certain = t
+        if standing != "waiting" and self.began is None:
+            self.began, self.began_inside = t, self.inside(h)
+        self.follow(t, h)
+        self.judge(t, h)
+        always = self.began_inside and standing != "waiting"
+        if standing != "released" and (always or self.due):
+            self.weigh(h)
+            if not self.inside(h) and self.arrival is not None and self.left is None:
+                at = self.left_before
+                self.left = at if at is not None and (always or at >= self.deadline) else t
+        self.released = standing == "released"
+        self.reached |= self.released and self.arrival is not None
+        self.before = [(t, h), *self.before[:2]]
+
+    def follow(self, t, h):
+        inside, was_inside = self.inside(h), self.inside(self.before[0][1]) if self.before else None
+        if inside and self.began is not None and self.arrival is None:
+            self.arrival = max(self.crossing(t, h) if was_inside is False else t, self.began)
+        if not inside and was_inside and self.arrival is not None:
+            self.left_before = self.crossing(t, h)
+
+    def judge(self, t, h):
+        if self.due or self.deadline is None:
+            return
+        same = SAME_TIME * max(abs(self.deadline), 1.0)
+        if t < self.deadline - same:
+            return
+        self.due, now = True, h
+        if self.before and t > self.deadline + same:
+            last = self.before[0][1]
+            both = self.inside(last) and self.inside(h)
+            now = min(last, h) if both else self.between(self.deadline, t, h)
+        self.weigh(now)
+        if not self.inside(now) and not self.began_inside:
+            if self.arrival is not None and self.arrival < self.deadline:
+                self.left = self.deadline if self.left_before is None else self.left_before
+            else:
+                self.late = self.deadline if self.certain is None else self.certain
+
+    def weigh(self, h):
+        self.reached = True
+        self.outside |= not self.inside(h)
+        if self.least is None or h < self.least or self.least != self.least:
+            self.least = h
+
+    def crossing(self, t, h):
+        if not self.before:
+            return t
+        start, first = self.before[0]
+        if not (math.isfinite(first) and math.isfinite(h)) or (first < 0.0) == (h < 0.0):
+            return t
+        end, rising = t, h > first
+        for _ in range(64):
+            middle = 0.5 * (start + end)
+            if (self.between(middle, t, h) < 0.0) == rising:
+                start = middle
+            else:
+                end = middle
+        return end
+
+    def between(self, at, t, h):
+        points = [(t, h), *self.before[: self.points]]
+        values = [h for _, h in points]
+        for width in range(1, len(points)):
+            for i in range(len(points) - width):
+                a, b = points[i][0], points[i + width][0]
+                values[i] += (values[i + 1] - values[i]) * (at - a) / (b - a)
+        return values[0]
+
+    def missed(self):
+        """When it was known that the deadline is missed."""
+        return self.late if self.due or self.began_inside or self.late is not None else self.certain
+
+    def on_time(self):
+        limit = self.began if self.began_inside else self.deadline
+        known = limit is not None and self.arrival is not None
+        return known and self.arrival <= limit + SAME_TIME * max(abs(limit), 1.0)
+
+    def kept(self):
+        return self.on_time() and self.reached and not self.outside and self.missed() is None
+
+
 class Filter:
     """What is kept of a filter in a run, as docs/campaign.md says under "The rows"."""
 
-    def __init__(self, block, values, start):
-        self.block, self.start = block, start
+    def __init__(self, block, values):
+        self.block = block
         self.statuses = items(block, "status")
         self.counts = dict.fromkeys(self.statuses.values(), 0)
         self.peaks = dict.fromkeys(block.efforts, 0.0)
@@ -120,8 +235,10 @@ class Filter:
         for name in block.barriers:
             key = f"{name}.deadline"
             own = block.variables[key].start if key in block.variables else math.inf
-            kept = dict(arrival=None, least_h=None, late=None, left=None, unmet=0, longest=0, violation=0.0)
-            kept |= dict(deadline=float((block.start | values).get(key, own)), reached=False, outside=False, row=0)
+            units = [block.variables[f"{name}.{field}"].unit for field in ("h", "slack")]
+            straight = {k: v for k, v in (powers(units[0]) | {"s": powers(units[0]).get("s", 0) - 1}).items() if v}
+            judge = Judge(float((block.start | values).get(key, own)), straight == powers(units[1]))
+            kept = dict(judge=judge, started=False, unmet=0, longest=0, violation=0.0, row=0)
             slots = [block.outputs[f"{name}.{field}"] for field in BARRIER]
             self.barriers[name] = (kept, slots, items(block, f"{name}.phase"))
 
@@ -135,20 +252,11 @@ class Filter:
             if abs(array[i]) > peak:
                 self.peaks[name] = abs(array[i])
         for kept, slots, phases in self.barriers.values():
-            h, phase, unmet, slack, arrived, late = [array[i] for array, i in slots]
-            if time - self.start >= kept["deadline"] - SAME_TIME:
-                kept["reached"] = True
-                if phase != phases["released"]:
-                    least = kept["least_h"]
-                    if least is None or h < least or least != least:
-                        kept["least_h"] = h
-                    kept["outside"] |= not h >= 0.0
-            if arrived and kept["arrival"] is None:
-                kept["arrival"] = time
-            if (late or phase == phases["late"]) and kept["late"] is None:
-                kept["late"] = time
-            if phase == phases["left"] and kept["left"] is None:
-                kept["left"] = time
+            h, phase, unmet, slack, late = [array[i] for array, i in slots]
+            kept["started"] |= status < self.statuses["invalid_input"]
+            if kept["started"]:
+                standing = {phases["released"]: "released", phases["waiting"]: "waiting"}.get(phase, "in force")
+                kept["judge"].see(time, h, standing, bool(late) or phase == phases["late"])
             if unmet > 0 or status >= self.statuses["invalid_input"]:
                 kept["unmet"] += 1
                 kept["row"] += 1
@@ -164,14 +272,14 @@ class Filter:
         cells |= {f"{block}.peak.{name.removeprefix('u.')}": peak for name, peak in self.peaks.items()}
         verdicts = []
         for name, (kept, _, _) in self.barriers.items():
-            deadline, inside = self.start + kept["deadline"], kept["reached"] and not kept["outside"]
-            on_time = kept["arrival"] is not None and kept["arrival"] <= deadline + SAME_TIME
-            missed = kept["late"] is not None or kept["left"] is not None or kept["unmet"] > 0
-            own = dict(arrival=kept["arrival"], on_time=on_time, least_h=kept["least_h"], inside=inside)
-            own |= {field: kept[field] for field in ["late", "left", "unmet", "longest"]}
-            own |= dict(violation=kept["violation"] if begun else None, kept=not missed and failure is None)
+            judge = kept["judge"]
+            own = dict(arrival=judge.arrival, on_time=judge.on_time(), least_h=judge.least)
+            own |= dict(inside=judge.reached and not judge.outside, late=judge.missed(), left=judge.left)
+            own |= {field: kept[field] for field in ["unmet", "longest"]}
+            promise, met = judge.kept(), kept["unmet"] == 0
+            own |= dict(violation=kept["violation"] if begun else None, kept=promise and met and failure is None)
             cells |= {f"{block}.{name}.{field}": value for field, value in own.items()}
-            verdicts.append({"kept": own["kept"] and kept["reached"], "on_time_and_inside": on_time and inside})
+            verdicts.append({"kept": own["kept"], "on_time_and_inside": promise})
         return cells, verdicts
 
 
@@ -195,7 +303,7 @@ class Simulation:
         for name, value in drawn["values"].items():
             component, variable = name.split(".", 1)
             values[component][variable] = value
-        filters = [Filter(b, values[b.name], start) for b in self.blocks.values() if b.barriers]
+        filters = [Filter(b, values[b.name]) for b in self.blocks.values() if b.barriers]
         begun, failure = False, None
         try:
             self.begin(start, stop, values)

@@ -1,7 +1,7 @@
 """A safety filter that gets a system into its safe set by a deadline and keeps it there.
 
 - `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` says what a configuration
-  comes to, `simulate` couples a filter FMU with a plant FMU in FMPy.
+  comes to, `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` says what became of a barrier there.
 - `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI.
 - `run_cli` runs the command line, which is installed as `punctual` too.
 """
@@ -12,6 +12,7 @@ from ._enumerations import Phase, Status
 from ._error import Error
 from ._fmu import Variable, build, check, variables
 from ._punctual import BarrierReport, Filter, FilterBatch, Step, __version__
+from ._promise import Promise, promise
 from ._simulate import simulate
 
 __all__ = [
@@ -21,12 +22,14 @@ __all__ = [
     "Filter",
     "FilterBatch",
     "Phase",
+    "Promise",
     "Status",
     "Step",
     "Variable",
     "__version__",
     "build",
     "check",
+    "promise",
     "run_cli",
     "simulate",
     "variables",

@@ -62,13 +62,15 @@ def check(
     *,
     plant: Configuration | None = None,
     x0: Mapping[str, float] | None = None,
+    u_ref: str | Mapping[str, float] = "none",
     effort: bool = False,
 ) -> dict[str, Any]:
     """What `punctual check --json` says of a configuration: relative degrees, rates, warnings, and from a start whether
-    the promise holds and the bounds allow it.
+    the promise holds, in a simulated closed loop too, and the bounds allow it.
 
     - `plant`: a plant configuration, whose start it is; or
     - `x0`: the start by state; those not named are 0.
+    - `u_ref`: of the closed loop that is simulated from there: `"none"`, `"damping"`, or values by input.
     - `effort`: also finds the least bound on the inputs that meets the deadline from there.
 
     Raises `Error` for a configuration that cannot be used.
@@ -82,6 +84,8 @@ def check(
             more += ["--plant", given[-1][1]]
         if x0 is not None:
             more += ["--x0", ",".join(f"{name}={float(value)!r}" for name, value in x0.items())]
+        wanted = u_ref if isinstance(u_ref, str) else ",".join(f"{n}={float(v)!r}" for n, v in u_ref.items())
+        more += ["--u-ref", wanted]
         # 1: it cannot be kept from there, which the report says.
         text = _run_for(given, "check", file, "--json", *more, accepted=(0, 1))
     report: dict[str, Any] = json.loads(text)

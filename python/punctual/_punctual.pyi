@@ -1,5 +1,5 @@
 from collections.abc import Sequence
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,9 +7,13 @@ from numpy.typing import NDArray
 from ._configuration import Configuration
 from ._enumerations import Phase, Status
 
-__all__ = ["BarrierReport", "Filter", "FilterBatch", "Step", "__version__"]
+__all__ = ["BarrierReport", "Filter", "FilterBatch", "Step", "__version__", "judge"]
 
 __version__: str
+
+def judge(
+    rows: Sequence[tuple[float, float, int, bool, int]], deadline: float | None, units: tuple[str, str]
+) -> dict[str, Any]: ...
 
 @final
 class BarrierReport:

@@ -51,7 +51,7 @@ def simulate(
       filter, but texts. Where both have an output of one name, the plant's is called `plant.<name>`.
 
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
-    FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it.
+    FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` says what became of a barrier.
 
     Raises `ImportError` without FMPy (`pip install punctual[fmpy]`); `Error` for names or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
@@ -256,6 +256,18 @@ class _Pair:
         make(slave.prepared("fmi2Terminate") for slave in (self.own, self.plant))
         return self._rows(times, reals, numbers)
 
+    def _barriers(self) -> dict[str, Any]:
+        """What `promise` needs of each barrier: its deadline, the units of h and its slack, whether h is not late."""
+        variables, starts = self.own.variables, self.starts[0]
+        barriers = {}
+        for name in (n.removesuffix(".unmet_steps") for n in variables if n.endswith(".unmet_steps")):
+            key = f"{name}.deadline"
+            own = starts.get(key, float(variables[key].start)) if key in variables else None
+            told = [variables.get(f"{name}.{field}") for field in ("h", "slack")]
+            units = tuple((v and v.unit) or "1" for v in told)
+            barriers[name] = own, units, f"{name}.h" in self.own.direct
+        return barriers
+
     def _rows(self, times: NDArray[Any], reals: NDArray[Any], numbers: NDArray[Any]) -> NDArray[np.void]:
         """The recorded columns, each in its type."""
         import numpy
@@ -263,7 +275,7 @@ class _Pair:
         types = {"Real": numpy.float64, "Integer": numpy.int32, "Boolean": numpy.bool_}
         kinds = {field: slave.kind(name) for field, (slave, name) in self.columns.items()}
         fields = [("time", numpy.float64), *((field, types[kind]) for field, kind in kinds.items())]
-        rows = numpy.empty(len(times), fields)
+        rows = numpy.empty(len(times), numpy.dtype(fields, metadata={"punctual": self._barriers()}))
         rows["time"] = times
         for field, port in self.columns.items():
             source = reals if kinds[field] == "Real" else numbers

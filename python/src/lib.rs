@@ -9,6 +9,7 @@
 //! | `arrays` | arguments that are arrays: type, shape, and what is said of one that does not fit |
 //! | `loading` | a path or dict to a configuration and the names of its signals |
 //! | `sample` | one loop: a filter, and what it remembers |
+//! | `promise` | what became of a promise in a recorded run |
 //! | `report` | what a step says, as Python objects |
 //! | `filter` | `Filter`: one loop |
 //! | `pool` | the threads, one set for each process |
@@ -20,6 +21,7 @@ mod batch;
 mod filter;
 mod loading;
 mod pool;
+mod promise;
 mod report;
 mod sample;
 
@@ -32,5 +34,6 @@ fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::FilterBatch>()?;
     module.add_class::<report::Step>()?;
     module.add_class::<report::BarrierReport>()?;
+    module.add_function(wrap_pyfunction!(promise::judge, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -11,10 +11,14 @@ use punctual_fmu::configuration::{
 use punctual_fmu::product::describe;
 use serde::Serialize;
 
-use super::closed_loop::{self, RatingReport, ReachReport, Verdict};
+use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
+use crate::coupling::Kept;
 use crate::error::Error;
 use crate::output::{self, number};
 use crate::package;
+
+/// Round-off of h at a start on the boundary, in its unit.
+const ROUND_OFF: f64 = 1e-12;
 
 /// Arguments of `punctual check`.
 #[derive(Debug, clap::Args)]
@@ -27,6 +31,10 @@ pub struct Arguments {
     /// Also check a filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
+    /// The u_ref of the closed loop that is simulated from the start: "none" (0), "damping" (the vehicles by name),
+    /// or constants such as "a=0.5,omega=0"
+    #[arg(long, value_name = "WHAT", default_value = "none", allow_hyphen_values = true)]
+    u_ref: String,
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
     #[arg(long)]
     effort: bool,
@@ -49,6 +57,12 @@ struct FilterReport {
     /// Status of the first sample from there.
     status: Option<&'static str>,
     warnings: Vec<String>,
+    /// The closed loop from the start, where the plant is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    closed_loop: Option<LoopReport>,
+    /// The same with damping, where that is known, not asked for, and the other does not keep every promise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    with_damping: Option<LoopReport>,
     /// What profiles and rates need, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
@@ -62,13 +76,13 @@ struct BarrierReport {
     unit: String,
     relative_degree: usize,
     method: &'static str,
-    /// In s.
-    deadline: f64,
+    /// In s; `null` for a barrier that is to be kept.
+    deadline: Option<f64>,
     /// In 1/s; `null` for the repeated root without a start, where it is chosen.
     rate: Option<f64>,
     rate_times_deadline: Option<f64>,
-    /// In 1/s.
-    stay_rate: f64,
+    /// In 1/s; `null` where it is chosen at the start.
+    stay_rate: Option<f64>,
     margin: f64,
     start: Option<StartReport>,
 }
@@ -77,10 +91,28 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
-    /// Whether the theorem applies from there.
+    /// Whether the theorem applies from there, and the closed loop keeps its promise.
     guaranteed: bool,
+    /// Whether the theorem applies to the first step.
+    first_step: bool,
+    /// What the closed loop came to, where the plant is known.
+    simulated: Option<Kept>,
     /// What the input bounds allow, where there are any.
     reach: Option<ReachReport>,
+}
+
+impl StartReport {
+    /// What the first step and the closed loop say together.
+    fn words(&self) -> &'static str {
+        match (self.first_step, self.simulated) {
+            (true, Some(Kept::Kept)) => "guaranteed",
+            (true, None) => "guaranteed at the first step; without a model nothing is simulated",
+            (_, Some(Kept::NothingPromised)) => "nothing is promised without a deadline",
+            (true, Some(_)) => "the first step is met, but the closed loop does not keep it",
+            (false, Some(Kept::Kept)) => "not guaranteed, though the closed loop keeps it",
+            (false, _) => "not guaranteed",
+        }
+    }
 }
 
 /// What `check` tells about a plant.
@@ -152,13 +184,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
+            let wanted = Wanted::parse(&arguments.u_ref, &configuration)?;
             let effort = match &start {
                 Some(x0) if arguments.effort => {
-                    Some(closed_loop::ratings(&configuration, x0).map_err(|e| e.in_file(file))?)
+                    Some(closed_loop::ratings(&configuration, x0, &wanted).map_err(|e| e.in_file(file))?)
                 }
                 _ => None,
             };
-            let mut report = filter(&configuration, start).map_err(|e| e.in_file(file))?;
+            let mut report = filter(&configuration, start, &wanted).map_err(|e| e.in_file(file))?;
             report.effort = effort;
             if arguments.json {
                 output::json(&report);
@@ -167,7 +200,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             }
             let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
             let lost = |s: &StartReport| s.reach.as_ref().is_some_and(|r| r.deadline == Verdict::CannotBeMet);
-            let promised = starts.all(|start| start.guaranteed && !lost(start));
+            let kept = report.closed_loop.as_ref().is_none_or(|run| run.kept);
+            let promised = kept && starts.all(|start| start.guaranteed && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Configuration::Controller(configuration) => {
@@ -250,13 +284,19 @@ fn measured(c: &FilterConfiguration) -> Vec<String> {
     states.chain(c.barrier_inputs().into_iter().map(|input| input.name)).collect()
 }
 
-fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterReport, Error> {
+fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> Result<FilterReport, Error> {
     let mut filter = c.build()?;
     let inputs = c.plant.inputs().len();
     let status = match start.as_deref() {
         Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
         None => None,
     };
+    // Without a model nothing is simulated.
+    let simulated = start.as_deref().filter(|_| c.external().is_none());
+    let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
+    let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
+    let damped = simulated.filter(|_| failed && *wanted == Wanted::None && closed_loop::has_damping(c));
+    let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
     let degrees: Vec<usize> = filter.relative_degrees().collect();
@@ -265,16 +305,21 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         let (name, unit) = (&section.name, section.unit(&c.plant));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
         let deadline = settings.deadline.unwrap_or(f64::INFINITY);
-        let default_rate = BarrierSettings::default_rate(deadline, step);
+        let default_rate = settings.deadline.map(|deadline| BarrierSettings::default_rate(deadline, step));
         let begun = start.is_some();
+        let promise = begun.then(|| filter.state().barriers[i]);
         let approaching = begun && filter.report().barriers[i].phase == Phase::Approach;
         let (method, rate) = match settings.method {
             Method::ReferenceProfile if settings.rates.is_some() => ("reference profile, rates given", None),
-            Method::ReferenceProfile => ("reference profile", Some(settings.rate.unwrap_or(default_rate))),
+            Method::ReferenceProfile if deadline.is_infinite() => {
+                ("kept inside", settings.rate.or(promise.map(|p| p.stay_rate)))
+            }
+            Method::ReferenceProfile => ("reference profile", settings.rate.or(default_rate)),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
             Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(deadline))),
         };
-        let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(default_rate);
+        let chosen = promise.filter(|_| deadline.is_infinite()).map(|p| p.stay_rate);
+        let stay_rate = settings.stay_rate.or(settings.rate).or(default_rate).or(chosen);
         let margin = if begun { filter.report().barriers[i].margin } else { settings.margin };
         let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
         if c.sampling == SamplingName::Pointwise && margin == 0.0 {
@@ -283,7 +328,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
                 number(step)
             ));
         }
-        for (which, rate) in [("rate", rate), ("stay_rate", Some(stay_rate))] {
+        for (which, rate) in [("rate", rate), ("stay_rate", stay_rate)] {
             let Some(rate) = rate.filter(|rate| rate * step > 1.0) else { continue };
             warn(format!(
                 "{which} times step is {}, more than 1: the error changes faster than the input",
@@ -293,7 +338,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         if deadline < step {
             warn(format!("the deadline is shorter than the step of {} s", number(step)));
         }
-        if experiment.stop_time - experiment.start_time < deadline {
+        if deadline.is_finite() && experiment.stop_time - experiment.start_time < deadline {
             warn("the experiment stops before the deadline".to_owned());
         }
         if let Some(reason) = filter.refusal(i) {
@@ -311,14 +356,27 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             ));
         }
         let report = begun.then(|| filter.report().barriers[i]);
-        let reach = match start.as_deref() {
-            // Without a model nothing is simulated.
-            Some(x0) if c.is_bounded() && c.external().is_none() => Some(closed_loop::reach(c, i, x0)?),
+        let reach = match (simulated, settings.deadline) {
+            (Some(x0), Some(deadline)) if c.is_bounded() => {
+                Some(closed_loop::reach(c, (i, deadline), (x0, wanted))?)
+            }
             _ => None,
         };
-        let start =
-            report.map(|b| StartReport { h: b.h, inside: b.h >= 0.0, guaranteed: b.guaranteed, reach });
-        if start.as_ref().is_some_and(|s| !s.guaranteed) {
+        let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
+        let start = report.map(|b| StartReport {
+            h: b.h,
+            inside: b.h >= -ROUND_OFF,
+            guaranteed: b.guaranteed && simulated.is_none_or(|seen| seen == Kept::Kept),
+            first_step: b.guaranteed,
+            simulated,
+            reach,
+        });
+        if start.as_ref().is_some_and(|s| !s.inside && deadline.is_infinite()) {
+            warn(
+                "outside at the start and without a deadline: nothing is promised; give it a deadline"
+                    .to_owned(),
+            );
+        } else if start.as_ref().is_some_and(|s| !s.guaranteed) {
             warn("nothing is guaranteed from this start".to_owned());
         }
         barriers.push(BarrierReport {
@@ -327,14 +385,15 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
             unit,
             relative_degree: degrees[i],
             method,
-            deadline,
+            deadline: settings.deadline,
             rate,
-            rate_times_deadline: rate.map(|rate| rate * deadline),
+            rate_times_deadline: rate.zip(settings.deadline).map(|(rate, deadline)| rate * deadline),
             stay_rate,
             margin,
             start,
         });
     }
+    warnings.extend(closed_loop.iter().flat_map(loop_warnings));
     Ok(FilterReport {
         kind: "filter",
         name: c.name.clone(),
@@ -344,8 +403,26 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>) -> Result<FilterRepo
         start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
         warnings,
+        closed_loop,
+        with_damping,
         effort: None,
     })
+}
+
+/// What a closed loop shows beyond its promises.
+fn loop_warnings(run: &LoopReport) -> Vec<String> {
+    let unmet = run.barriers.iter().filter(|b| b.unmet > 0).map(|b| {
+        let name = &b.name;
+        format!("{name}: {} steps of the closed loop do not meet its constraint: no guarantee there", b.unmet)
+    });
+    let loose: Vec<_> = run.inputs.iter().filter(|input| input.bounds.is_none()).map(|i| i.words()).collect();
+    let loose = (!loose.is_empty()).then(|| {
+        format!(
+            "the closed loop takes inputs without bounds: {}; give what the plant can do in [bounds]",
+            loose.join(", ")
+        )
+    });
+    unmet.chain(run.beyond.iter().map(|state| state.words())).chain(loose).collect()
 }
 
 /// Anchors the filter at `x0` with u_ref = 0; the status in words.
@@ -418,26 +495,35 @@ fn filter_text(report: &FilterReport) -> String {
             (Some(rate), Some(product)) => {
                 format!("{} 1/s, times the deadline {}", number(rate), number(product))
             }
+            (Some(rate), None) => format!("{} 1/s", number(rate)),
             _ => "chosen at the start".to_owned(),
         };
+        let stay_rate =
+            b.stay_rate.map_or_else(|| "chosen at the start".to_owned(), |r| format!("{} 1/s", number(r)));
+        let deadline =
+            b.deadline.map_or_else(|| "none: to be kept".to_owned(), |d| format!("{} s", number(d)));
         let mut rows = vec![
             ("relative degree", b.relative_degree.to_string()),
             ("method", b.method.to_owned()),
-            ("deadline", format!("{} s", number(b.deadline))),
+            ("deadline", deadline),
             ("rate", rate),
-            ("stay rate", format!("{} 1/s", number(b.stay_rate))),
+            ("stay rate", stay_rate),
             ("margin", format!("{} {}", number(b.margin), b.unit)),
         ];
         if let Some(start) = &b.start {
             let side = if start.inside { "inside" } else { "outside" };
-            let promise = if start.guaranteed { "guaranteed" } else { "not guaranteed" };
-            rows.push(("start", format!("{side}, h = {} {}; {promise}", number(start.h), b.unit)));
+            rows.push(("start", format!("{side}, h = {} {}; {}", number(start.h), b.unit, start.words())));
             rows.extend(start.reach.iter().flat_map(ReachReport::rows));
         }
         lines.extend(rows.into_iter().map(|(name, value)| format!("  {name:<16} {value}")));
     }
+    lines.extend(report.closed_loop.iter().map(LoopReport::text));
+    if let Some(run) = &report.with_damping {
+        lines.push(run.head());
+    }
     if let Some(ratings) = &report.effort {
-        lines.push(closed_loop::ratings_text(ratings));
+        let wanted = report.closed_loop.as_ref().map_or("", |run| &run.u_ref);
+        lines.push(closed_loop::ratings_text(ratings, wanted));
     }
     if !report.warnings.is_empty() {
         lines.push(String::new());

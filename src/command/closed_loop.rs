@@ -1,13 +1,14 @@
-//! What `check` finds by running the filter it checks in a closed loop: the soonest deadline, the smallest
-//! bounds. With damping as u_ref on a reference plant, u_ref = 0 on another, on the filter's own model.
+//! What `check` finds by running the filter it checks in a closed loop, on the filter's own model and with the
+//! u_ref that is asked for: whether each promise is kept, the soonest deadline, the smallest bounds.
 
-use punctual_core::effort::{self, CANDIDATES, Candidate};
+use punctual_core::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_core::filter::{ProfileKind, SafetyFilter};
 use punctual_core::nominal::damping;
 use punctual_core::simulation::Schedule;
 use punctual_fmu::configuration::{FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
 use serde::Serialize;
 
+use crate::coupling::Kept;
 use crate::error::Error;
 use crate::output::{self, number};
 
@@ -19,6 +20,254 @@ const TOLERANCE: f64 = 0.02;
 const HORIZON: f64 = 30.0;
 /// Per second.
 const DAMPING: f64 = 1.0;
+/// How long a closed loop is watched, in units of its longest deadline.
+const WATCHED: f64 = 3.0;
+/// The longest step in s by which the plant is integrated in a closed loop that is watched.
+const INNER_STEP: f64 = 0.002;
+/// The fewest instants of a period at which h is looked at there.
+const INSTANTS: f64 = 4.0;
+/// The most samples of a closed loop that is watched: beyond, they are further apart.
+const MOST_SAMPLES: f64 = 1e6;
+
+/// The u_ref of the closed loops.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Wanted {
+    /// Zero: what an FMU gets where nothing is connected.
+    None,
+    /// −v per second, for the vehicles by name.
+    Damping,
+    /// Constant.
+    Constant(Vec<f64>),
+}
+
+impl Wanted {
+    /// As `--u-ref` says: `none`, `damping`, or values such as `a=0.5,omega=0`.
+    pub(super) fn parse(text: &str, c: &FilterConfiguration) -> Result<Self, Error> {
+        let refuse = |message: String| Err(Error::configuration("--u-ref", message));
+        let inputs: Vec<String> = c.plant.inputs().into_iter().map(|input| input.name).collect();
+        match text.trim() {
+            "none" => return Ok(Self::None),
+            "damping" if has_damping(c) => return Ok(Self::Damping),
+            "damping" => {
+                let example = inputs.first().map_or("u", String::as_str);
+                return refuse(format!(
+                    "is \"damping\", which is for the vehicles by name; give none, or values as \"{example}=0\""
+                ));
+            }
+            _ => {}
+        }
+        let mut values = vec![0.0; inputs.len()];
+        for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            let Some((name, value)) = part.split_once('=') else {
+                return refuse(format!("is {part:?}, must be none, damping, or like \"a=0.5\""));
+            };
+            let Some(index) = inputs.iter().position(|input| input == name.trim()) else {
+                return refuse(format!(
+                    "{:?} is no input, must be one of {}",
+                    name.trim(),
+                    inputs.join(", ")
+                ));
+            };
+            match value.trim().parse() {
+                Ok(value) if f64::is_finite(value) => values[index] = value,
+                _ => return refuse(format!("is {part:?}, must be a finite number")),
+            }
+        }
+        Ok(Self::Constant(values))
+    }
+
+    /// In words, as `--u-ref` takes it.
+    fn words(&self, c: &FilterConfiguration) -> String {
+        match self {
+            Self::None => "u_ref = 0 (--u-ref none)".to_owned(),
+            Self::Damping => "damping as u_ref (--u-ref damping)".to_owned(),
+            Self::Constant(values) => {
+                let inputs = c.plant.inputs();
+                let named = inputs.iter().zip(values).map(|(s, v)| format!("{} = {}", s.name, number(*v)));
+                format!("u_ref: {}", named.collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+
+    /// Writes u_ref for the state `x`.
+    fn write(&self, c: &FilterConfiguration, x: &[f64], u_ref: &mut [f64]) {
+        match self {
+            Self::None => u_ref.fill(0.0),
+            Self::Constant(values) => u_ref.copy_from_slice(values),
+            Self::Damping if c.plant.model == Some(ModelName::PointMass) => {
+                u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
+            }
+            Self::Damping => {
+                u_ref.fill(0.0);
+                u_ref[0] = damping(x[3], DAMPING);
+            }
+        }
+    }
+}
+
+/// Whether damping is known for the plant: the fourth state of every vehicle is a velocity.
+pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
+    c.plant.model.is_some() && c.plant.states().len() > 3
+}
+
+/// What a closed loop came to.
+#[derive(Serialize)]
+pub(super) struct LoopReport {
+    /// In words.
+    pub(super) u_ref: String,
+    /// Whether every promise was kept.
+    pub(super) kept: bool,
+    /// Until when it ran, in s.
+    end: f64,
+    /// Between samples, in s.
+    step: f64,
+    pub(super) barriers: Vec<LoopBarrier>,
+    pub(super) inputs: Vec<LoopInput>,
+    /// States that left the range in which the model is meant.
+    pub(super) beyond: Vec<LoopState>,
+}
+
+/// What was seen of a barrier.
+#[derive(Serialize)]
+pub(super) struct LoopBarrier {
+    pub(super) name: String,
+    pub(super) promise: Kept,
+    arrival: Option<f64>,
+    late: Option<f64>,
+    left: Option<f64>,
+    least_h: Option<f64>,
+    pub(super) unmet: usize,
+    first_unmet: Option<f64>,
+}
+
+/// What an input came to.
+#[derive(Serialize)]
+pub(super) struct LoopInput {
+    pub(super) name: String,
+    unit: String,
+    /// Largest size.
+    pub(super) peak: f64,
+    /// `null` where it has none.
+    pub(super) bounds: Option<[f64; 2]>,
+}
+
+/// A state beyond its range.
+#[derive(Serialize)]
+pub(super) struct LoopState {
+    name: String,
+    unit: String,
+    seen: [f64; 2],
+    range: [Option<f64>; 2],
+}
+
+impl LoopState {
+    pub(super) fn words(&self) -> String {
+        let end = |end: Option<f64>, none: &str| end.map_or_else(|| none.to_owned(), number);
+        format!(
+            "{} goes from {} to {} {}, beyond its range of {} to {}: the model is not meant there",
+            self.name,
+            number(self.seen[0]),
+            number(self.seen[1]),
+            self.unit,
+            end(self.range[0], "-inf"),
+            end(self.range[1], "inf"),
+        )
+    }
+}
+
+impl LoopInput {
+    pub(super) fn words(&self) -> String {
+        let Self { name, peak, unit, .. } = self;
+        let size = format!("{name} {} {unit}", number(*peak));
+        match self.bounds {
+            Some([min, max]) => format!("{size} (bounds {} to {})", number(min), number(max)),
+            None => format!("{size} (no bounds)"),
+        }
+    }
+}
+
+impl LoopReport {
+    /// Whether it came to what was promised, in a line.
+    pub(super) fn head(&self) -> String {
+        let verdict = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
+        let (step, end) = (number(self.step), number(self.end));
+        format!("closed loop with {}, steps of {step} s to t = {end} s: {verdict}", self.u_ref)
+    }
+
+    pub(super) fn text(&self) -> String {
+        let head =
+            ["barrier", "promise", "arrival s", "late s", "left s", "least h", "steps not met", "from s"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), number);
+        rows.extend(self.barriers.iter().map(|b| {
+            let promise = b.promise.words().to_owned();
+            let times = [b.arrival, b.late, b.left, b.least_h].map(shown);
+            let [arrival, late, left, least] = times;
+            let unmet = b.unmet.to_string();
+            vec![b.name.clone(), promise, arrival, late, left, least, unmet, shown(b.first_unmet)]
+        }));
+        let right = [false, false, true, true, true, true, true, true];
+        let inputs: Vec<_> = self.inputs.iter().map(LoopInput::words).collect();
+        format!("\n{}\n{}\nlargest inputs: {}", self.head(), output::table(&rows, &right), inputs.join(", "))
+    }
+}
+
+/// The experiment's length in s, or well past every deadline.
+fn watched(c: &FilterConfiguration) -> f64 {
+    let ends = c.barrier.iter().flat_map(|b| [b.deadline.unwrap_or(0.0), b.begin, b.end]);
+    let longest = ends.fold(0.0, f64::max);
+    (WATCHED * longest).max(c.experiment.stop_time - c.experiment.start_time)
+}
+
+/// The closed loop of the configuration from `x0`, well past every deadline.
+pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
+    let (mut filter, plant) = (c.build()?, c.plant.build()?);
+    let (length, deadlines) = (watched(c), deadlines(c));
+    let step = c.experiment.step_size.max(length / MOST_SAMPLES);
+    let substeps = (step / INNER_STEP).max(INSTANTS).ceil() as usize;
+    let steps = (length / step - 1e-9).ceil() as usize;
+    let setting = Loop {
+        plant: &*plant,
+        start: (c.experiment.start_time, x0),
+        schedule: Schedule { step, steps, substeps },
+        deadlines: &deadlines,
+        delay: c.actuation_delay,
+        to_the_end: true,
+    };
+    let run = effort::run(&mut filter, &setting, |x, u_ref| wanted.write(c, x, u_ref))?;
+    let barriers = c.barrier.iter().zip(&run.barriers).map(|(section, seen)| LoopBarrier {
+        name: section.name.clone(),
+        promise: seen.judgement.verdict().into(),
+        arrival: seen.judgement.arrival,
+        late: seen.judgement.late,
+        left: seen.judgement.left,
+        least_h: seen.judgement.least,
+        unmet: seen.unmet,
+        first_unmet: seen.first_unmet,
+    });
+    let inputs = c.plant.inputs().into_iter().zip(run.peak).map(|(input, peak)| LoopInput {
+        bounds: c.bounds.get(&input.name).copied().filter(|b| b.iter().all(|b| b.abs() < UNBOUNDED)),
+        name: input.name,
+        unit: input.unit,
+        peak,
+    });
+    let beyond = c.plant.states().into_iter().zip(&run.states).filter_map(|(state, seen)| {
+        // Not a number is beyond everything.
+        let within = state.min.is_none_or(|min| seen[0] >= min) && state.max.is_none_or(|max| seen[1] <= max);
+        let (seen, range) = (*seen, [state.min, state.max]);
+        let finite = seen.iter().all(|x| x.is_finite());
+        (!within || !finite).then_some(LoopState { name: state.name, unit: state.unit, seen, range })
+    });
+    Ok(LoopReport {
+        u_ref: wanted.words(c),
+        kept: run.kept,
+        end: run.end,
+        step,
+        barriers: barriers.collect(),
+        inputs: inputs.collect(),
+        beyond: beyond.collect(),
+    })
+}
 
 /// Whether the bounds allow the deadline.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize)]
@@ -44,7 +293,7 @@ pub(super) struct ReachReport {
 impl ReachReport {
     pub(super) fn rows(&self) -> Vec<(&'static str, String)> {
         let verdict = match self.deadline {
-            Verdict::CanBeMet => "can be met (this filter does it, simulated)",
+            Verdict::CanBeMet => "can be met (this filter does it with that u_ref, simulated)",
             Verdict::CannotBeMet => "cannot be met (no input within the bounds is inside then)",
             Verdict::NotKnown => "not known whether it can be met",
         };
@@ -77,38 +326,38 @@ pub(super) struct RatingReport {
 fn run(
     c: &FilterConfiguration,
     filter: &mut SafetyFilter,
-    x0: &[f64],
+    (x0, wanted): (&[f64], &Wanted),
     deadlines: &[f64],
 ) -> Result<effort::Run, Error> {
     let plant = c.plant.build()?;
-    let longest = deadlines.iter().copied().fold(0.0, f64::max);
-    let shortest = deadlines.iter().copied().fold(f64::INFINITY, f64::min);
+    let finite = deadlines.iter().copied().filter(|deadline| deadline.is_finite());
+    let longest = finite.clone().fold(0.0, f64::max);
+    let shortest = finite.fold(f64::INFINITY, f64::min);
     let step = c.experiment.step_size.max(longest / SAMPLES).min(shortest);
-    let substeps = (10.0 * step / shortest).ceil() as usize;
-    let schedule = Schedule { step, steps: (2.0 * longest / step).ceil() as usize, substeps };
-    let states = c.plant.states().len();
-    let point_mass = c.plant.model == Some(ModelName::PointMass);
-    let vehicle = c.plant.model.is_some() && states > 3;
-    effort::run(filter, &*plant, (c.experiment.start_time, x0), schedule, deadlines, |x, u_ref| {
-        u_ref.fill(0.0);
-        if point_mass {
-            u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
-        } else if vehicle {
-            u_ref[0] = damping(x[3], DAMPING);
-        }
-    })
-    .map_err(Error::from)
+    let substeps = ((10.0 * step / shortest).ceil() as usize).max(2);
+    let setting = Loop {
+        plant: &*plant,
+        start: (c.experiment.start_time, x0),
+        schedule: Schedule { step, steps: (2.0 * longest / step).ceil() as usize, substeps },
+        deadlines,
+        delay: c.actuation_delay.min(step),
+        to_the_end: false,
+    };
+    effort::run(filter, &setting, |x, u_ref| wanted.write(c, x, u_ref)).map_err(Error::from)
 }
 
 fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// What the bounds allow barrier `index` from `x0`.
-pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result<ReachReport, Error> {
+/// What the bounds allow barrier `index`, of that deadline, from `x0`.
+pub(super) fn reach(
+    c: &FilterConfiguration,
+    (index, deadline): (usize, f64),
+    (x0, wanted): (&[f64], &Wanted),
+) -> Result<ReachReport, Error> {
     let filter = c.build()?;
-    let (t, configured) = (c.experiment.start_time, deadlines(c));
-    let deadline = configured[index];
+    let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
     let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
     let keeps = |deadline: f64| {
@@ -116,7 +365,7 @@ pub(super) fn reach(c: &FilterConfiguration, index: usize, x0: &[f64]) -> Result
         tried.barrier[index].deadline = Some(deadline);
         tried.barrier[index].when_infeasible = punctual_fmu::configuration::InfeasibleName::Report;
         let mut filter = tried.build()?;
-        Ok::<_, Error>(run(c, &mut filter, x0, &deadlines(&tried))?.kept)
+        Ok::<_, Error>(run(c, &mut filter, (x0, wanted), &deadlines(&tried))?.kept)
     };
     let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     // Growing from what is not ruled out: the longest deadlines are the longest runs.
@@ -152,14 +401,19 @@ fn written(bound: f64) -> f64 {
 
 /// What the candidates of [`effort`] need from `x0`: bounds on the inputs that are accelerations; the others
 /// keep theirs.
-pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingReport>, Error> {
+pub(super) fn ratings(
+    c: &FilterConfiguration,
+    x0: &[f64],
+    wanted: &Wanted,
+) -> Result<Vec<RatingReport>, Error> {
     let driven: Vec<usize> =
         c.plant.inputs().iter().enumerate().filter(|(_, s)| s.unit == "m/s2").map(|(i, _)| i).collect();
     let configured = |candidate: &Candidate, bound: f64| {
         let mut tried = c.clone();
         for section in &mut tried.barrier {
+            let Some(deadline) = section.deadline else { continue };
             section.rates.clear();
-            section.rate = section.deadline.map_or(0.0, |deadline| candidate.rate_times_deadline / deadline);
+            section.rate = candidate.rate_times_deadline / deadline;
             section.profile = match candidate.profile {
                 ProfileKind::Hermite => ProfileName::Hermite,
                 ProfileKind::LowPeak => ProfileName::LowPeak,
@@ -174,14 +428,16 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
     let try_out = |candidate: &Candidate, bound: f64| {
         let tried = configured(candidate, bound);
         let mut filter = tried.build()?;
-        let run = run(&tried, &mut filter, x0, &deadlines(&tried))?;
+        let run = run(&tried, &mut filter, (x0, wanted), &deadlines(&tried))?;
         Ok::<_, Error>((run.kept, driven.iter().map(|&i| run.peak[i]).fold(0.0, f64::max)))
     };
     let ratings = effort::compare(&CANDIDATES, try_out)?;
     let lines = |candidate: &Candidate, bound: Option<f64>| {
         let mut lines: Vec<String> = Vec::new();
         for section in &c.barrier {
-            let rate = section.deadline.map_or(0.0, |deadline| candidate.rate_times_deadline / deadline);
+            // Without a deadline there is nothing to paste.
+            let Some(deadline) = section.deadline else { continue };
+            let rate = candidate.rate_times_deadline / deadline;
             let profile = name(candidate.profile);
             lines
                 .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));
@@ -207,7 +463,7 @@ pub(super) fn ratings(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<RatingR
 }
 
 /// The ratings as a table, and the best as lines to paste.
-pub(super) fn ratings_text(ratings: &[RatingReport]) -> String {
+pub(super) fn ratings_text(ratings: &[RatingReport], wanted: &str) -> String {
     let head = ["profile", "rate times deadline", "peak m/s2", "smallest bound m/s2"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     let shown = |value: Option<f64>| value.map_or_else(|| "deadline lost".to_owned(), number);
@@ -215,7 +471,9 @@ pub(super) fn ratings_text(ratings: &[RatingReport]) -> String {
         vec![r.profile.to_owned(), number(r.rate_times_deadline), shown(r.peak), shown(r.smallest_bound)]
     }));
     let table = output::table(&rows, &[false, true, true, true]);
-    let head = "effort, simulated with damping as u_ref; below the peak steps are infeasible and nothing is guaranteed";
+    let head = format!(
+        "effort, simulated with {wanted}; below the peak steps are infeasible and nothing is guaranteed"
+    );
     match ratings.first().filter(|best| best.smallest_bound.is_some()) {
         Some(best) => format!("\n{head}\n{table}\n\n{}", best.settings),
         None => format!("\n{head}\n{table}"),

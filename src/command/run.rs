@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use crate::coupling::{Order, Outcome, Picture, Promise, Simulation, System};
+use crate::coupling::{Kept, Order, Outcome, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
@@ -30,8 +30,8 @@ pub struct Arguments {
     /// Run in a process of its own: a crash of an FMU is told, and the rows until then are kept
     #[arg(long)]
     isolate: bool,
-    /// Exit with code 1 unless every promise of every filter was kept: each sample met its constraint, no
-    /// deadline was missed, no set left again
+    /// Exit with code 1 unless every barrier of every filter was on time and inside from then on
+    /// (`on_time_and_inside`), and each of its samples met the constraint too (`kept`)
     #[arg(long, value_enum, value_name = "WHAT")]
     require: Option<Requirement>,
     /// The folder of a run that another process watches
@@ -41,8 +41,28 @@ pub struct Arguments {
 
 /// What a run must come to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "snake_case")]
 enum Requirement {
+    /// The promise and the constraint
     Kept,
+    /// The promise
+    OnTimeAndInside,
+}
+
+impl Requirement {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::OnTimeAndInside => "on_time_and_inside",
+        }
+    }
+
+    fn is_met(self, promise: &Promise) -> bool {
+        match self {
+            Self::Kept => promise.kept(),
+            Self::OnTimeAndInside => promise.promise == Kept::Kept,
+        }
+    }
 }
 
 /// What `run` tells, as JSON.
@@ -111,8 +131,8 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
         words.extend(["--out".into(), folder.into()]);
     }
     words.extend(arguments.json.then(|| "--json".into()));
-    if arguments.require == Some(Requirement::Kept) {
-        words.extend(["--require".into(), "kept".into()]);
+    if let Some(required) = arguments.require {
+        words.extend(["--require".into(), required.word().into()]);
     }
     words.extend(["--watched".into(), child.folder().into(), "--".into(), arguments.system.clone().into()]);
     let (how, last) = match child.run(words, Voice::Loud, None)? {
@@ -184,7 +204,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     } else {
         output::result(&text(&report));
     }
-    let broken = arguments.require == Some(Requirement::Kept) && !report.promises.iter().all(Promise::kept);
+    let broken =
+        arguments.require.is_some_and(|required| !report.promises.iter().all(|p| required.is_met(p)));
     Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
@@ -233,6 +254,8 @@ fn report(
         let last = recording.column(index).last().unwrap_or(f64::NAN);
         SignalReport { name: column.name.clone(), unit: column.unit.clone(), min, max, last }
     };
+    let mut notes = outcome.notes;
+    notes.extend(nothing_promised(&outcome.promises));
     Report {
         system: path.display().to_string(),
         order: system.experiment().order,
@@ -252,7 +275,7 @@ fn report(
         promises: outcome.promises,
         signals: (0..recording.columns().len()).map(signal).collect(),
         files,
-        notes: outcome.notes,
+        notes,
     }
 }
 
@@ -283,26 +306,47 @@ fn text(report: &Report) -> String {
     text
 }
 
+/// Barriers that have no promise at all.
+pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
+    promises.iter().filter(|p| p.promise == Kept::NothingPromised).map(|p| {
+        format!(
+            "{} is outside at the start and without a deadline: nothing is promised; give it a deadline",
+            p.barrier
+        )
+    })
+}
+
 /// A row for each promise and an empty line; nothing without one.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
         return String::new();
     }
-    let head = ["promise", "arrival s", "late s", "left s", "samples not met", "in a row", "violation", ""];
+    let head = [
+        "barrier",
+        "promise",
+        "arrival s",
+        "late s",
+        "left s",
+        "constraint",
+        "samples not met",
+        "in a row",
+        "violation",
+    ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     let time = |t: Option<f64>| t.map_or_else(|| "-".to_owned(), output::number);
     rows.extend(promises.iter().map(|p| {
         vec![
             p.barrier.clone(),
+            p.promise.words().to_owned(),
             time(p.arrival),
             time(p.late),
             time(p.left),
+            if p.constraint_met { "met" } else { "not met" }.to_owned(),
             p.unmet.to_string(),
             p.longest.to_string(),
             output::number(p.violation),
-            if p.kept() { "kept" } else { "not kept" }.to_owned(),
         ]
     }));
-    let right = [false, true, true, true, true, true, true, false];
+    let right = [false, false, true, true, true, false, true, true, true];
     format!("{}\n\n", output::table(&rows, &right))
 }

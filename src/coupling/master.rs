@@ -176,7 +176,7 @@ impl<P: Participant> Simulation<P> {
 
         let watched = promises::ports(system, descriptions);
         let mut read = recorded.clone();
-        read.extend(watched.iter().flat_map(|(_, status, fields)| fields.iter().chain([status])));
+        read.extend(watched.iter().flat_map(|ports| ports.fields.iter().chain([&ports.status])));
         let mut layout = Layout::default();
         let mut groups = Vec::new();
         for (component, description) in descriptions.iter().enumerate() {
@@ -223,6 +223,7 @@ impl<P: Participant> Simulation<P> {
             used: false,
         };
         simulation.note_shortened_step(descriptions);
+        simulation.notes.extend(promises::unfed(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
     }
@@ -288,7 +289,7 @@ impl<P: Participant> Simulation<P> {
             }
         }
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
-        let promises = self.promises.iter().map(|watched| watched.promise().clone()).collect();
+        let promises = self.promises.iter().map(Watched::promise).collect();
         Ok(Outcome { recording, statistics, promises, notes: self.notes.clone(), failure: ran.err() })
     }
 
@@ -356,7 +357,17 @@ impl<P: Participant> Simulation<P> {
     fn initialise(&mut self) -> Result<(), Error> {
         self.notes.truncate(self.standing_notes);
         self.reported.fill(false);
-        self.promises.iter_mut().for_each(Watched::reset);
+        for watched in &mut self.promises {
+            let starts = &self.members[watched.component].starts;
+            let deadline = watched.deadline.map(|(reference, own)| {
+                let given = starts.iter().find_map(|start| match *start {
+                    Start::Real(other, value) if other == reference => Some(value),
+                    _ => None,
+                });
+                given.unwrap_or(own)
+            });
+            watched.reset(deadline);
+        }
         let used = std::mem::replace(&mut self.used, true);
         for member in &mut self.members {
             if used {

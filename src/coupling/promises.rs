@@ -1,28 +1,84 @@
-//! What filters say of their promises in the course of a run, recorded or not. A filter is known by the names
-//! of its outputs: `status`, and `<barrier>.unmet_steps` with the others of [`FIELDS`].
+//! What became of the promises of filters in the course of a run, recorded or not. A filter is known by the names
+//! of its outputs: `status`, and `<barrier>.h` with the others of [`FIELDS`].
+//!
+//! A promise is judged by h itself ([`punctual_core::judge`]), at the deadline and at the communication points. Where
+//! a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is of the point before.
 
 use punctual_core::filter::{Phase, Status};
+use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+use punctual_fmu::configuration::over_seconds;
 use serde::Serialize;
 
 use super::layout::Layout;
-use super::network::Port;
-use super::system::System;
+use super::network::{self, Link, Port};
+use super::system::{Order, System};
 use crate::host::{Causality, Description};
 
 /// The outputs of a barrier that are looked at.
-const FIELDS: [&str; 5] = ["unmet_steps", "slack", "arrived", "late_certain", "phase"];
+const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "late_certain", "phase"];
 
-/// What became of one barrier's promise.
+/// What a promise came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kept {
+    /// On time, and inside from then on; always inside where it began inside.
+    Kept,
+    /// Late, or left.
+    Broken,
+    /// The run ends before it is decided.
+    Open,
+    /// It began outside and has no deadline.
+    NothingPromised,
+}
+
+impl Kept {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::Broken => "not kept",
+            Self::Open => "open",
+            Self::NothingPromised => "nothing promised",
+        }
+    }
+}
+
+impl From<Verdict> for Kept {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Kept => Self::Kept,
+            Verdict::Broken => Self::Broken,
+            Verdict::Open => Self::Open,
+            Verdict::Nothing => Self::NothingPromised,
+        }
+    }
+}
+
+/// What became of one barrier: its promise, which is about h, and its constraint, which is about steps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Promise {
     /// `component.barrier`.
     pub barrier: String,
-    /// The first communication point in s at which it had arrived.
+    /// On time and inside, by h itself.
+    pub promise: Kept,
+    /// Whether every sample met the constraint.
+    pub constraint_met: bool,
+    /// The instant of its deadline in s; `None` without one.
+    pub deadline: Option<f64>,
+    /// Whether it began inside.
+    pub began_inside: bool,
+    /// Whether h ≥ 0 held by the deadline; without one, at the start.
+    pub on_time: bool,
+    /// Whether h ≥ 0 held from the deadline on; from the start on where it began inside.
+    pub inside: bool,
+    /// When h ≥ 0 held first, in s: between two samples where it was there.
     pub arrival: Option<f64>,
-    /// The first one in s at which its deadline had passed outside, or was certain to.
+    /// When it was known in s that the deadline is missed.
     pub late: Option<f64>,
-    /// The first one in s at which it had been left again.
+    /// When it was left in s, after it had been inside and was to stay so.
     pub left: Option<f64>,
+    /// Least h while it was to be inside.
+    pub least_h: Option<f64>,
     /// Samples that did not meet its constraint, or had no valid input to meet it with.
     pub unmet: u64,
     /// The longest row of them.
@@ -32,26 +88,85 @@ pub struct Promise {
 }
 
 impl Promise {
-    /// Whether nothing was missed: every sample met, not late, not left.
+    /// Whether nothing was missed: the promise is kept and every sample met the constraint.
     pub fn kept(&self) -> bool {
-        self.late.is_none() && self.left.is_none() && self.unmet == 0
+        self.promise == Kept::Kept && self.constraint_met
     }
+
+    /// Takes what became of h.
+    fn judged(&mut self, seen: &Judgement) {
+        self.promise = seen.verdict().into();
+        (self.deadline, self.began_inside) = (seen.deadline, seen.began_inside);
+        (self.on_time, self.inside) = (seen.on_time(), seen.inside());
+        (self.arrival, self.late, self.left) = (seen.arrival, seen.late, seen.left);
+        self.least_h = seen.least;
+    }
+}
+
+/// The outputs that tell of a promise, and what is known of it before a run.
+pub(super) struct Ports {
+    /// `component.barrier`.
+    name: String,
+    pub(super) status: Port,
+    pub(super) fields: [Port; FIELDS.len()],
+    rearm: Option<Port>,
+    /// The value reference of its deadline, and the value where none is set.
+    deadline: Option<(u32, f64)>,
+    course: Course,
+    /// Whether h is of the communication point at which it is read.
+    prompt: bool,
 }
 
 /// A promise that is watched.
 #[derive(Debug)]
 pub(super) struct Watched {
-    promise: Promise,
+    pub(super) component: usize,
+    /// The value reference of its deadline, and the value where none is set.
+    pub(super) deadline: Option<(u32, f64)>,
+    name: String,
+    course: Course,
+    prompt: bool,
     status: usize,
+    rearm: Option<usize>,
     fields: [usize; FIELDS.len()],
-    unmet_in_a_row: u64,
+    /// What changes in the course of a run.
+    run: Run,
 }
 
-/// The outputs that tell of promises: for each barrier its name, `status` and the [`FIELDS`].
-pub(super) fn ports(
-    system: &System,
-    descriptions: &[&Description],
-) -> Vec<(String, Port, [Port; FIELDS.len()])> {
+#[derive(Clone, Debug)]
+struct Run {
+    judge: Judge,
+    deadline: Option<f64>,
+    /// Promises that were given up for a new start.
+    before: Option<Judgement>,
+    rearm: bool,
+    started: bool,
+    last: Option<f64>,
+    unmet: u64,
+    in_a_row: u64,
+    longest: u64,
+    violation: f64,
+}
+
+impl Run {
+    fn new(deadline: Option<f64>, course: Course) -> Self {
+        Self {
+            judge: Judge::new(deadline, course),
+            deadline,
+            before: None,
+            rearm: false,
+            started: false,
+            last: None,
+            unmet: 0,
+            in_a_row: 0,
+            longest: 0,
+            violation: 0.0,
+        }
+    }
+}
+
+/// The promises of all filters in `system`.
+pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports> {
     let mut found = Vec::new();
     for (component, description) in descriptions.iter().enumerate() {
         let output = |name: &str| {
@@ -63,71 +178,150 @@ pub(super) fn ports(
         for variable in &description.variables {
             let Some(barrier) = variable.name.strip_suffix(".unmet_steps") else { continue };
             let ports = FIELDS.map(|field| output(&format!("{barrier}.{field}")));
-            if let [Some(a), Some(b), Some(c), Some(d), Some(e)] = ports {
-                let name = format!("{}.{barrier}", system.components()[component].name);
-                found.push((name, status, [a, b, c, d, e]));
-            }
+            let [Some(unmet), Some(slack), Some(h), Some(late), Some(phase)] = ports else { continue };
+            let unit = |port: Port| description.variables[port.variable].unit.as_deref().unwrap_or("1");
+            let straight = over_seconds(unit(h), 1) == unit(slack);
+            let parameter = description.index_of(&format!("{barrier}.deadline"));
+            let parameter = parameter.map(|i| &description.variables[i]);
+            let owner = &system.components()[component];
+            found.push(Ports {
+                name: format!("{}.{barrier}", owner.name),
+                status,
+                fields: [unmet, slack, h, late, phase],
+                rearm: description.index_of("rearm").map(|variable| Port { component, variable }),
+                deadline: parameter
+                    .and_then(|v| Some((v.value_reference, v.start.as_deref()?.parse().ok()?))),
+                course: if straight { Course::Straight } else { Course::Smooth },
+                prompt: system.experiment().order == Order::GaussSeidel
+                    && network::has_feedthrough(owner, description, h.variable),
+            });
         }
     }
     found
 }
 
+/// What nothing feeds of a filter: measured states, and u_ref where none of it is fed. An input with a start value
+/// in the system file is meant to be constant.
+pub(super) fn unfed(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (component, (owner, description)) in system.components().iter().zip(descriptions).enumerate() {
+        let outputs = |ending| description.variables.iter().any(|v| v.name.ends_with(ending));
+        if !outputs(".unmet_steps") || description.index_of("status").is_none() {
+            continue;
+        }
+        let loose = |prefix: &str| -> (Vec<&str>, usize) {
+            let all = description.variables.iter().enumerate();
+            let all = all.filter(|(_, v)| v.causality == Causality::Input && v.name.starts_with(prefix));
+            let mut count = 0;
+            let mut loose = Vec::new();
+            for (variable, v) in all {
+                count += 1;
+                let port = Port { component, variable };
+                let fed = links.iter().any(|link| link.to == port) || owner.start.contains_key(&v.name);
+                loose.extend((!fed).then_some(v.name.as_str()));
+            }
+            (loose, count)
+        };
+        let name = &owner.name;
+        let (states, _) = loose("x.");
+        if !states.is_empty() {
+            notes.push(format!("{name}: nothing feeds {}, which stay at their start", states.join(", ")));
+        }
+        let (wanted, count) = loose("u_ref.");
+        if !wanted.is_empty() && wanted.len() == count {
+            notes.push(format!(
+                "{name}: nothing feeds {}: the wanted input is 0 at all times, and nothing damps the motion along the set; \
+                 connect a controller, such as damping, or give a start value",
+                wanted.join(", ")
+            ));
+        }
+    }
+    notes
+}
+
 impl Watched {
     /// `None` where a port has no slot.
-    pub(super) fn new(
-        layout: &Layout,
-        (name, status, fields): &(String, Port, [Port; FIELDS.len()]),
-    ) -> Option<Self> {
+    pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
         let mut slots = [0; FIELDS.len()];
-        for (slot, port) in slots.iter_mut().zip(fields) {
+        for (slot, port) in slots.iter_mut().zip(&ports.fields) {
             *slot = layout.slot(*port)?;
         }
-        let promise = Promise {
-            barrier: name.clone(),
-            arrival: None,
-            late: None,
-            left: None,
-            unmet: 0,
-            longest: 0,
-            violation: 0.0,
-        };
-        Some(Self { promise, status: layout.slot(*status)?, fields: slots, unmet_in_a_row: 0 })
+        Some(Self {
+            component: ports.status.component,
+            deadline: ports.deadline,
+            name: ports.name.clone(),
+            course: ports.course,
+            prompt: ports.prompt,
+            status: layout.slot(ports.status)?,
+            rearm: ports.rearm.and_then(|port| layout.slot(port)),
+            fields: slots,
+            run: Run::new(None, ports.course),
+        })
     }
 
-    /// Forgets the run before.
-    pub(super) fn reset(&mut self) {
-        let barrier = std::mem::take(&mut self.promise.barrier);
-        self.promise =
-            Promise { barrier, arrival: None, late: None, left: None, unmet: 0, longest: 0, violation: 0.0 };
-        self.unmet_in_a_row = 0;
+    /// Forgets the run before; `deadline` in s after the first step is that of the next.
+    pub(super) fn reset(&mut self, deadline: Option<f64>) {
+        self.run = Run::new(deadline, self.course);
     }
 
     /// Takes the `values` of the communication point at `time` (s).
     pub(super) fn see(&mut self, time: f64, values: &[f64]) {
-        let [unmet, slack, arrived, late, phase] = self.fields.map(|slot| values[slot]);
+        let at = if self.prompt { Some(time) } else { self.run.last };
+        self.run.last = Some(time);
+        let Some(time) = at else { return };
+        let [unmet, slack, h, lost, phase] = self.fields.map(|slot| values[slot]);
         let is = |number: Phase| phase == f64::from(number as i32);
-        let promise = &mut self.promise;
-        if arrived != 0.0 {
-            promise.arrival.get_or_insert(time);
-        }
-        if late != 0.0 || is(Phase::Late) {
-            promise.late.get_or_insert(time);
-        }
-        if is(Phase::Left) {
-            promise.left.get_or_insert(time);
-        }
         let invalid = values[self.status] >= f64::from(Status::InvalidInput as i32);
+        let run = &mut self.run;
+        let rearm = self.rearm.is_some_and(|slot| values[slot] != 0.0);
+        if rearm && !run.rearm && run.started {
+            let judged = run.judge.judgement();
+            run.before = run.before.filter(|before| before.verdict() == Verdict::Broken).or(Some(judged));
+            run.judge = Judge::new(run.deadline, self.course);
+            run.started = false;
+        }
+        run.rearm = rearm;
+        run.started |= !invalid;
+        if run.started {
+            let standing = match () {
+                () if is(Phase::Released) => Standing::Released,
+                () if is(Phase::Waiting) => Standing::Waiting,
+                () => Standing::InForce,
+            };
+            run.judge.see(time, h, standing, lost != 0.0 || is(Phase::Late));
+        }
         if unmet > 0.0 || invalid {
-            promise.unmet += 1;
-            self.unmet_in_a_row += 1;
-            promise.longest = promise.longest.max(self.unmet_in_a_row);
-            promise.violation = promise.violation.max(-slack);
+            run.unmet += 1;
+            run.in_a_row += 1;
+            run.longest = run.longest.max(run.in_a_row);
+            run.violation = run.violation.max(-slack);
         } else {
-            self.unmet_in_a_row = 0;
+            run.in_a_row = 0;
         }
     }
 
-    pub(super) fn promise(&self) -> &Promise {
-        &self.promise
+    /// What became of it until now.
+    pub(super) fn promise(&self) -> Promise {
+        let run = &self.run;
+        let mut promise = Promise {
+            barrier: self.name.clone(),
+            promise: Kept::Open,
+            constraint_met: run.unmet == 0,
+            deadline: None,
+            began_inside: false,
+            on_time: false,
+            inside: false,
+            arrival: None,
+            late: None,
+            left: None,
+            least_h: None,
+            unmet: run.unmet,
+            longest: run.longest,
+            violation: run.violation,
+        };
+        // One that was broken before it was started anew stays so.
+        let before = run.before.filter(|before| before.verdict() == Verdict::Broken);
+        promise.judged(&before.unwrap_or_else(|| run.judge.judgement()));
+        promise
     }
 }

@@ -13,6 +13,7 @@ mod help;
 mod hostile;
 mod in_process;
 mod inspecting;
+mod judging;
 mod merging;
 mod misbehaving;
 mod models;

@@ -18,7 +18,7 @@ FILTER = {
     "kind": "filter",
     "name": "unicycle_filter",
     "plant": {"model": "unicycle"},
-    "barrier": [goal(), {"name": "post", "shape": "obstacle", "centre": [8.0, 5.0], "radius": 1.0, "deadline": 1.0}],
+    "barrier": [goal(), {"name": "post", "shape": "obstacle", "centre": [8.0, 5.0], "radius": 1.0}],
     "bounds": {"a": [-20.0, 20.0]},
     "experiment": {"step_size": STEP},
 }

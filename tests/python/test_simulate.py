@@ -1,6 +1,7 @@
 """`punctual.simulate` against `punctual run`: the same calls, the same bits."""
 
 import csv
+import json
 import math
 
 import fmpy
@@ -156,6 +157,41 @@ def test_an_input_that_nothing_feeds_is_refused(fmus, tmp_path):
     values = dict(zip(inputs, [20.0, 10.0, 0.0, 0.0]))
     result = punctual.simulate(centre, fmus[1], stop_time=0.1, step_size=STEP, parameters=values)
     assert result["goal.h"][0] == punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)["goal.h"][0]
+
+
+@pytest.mark.parametrize("deadline", [5.0, 4.99, 1.5, 20.0])
+def test_a_promise_is_judged_as_by_a_run(fmus, tmp_path, deadline):
+    parameters = {"goal.deadline": deadline, "u_max.a": 9.0, "u_min.a": -9.0}
+    result = punctual.simulate(*fmus, stop_time=STOP, step_size=0.03, nominal=DAMPING, parameters=parameters)
+    starts = ", ".join(f'"{name}" = {value}' for name, value in parameters.items())
+    (tmp_path / "system.toml").write_text(
+        f"""[experiment]
+stop_time = {STOP}
+step = 0.03
+[[component]]
+name = "filter"
+fmu = "{fmus[0]}"
+start = {{ {starts} }}
+[[component]]
+name = "plant"
+fmu = "{fmus[1]}"
+[[connect_by_name]]
+components = ["filter", "plant"]
+{DAMPED}
+"""
+    )
+    told = json.loads(punctual.run_cli("run", tmp_path / "system.toml", "--json"))["promises"]
+    for said in told:
+        found = punctual.promise(result, said["barrier"].removeprefix("filter."))
+        assert {field: said[field] for field in vars(found)} == vars(found)
+        assert (found.constraint_met, found.kept) == (
+            said["constraint_met"],
+            said["promise"] == "kept" and said["constraint_met"],
+        )
+    assert punctual.promise(result, "goal").promise == {1.5: "broken", 20.0: "open"}.get(deadline, "kept")
+    assert punctual.promise(result, "goal", deadline=0.5).late is not None
+    with pytest.raises(punctual.Error, match="result: has no field 'goal.phase'"):
+        punctual.promise(result[["time", "status", "goal.h"]], "goal")
 
 
 def test_a_refused_step_names_fmu_time_and_reason(fmus):

@@ -599,6 +599,23 @@ impl SafetyFilter {
     pub fn relative_degrees(&self) -> impl Iterator<Item = usize> + '_ {
         self.channels.iter().map(|c| c.source.relative_degree())
     }
+
+    /// h of each barrier at time `t` (s) and the state `x`, written to `h` in the order of the report: for instants
+    /// between two samples. Remembers nothing.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    pub fn barrier_values(&mut self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), Error> {
+        length("x", x.len(), self.state_dim)?;
+        length("h", h.len(), self.channels.len())?;
+        let derivatives = &mut self.workspace.derivatives;
+        for (channel, h) in self.channels.iter().zip(h) {
+            channel.source.evaluate(t, x, derivatives);
+            *h = derivatives.drift[0];
+        }
+        Ok(())
+    }
 }
 
 /// What plant and inputs can do about a barrier at a sample; notes how well it can be influenced.

@@ -1,4 +1,4 @@
-//! `[[barrier]]`: a safe set, the deadline for reaching it, and when that is in force.
+//! `[[barrier]]`: a safe set, the deadline for reaching it if it has one, and when that is in force.
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{
@@ -162,7 +162,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// `[[barrier]]`: a safe set and the deadline for reaching it.
+/// `[[barrier]]`: a safe set, to be reached by a deadline, or to be kept.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct BarrierSection {
@@ -231,8 +231,8 @@ pub struct BarrierSection {
     /// What is done where the bounds certainly do not allow the deadline. Default `report`.
     #[serde(default, skip_serializing_if = "is_default")]
     pub when_infeasible: InfeasibleName,
-    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline, at most
-    /// 0.5 / step.
+    /// Rate a of the profile method in 1/s, ≥ 0. Default 0: 20 / deadline, without a deadline what the bounds can
+    /// brake; at most 0.5 / step.
     #[serde(default)]
     pub rate: f64,
     /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`. Default: none.
@@ -261,7 +261,7 @@ pub struct BarrierSection {
     /// hard.
     #[serde(default, skip_serializing_if = "is_default")]
     pub penalty: f64,
-    /// Time in s after the first step from which it is enforced, ≥ 0, < deadline. Default 0.
+    /// Time in s after the first step from which it is enforced, ≥ 0, < deadline if there is one. Default 0.
     #[serde(default, skip_serializing_if = "is_default")]
     pub begin: f64,
     /// The barrier, above in the file, whose arrival it waits for. Default: none.
@@ -410,17 +410,15 @@ impl BarrierSection {
             };
         let (positive, non_negative, finite) = (Range::POSITIVE, Range::NON_NEGATIVE, Range::FINITE);
         if self.deadline.is_some() {
-            row("deadline", "s", positive, "time from the first step to be inside", |b| {
+            row("deadline", "s", positive, "time from the first step to be inside and to stay so", |b| {
                 b.deadline.get_or_insert(1.0)
             });
         }
-        row(
-            "rate",
-            "1/s",
-            non_negative,
-            "decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step",
-            |b| &mut b.rate,
-        );
+        let meaning = match self.deadline {
+            Some(_) => "decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step",
+            None => "how fast h may go to the margin; 0: what the bounds can brake, at most 0.5 / step",
+        };
+        row("rate", "1/s", non_negative, meaning, |b| &mut b.rate);
         row(
             "stay_rate",
             "1/s",
@@ -489,6 +487,18 @@ impl BarrierSection {
             row("bound", unit, range, "the bound", |b| b.bound.get_or_insert(0.0));
         }
         rows
+    }
+
+    /// The position in m at which h is largest, on a plant with a name; `None` where that is not known.
+    pub(super) fn inmost(&self) -> Option<[f64; 2]> {
+        match self.shape {
+            ShapeName::Disc | ShapeName::QuadraticDisc | ShapeName::Ellipse | ShapeName::Rectangle => {
+                self.centre
+            }
+            // At rest, wherever that is.
+            ShapeName::SpeedLimit => Some([0.0; 2]),
+            _ => None,
+        }
     }
 
     /// The settings of its promise; 0 means "as the others say".

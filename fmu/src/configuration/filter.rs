@@ -230,8 +230,33 @@ impl FilterConfiguration {
             parameter.check(&mut self)?;
         }
         // Whatever the ranges of single numbers cannot say.
-        self.build_integrator(&self.build()?)?;
+        let mut filter = self.build()?;
+        self.build_integrator(&filter)?;
+        self.check_margins(&mut filter)?;
         Ok(self)
+    }
+
+    /// Refuses a margin that h never has: of shapes whose largest h is known, at their centre or at rest.
+    fn check_margins(&self, filter: &mut SafetyFilter) -> Result<(), ConfigurationError> {
+        let states = self.plant.states().len();
+        let mut x = vec![0.0; states];
+        x.extend(self.barrier_inputs().iter().map(|input| input.start));
+        let mut h = vec![0.0; self.barrier.len()];
+        for (i, section) in self.barrier.iter().enumerate() {
+            let Some(centre) = section.inmost() else { continue };
+            x[..2].copy_from_slice(&centre);
+            let named = |e: punctual_core::Error| ConfigurationError::new(e.field(), e.message());
+            filter.barrier_values(0.0, &x, &mut h).map_err(named)?;
+            let margin = section.margin.unwrap_or(0.0);
+            if margin >= h[i] {
+                let (unit, largest) = (section.unit(&self.plant), h[i]);
+                let message = format!(
+                    "is {margin} {unit}, must be < {largest:.6} {unit}, the largest that h ever is: h >= margin is aimed at"
+                );
+                return Err(ConfigurationError::new(format!("barrier[{i}].margin"), message));
+            }
+        }
+        Ok(())
     }
 
     /// The numbers that are parameters of the FMU.

@@ -1,0 +1,75 @@
+"""What became of a promise in a result of `simulate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ._enumerations import Status
+from ._error import Error
+from ._punctual import judge
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What became of one barrier: its promise, which is about h, and its constraint, which is about steps."""
+
+    promise: str
+    """`kept`, `broken`, `open` (the run ends before it is decided) or `nothing_promised`."""
+    deadline: float | None
+    """The instant of the deadline in s; `None` without one."""
+    began_inside: bool
+    on_time: bool
+    """Whether h >= 0 held by the deadline; without one, at the start."""
+    inside: bool
+    """Whether h >= 0 held from the deadline on; from the start on where it began inside."""
+    arrival: float | None
+    """When h >= 0 held first, in s."""
+    late: float | None
+    """When it was known in s that the deadline is missed."""
+    left: float | None
+    """When it was left in s, after it had been inside and was to stay so."""
+    least_h: float | None
+    """Least h while it was to be inside."""
+    unmet: int
+    """Samples that did not meet its constraint."""
+
+    @property
+    def constraint_met(self) -> bool:
+        """Whether every sample met the constraint."""
+        return self.unmet == 0
+
+    @property
+    def kept(self) -> bool:
+        """Whether nothing was missed: the promise is kept and every sample met the constraint."""
+        return self.promise == "kept" and self.constraint_met
+
+
+def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = None) -> Promise:
+    """What became of `barrier` in a result of `simulate`, judged as `punctual run` does it: by h itself, at the deadline
+    too where that lies between two communication points.
+
+    - `deadline`: in s after the first step. Default: what the filter had in that run.
+
+    The result must have the fields `status` and `h`, `phase`, `late_certain` and `unmet_steps` of the barrier, as it has
+    unless `record` says otherwise. Raises `Error` where one is missing.
+    """
+    fields = ["time", "status", *(f"{barrier}.{field}" for field in ("h", "phase", "late_certain", "unmet_steps"))]
+    names = result.dtype.names or ()
+    missing = [field for field in fields if field not in names]
+    if missing:
+        raise Error(f"result: has no field {missing[0]!r}, only {', '.join(names)}")
+    known: dict[str, Any] = dict(result.dtype.metadata or {}).get("punctual", {})
+    own, units, prompt = known.get(barrier, (None, ("1", "1"), True))
+    time, status, h, phase, late, unmet = (result[field].tolist() for field in fields)
+    if not prompt:
+        # What is read at a point is of the one before.
+        time, status, h, phase, late, unmet = time[:-1], status[1:], h[1:], phase[1:], late[1:], unmet[1:]
+    rows = list(zip(time, h, phase, late, status))
+    said = judge(rows, own if deadline is None else deadline, units)
+    failed = sum(n > 0 or s >= Status.INVALID_INPUT for n, s in zip(unmet, status))
+    return Promise(**said, unmet=failed)
