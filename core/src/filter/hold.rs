@@ -63,7 +63,7 @@ impl Hold<'_> {
             true => self.between(self.node(from)?, last, DEPTH)?,
             false => Lowest { h: last.h, at: to },
         };
-        let error = UNSURE * self.integration_error(to, last.h, scratch)?;
+        let error = UNSURE * self.integration_error(last, scratch)?;
         Some(Lowest { h: found.h - error, ..found })
     }
 
@@ -73,14 +73,14 @@ impl Hold<'_> {
         known.then_some(Node { at, h: ahead.value[0], slope: ahead.value[1] })
     }
 
-    /// What the prediction of h at `to` is off.
-    fn integration_error(&self, to: f64, h: f64, scratch: &mut [f64]) -> Option<f64> {
-        let half = to / 2.0;
+    /// What the prediction at the `last` node is off, of h and by its slope.
+    fn integration_error(&self, last: Node, scratch: &mut [f64]) -> Option<f64> {
+        let (to, half) = (last.at, last.at / 2.0);
         scratch.copy_from_slice(self.x);
         let mut ahead = Ahead::ZERO;
         let known = self.source.predict(scratch, self.u, half)
             && self.source.ahead(self.t + half, scratch, self.u, half, &mut ahead);
-        known.then(|| (ahead.value[0] - h).abs())
+        known.then(|| (ahead.value[0] - last.h).abs() + to * (ahead.value[1] - last.slope).abs())
     }
 
     fn between(&self, a: Node, b: Node, depth: u32) -> Option<Lowest> {
@@ -97,8 +97,8 @@ impl Hold<'_> {
         let off = (middle.h - foreseen).abs() + length / 4.0 * (middle.slope - slope).abs();
         let halves = dip(a, middle).or(dip(middle, b));
         let sure = halves.h - off / 16.0;
-        // What is off must be small for the halves to be off by so much less.
-        if middle.h < 0.0 || sure >= off {
+        // What is off must be small for the halves to be off by so much less; and once may be chance.
+        if middle.h < 0.0 || depth < DEPTH && sure >= off {
             return Some(Lowest { h: if middle.h < 0.0 { halves.h } else { sure }, ..halves });
         }
         if depth == 0 {

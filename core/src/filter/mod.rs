@@ -74,6 +74,9 @@ const WIDE_EVERY: u32 = 64;
 /// Periods that differ by less than this part of them are one.
 const SAME_PERIOD: f64 = 1e-6;
 
+/// How much further from u_ref, or 1, an instant may move the input.
+const MUCH_FURTHER: f64 = 4.0;
+
 /// Scratch memory of a step; what it holds from the step before changes no bit of the next.
 struct Workspace {
     derivatives: Derivatives,
@@ -323,8 +326,8 @@ impl SafetyFilter {
         let widens =
             self.state.barriers.iter().all(|b| b.unmet.is_none_or(|unmet| unmet.steps % WIDE_EVERY == 0));
         let listed = conditions.len();
+        let (mut round, mut allowed) = (0, f64::INFINITY);
         let mut solution;
-        let mut round = 0;
         loop {
             let total = conditions.len().max(count);
             for (i, condition) in conditions.iter().enumerate() {
@@ -368,13 +371,16 @@ impl SafetyFilter {
                 let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: held_from(i), u };
                 outlooks[i].look(&promises[i], &held, &reports[i].row.normal, hold, scratch);
             }
-            let met = matches!(solution.outcome, Outcome::Optimal);
+            // An input that turns the plant by many radians makes any prediction true.
+            let distance = u.iter().zip(u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+            let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
             if conditions.len() > listed && !met {
                 // That instant cannot be had as well: the flag says so.
                 conditions.truncate(listed);
                 round = ROUNDS;
                 continue;
             }
+            allowed = MUCH_FURTHER * u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
             let before = conditions.len();
             if round < ROUNDS && met && report.predicted {
                 for (i, outlook) in outlooks[..count].iter().enumerate() {
