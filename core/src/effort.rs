@@ -24,8 +24,8 @@ pub struct Loop<'a> {
     pub deadlines: &'a [f64],
     /// How much later than computed an input acts, in s, ≥ 0, at most a step; 0 acts before.
     pub delay: f64,
-    /// Whether the run goes on where a promise has been broken.
-    pub to_the_end: bool,
+    /// Where a promise has been broken the run ends, not before this many seconds after the start.
+    pub until: f64,
 }
 
 /// What a closed loop came to.
@@ -185,7 +185,7 @@ pub fn run(
         nominal(&x, &mut u_ref);
         let report = filter.step(t, &x, &u_ref, &mut u)?;
         running.sample(t, &x, &u, report);
-        let lost = running.is_broken() && !setting.to_the_end;
+        let lost = t - t0 >= setting.until && running.is_broken();
         if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
             break;
         }

@@ -21,7 +21,7 @@ const HORIZON: f64 = 30.0;
 /// Per second.
 const DAMPING: f64 = 1.0;
 /// How long a closed loop is watched, in units of its longest deadline.
-const WATCHED: f64 = 3.0;
+const WATCHED: f64 = 2.0;
 /// The longest step in s by which the plant is integrated in a closed loop that is watched.
 const INNER_STEP: f64 = 0.002;
 /// The fewest instants of a period at which h is looked at there.
@@ -232,7 +232,8 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         schedule: Schedule { step, steps, substeps },
         deadlines: &deadlines,
         delay: c.actuation_delay,
-        to_the_end: true,
+        // What is lost is not followed for long: steps that cannot be met take the longest.
+        until: deadlines.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max),
     };
     let run = effort::run(&mut filter, &setting, |x, u_ref| wanted.write(c, x, u_ref))?;
     let barriers = c.barrier.iter().zip(&run.barriers).map(|(section, seen)| LoopBarrier {
@@ -341,7 +342,7 @@ fn run(
         schedule: Schedule { step, steps: (2.0 * longest / step).ceil() as usize, substeps },
         deadlines,
         delay: c.actuation_delay.min(step),
-        to_the_end: false,
+        until: 0.0,
     };
     effort::run(filter, &setting, |x, u_ref| wanted.write(c, x, u_ref)).map_err(Error::from)
 }

@@ -43,9 +43,7 @@ pub struct Arguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 #[value(rename_all = "snake_case")]
 enum Requirement {
-    /// The promise and the constraint
     Kept,
-    /// The promise
     OnTimeAndInside,
 }
 

@@ -6,6 +6,9 @@ use serde_json::Value;
 
 use crate::workshop::{Workshop, assert_golden, examples};
 
+/// Steps that are long enough for a closed loop in a test.
+const COARSE: (&str, &str) = ("step_size = 0.001", "step_size = 0.05");
+
 /// The example's filter and plant, the filter with edits.
 fn workshop(edits: &[(&str, &str)]) -> Workshop {
     let workshop = Workshop::new();
@@ -31,6 +34,7 @@ fn the_text_of_filter_and_plant() {
     let workshop = workshop(&[]);
     assert_golden("check-filter.txt", &workshop.punctual(["check", "filter.toml"]).success());
     assert_golden("check-plant.txt", &workshop.punctual(["check", "plant.toml"]).success());
+    let workshop = self::workshop(&[COARSE]);
     let words = ["check", "filter.toml", "--plant", "plant.toml", "--u-ref", "damping"];
     assert_golden("check-start.txt", &workshop.punctual(words).success());
 }
@@ -38,7 +42,7 @@ fn the_text_of_filter_and_plant() {
 #[test]
 fn the_repeated_root_from_a_start() {
     let root = ("margin = 0.02 ", "margin = 0.0\nmethod = \"repeated_root\"\nshape = \"quadratic_disc\"");
-    let workshop = workshop(&[root]);
+    let workshop = workshop(&[root, COARSE]);
     let text = workshop.punctual(["check", "filter.toml", "--x0", "theta=0.5"]).stdout;
     assert_golden("check-repeated-root.txt", &text);
 }
@@ -127,7 +131,7 @@ fn warnings_name_what_does_not_fit_the_step() {
 /// Bounds that the start asks too much of: the promise cannot be given, and the code says so.
 #[test]
 fn a_start_without_a_guarantee_is_code_one() {
-    let workshop = workshop(&[("[experiment]", "[bounds]\na = [-0.01, 0.01]\n[experiment]")]);
+    let workshop = workshop(&[("[experiment]", "[bounds]\na = [-0.01, 0.01]\n[experiment]"), COARSE]);
     let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: infeasible"), "{done:#?}");
@@ -138,7 +142,7 @@ fn a_start_without_a_guarantee_is_code_one() {
 #[test]
 fn a_degenerate_start_is_code_one() {
     let across = format!("theta={}", 0.75 * std::f64::consts::PI);
-    let done = workshop(&[]).punctual(["check", "filter.toml", "--x0", &across]);
+    let done = workshop(&[COARSE]).punctual(["check", "filter.toml", "--x0", &across]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: degenerate\n"), "{done:#?}");
     assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");

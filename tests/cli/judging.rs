@@ -109,7 +109,7 @@ fn an_obstacle_is_kept_without_a_deadline() {
         let x0 = format!("[x0]\ngap = {gap:?}\nv = {v:?}");
         let case = Case { filter: "", plant, x0: &x0, barriers, experiment: [0.01, 30.0] };
         let workshop = case.built();
-        let (code, report) = run(&workshop, "kept");
+        let (code, report) = run(&workshop, "on_time_and_inside");
         let promise = &report["promises"][0];
         assert_eq!(
             (code, &promise["promise"], &promise["deadline"]),
@@ -206,7 +206,7 @@ fn a_margin_that_h_never_has_is_refused() {
         ("centre = [20.0, 0.0]\nradius = 2.0", 5.0, "m", "0.828427"),
         ("centre = [20.0, 0.0]\nradius = 1.0\nsmoothing = 0.1", 0.91, "m", "0.904988"),
         ("shape = \"quadratic_disc\"\ncentre = [3.0, 4.0]\nradius = 2.0", 4.0, "m2", "4.000000"),
-        ("shape = \"speed_limit\"\nbound = 3.0", 3.5, "m/s", "3.000000"),
+        ("shape = \"speed_limit\"\nbound = 3.0", 3.5, "m/s", "1.854102"),
     ] {
         let workshop = Workshop::new();
         let text = format!(
@@ -241,13 +241,13 @@ fn check_says_what_a_run_does() {
         let filter = format!("bounds = {{ u_x = [-{bound:?}, {bound:?}], u_y = [-{bound:?}, {bound:?}] }}");
         let plant = "[plant]\nmodel = \"point_mass\"";
         let (x0, barriers) = (format!("[x0]\nv_x = {:?}\nv_y = {:?}", v[0], v[1]), goal(centre, more));
-        let case = Case { filter: &filter, plant, x0: &x0, barriers: &barriers, experiment: [0.01, 15.0] };
+        let case = Case { filter: &filter, plant, x0: &x0, barriers: &barriers, experiment: [0.02, 10.0] };
         let workshop = case.built();
         let (_, ran) = run(&workshop, "kept");
         let (code, checked) = check(&workshop, &[]);
         let (seen, promise) = (&checked["closed_loop"]["barriers"][0], &ran["promises"][0]);
         assert_eq!(seen["promise"], promise["promise"], "{checked} against {ran}");
-        assert_eq!(seen["unmet"], promise["unmet"], "{checked} against {ran}");
+        assert!(seen["promise"] != "kept" || seen["unmet"] == promise["unmet"], "{checked} against {ran}");
         let start = &checked["barriers"][0]["start"];
         let (said, kept) = (start["guaranteed"] == true, seen["promise"] == "kept");
         assert!(!said || kept, "{checked}");
