@@ -93,6 +93,8 @@ fn a_step_allocates_nothing() {
                     10 => x[1] = f64::NAN,
                     20 => x[0] = 1e300,
                     30 => x[3] = -200.0,
+                    // On the way out.
+                    40 => x = [43.2, 45.0, -0.9, 0.1],
                     _ => {}
                 }
                 let u_ref = [0.1, -0.1];

@@ -70,17 +70,21 @@ fn stacks_along(t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
 #[test]
 fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
     let (mut own, mut given) = (filter(sources()), external());
-    let (mut x, mut filtered) = (vec![0.0, 0.0, 0.3, 1.0], 0);
+    let (mut x, mut filtered, mut known) = (vec![0.0, 0.0, 0.3, 1.0], 0, 0);
     for k in 0..(2.0 * DEADLINE / STEP) as usize {
         let (t, u_ref) = (k as f64 * STEP, [0.5, 0.4]);
         if k % 50 == 7 {
             let (dx, du_ref) = ([0.3, -0.2, 0.5, 1.0], [-0.25, 0.75]);
             let (mut wanted, mut found) = (SampleDerivative::default(), SampleDerivative::default());
             let unknown = own.differentiate(t, [&x, &dx], [&u_ref, &du_ref], &mut wanted).expect("lengths");
-            assert_eq!(unknown, None);
             let state = [&stacks(t, &x)[..], &stacks_along(t, &x, &dx)];
-            let unknown = given.differentiate(t, state, [&u_ref, &du_ref], &mut found).expect("lengths");
-            assert_eq!(unknown, None);
+            let also = given.differentiate(t, state, [&u_ref, &du_ref], &mut found).expect("lengths");
+            assert_eq!(also, unknown);
+            // Where bounds choose the rate there is none.
+            known += usize::from(unknown.is_none());
+            if unknown.is_some() {
+                continue;
+            }
             let numbers = |d: &SampleDerivative| {
                 let barriers = d.barriers.iter().flat_map(|b| [b.h, b.profile, b.margin, b.slack]);
                 d.u.into_iter().chain(barriers).collect::<Vec<_>>()
@@ -102,7 +106,7 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
         filtered += usize::from(wanted.status == Status::Filtered);
         assert!(sources()[0].predict(&mut x, &u, STEP));
     }
-    assert!(filtered > 100, "{filtered} steps were filtered");
+    assert!(filtered > 100 && known > 3, "{filtered} steps were filtered, {known} derivatives compared");
 }
 
 #[test]

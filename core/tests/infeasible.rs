@@ -238,7 +238,7 @@ fn situations() -> Vec<Situation> {
             violations: vec![0.0, 11.0],
         },
         Situation {
-            // The profile from h = 0.5 m, ḣ = −3 m/s asks for −u ≥ −6h/T² − 4ḣ/T = 9.
+            // Kept at h = 0.5 m, ḣ = −3 m/s, it asks for −u ≥ −2aḣ − a²h = 10 with the largest rate, ten times the one given.
             name: "too fast towards a wall",
             filter: {
                 let slow =
@@ -250,7 +250,7 @@ fn situations() -> Vec<Situation> {
             limit: 2.0,
             status: Status::Infeasible,
             u: [-2.0, 0.0],
-            violations: vec![7.0],
+            violations: vec![8.0],
         },
     ]
 }

@@ -250,7 +250,8 @@ fn the_period_is_measured() {
         assert!(report.predicted);
         periods.push(report.period);
     }
-    assert_eq!(periods, [0.01 * DEADLINE, 0.125, 0.125, 0.25, 0.25, 0.25, 0.125]);
+    // The longest is forgotten by a hundredth of the time that passes.
+    assert_eq!(periods, [0.01 * DEADLINE, 0.125, 0.125, 0.25, 0.25, 0.25, 0.25 - 0.01 * 0.125]);
     filter.rearm();
     let report = filter.step(2.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
     assert_eq!(report.period, 0.01 * DEADLINE);
@@ -316,8 +317,8 @@ fn without_a_prediction_the_constraint_is_pointwise() {
 /// Samples further apart than was thought at the first one: the margin becomes what it would have been.
 #[test]
 fn the_margin_follows_the_measured_period() {
-    let mut known = filter(PointMass, Sampling::Measured { first: Some(0.2) });
-    let mut measured = filter(PointMass, Sampling::Measured { first: Some(0.001) });
+    let mut known = filter(PointMass, Sampling::Measured { first: Some(0.02) });
+    let mut measured = filter(PointMass, Sampling::Measured { first: Some(0.0001) });
     let mut u = [0.0; 2];
     let mut margin = |filter: &mut SafetyFilter, t: f64| {
         let report = filter.step(t, &[2.0 * t, 0.0, 2.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
@@ -325,11 +326,13 @@ fn the_margin_follows_the_measured_period() {
     };
     let (wanted, first) = (margin(&mut known, 0.0), margin(&mut measured, 0.0));
     assert!(settings().margin < first && first < wanted, "{first} {wanted}");
-    // Until round-off: h at the anchor is put together again from the margin and what is above it.
-    let second = margin(&mut measured, 0.2);
-    assert!((second - wanted).abs() < 1e-12, "{second} for {wanted}");
-    // Once only, and never less.
-    assert_eq!(margin(&mut measured, 0.6), second);
+    // Nearly: what has happened since the anchor may have started the profile anew.
+    let second = margin(&mut measured, 0.02);
+    assert!((second - wanted).abs() < 1e-3 * wanted, "{second} for {wanted}");
+    // Again where one is longer still, and never less.
+    let third = margin(&mut measured, 0.06);
+    let fourth = margin(&mut measured, 0.065);
+    assert!(third > second && (fourth - third).abs() < 1e-3 * third, "{third} {fourth}");
 }
 
 proptest! {

@@ -12,8 +12,8 @@ use punctual_core::simulation::{Schedule, closed_loop};
 
 use super::judge::case::{Case, Numbers, Reference, Set};
 use super::judge::model::{Plant, Shape};
+use super::judge::on_every_core;
 use super::judge::run::{Promise, run_seen};
-use super::judge::{demanding, on_every_core};
 
 const STEP: f64 = 0.01;
 
@@ -143,8 +143,9 @@ fn table_of_the_readme_drawn_at_random() {
         println!("\nFound::draw({}): {:?}\n{:?}\n{:?}", found.seed, found.promise, found.peaks, found.case);
     }
     for found in &found {
-        let fine = found.promise.broken.is_none() && !found.promise.out_after_arrival;
-        assert!(fine || !demanding(), "{found:?}");
+        // Drawn bounds may not allow to stop inside: then nothing may be promised.
+        let stays = !found.promise.out_after_arrival || found.case.bounds[0].is_finite();
+        assert!(found.promise.broken.is_none() && stays, "{found:?}");
     }
 }
 
@@ -192,6 +193,7 @@ fn the_readme_with_one_number_changed() {
         ("u_ref = 0", Case { reference: Reference::Zero, ..plain(example()) }),
     ];
     for (name, case) in cases {
+        let Shape::Disc { radius, .. } = case.sets[0].shape else { unreachable!("all are discs") };
         for step in [0.001, 0.01] {
             // A while longer than twice the deadline: some leave late.
             let horizon = case.horizon + 10.0;
@@ -199,15 +201,18 @@ fn the_readme_with_one_number_changed() {
             let Promise { late, out_after_arrival: out, broken, least, unmet, .. } = found.promise;
             let [speed, left] = as_simulated(&case.at(step));
             println!("{name}, {step} s, as simulated: peak speed {speed:.1}, least h after T {left:.3}");
-            assert!(left >= 0.0 && speed < 100.0 || !demanding(), "{name}, {step}: {speed} m/s, {left}");
+            assert!(left >= 0.0 && speed < 100.0, "{name}, {step}: {speed} m/s, {left}");
             println!(
                 "{name}, {step} s: late {late}, out after arrival {out}, least h {least:.3}, peaks {:.1?}, unmet \
                  {unmet}, broken under the flag {broken:?}",
                 found.largest
             );
-            assert!(!late && !out && broken.is_none() || !demanding(), "{name}, {step}: {found:?}");
-            let calm = found.peaks[0] < 2.0 && found.peaks[1] < 4.0;
-            assert!(calm || !demanding(), "{name}, {step}: peaks {:?}", found.peaks);
+            assert!(!late && !out && broken.is_none(), "{name}, {step}: {found:?}");
+            // What comes to the disc at the speed of the way, ahead of its profile, has half the radius to stop in.
+            let (speed, effort) = (found.largest[0], found.largest[1]);
+            let calm =
+                found.peaks[0] < 2.0 && (found.peaks[1] < 4.0 || effort < 2.0 * speed * speed / radius);
+            assert!(calm, "{name}, {step}: peaks {:?}", found.peaks);
         }
     }
 }

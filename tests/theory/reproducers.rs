@@ -11,12 +11,7 @@ use punctual_core::filter::Status;
 use super::judge::case::{Case, Numbers, Reference, Set, Steps};
 use super::judge::model::{Plant, Shape};
 use super::judge::run::{Run, run, run_seen};
-use super::judge::{demanding, on_every_core};
-
-/// Whether the code is not there yet: these tests wait for it.
-fn waiting() -> bool {
-    !demanding()
-}
+use super::judge::{drawn, on_every_core};
 
 fn disc(start: [f64; 2], radius: f64, outside: bool) -> Shape {
     Shape::Disc { start, velocity: [0.0; 2], radius, smoothing: Some(radius), outside }
@@ -47,9 +42,6 @@ fn towards(velocity: [f64; 2], centre: [f64; 2], radius: f64) -> Case {
 
 #[test]
 fn an_obstacle_straight_ahead() {
-    if waiting() {
-        return;
-    }
     let mut count = broken("as found", &[towards([4.27, 0.0], [2.88, 0.0], 2.0)]);
     let mut numbers = Numbers::new(1);
     let cases: Vec<_> = (0..100)
@@ -66,11 +58,8 @@ fn an_obstacle_straight_ahead() {
 /// 536 of them collided.
 #[test]
 fn two_thousand_starts_outside_a_disc() {
-    if waiting() {
-        return;
-    }
     let mut numbers = Numbers::new(2);
-    let cases: Vec<_> = (0..2000)
+    let cases: Vec<_> = (0..drawn(2000))
         .map(|_| {
             let (radius, angle) = (numbers.within(0.5, 5.0), numbers.within(-PI, PI));
             let far = radius + numbers.scale(0.1, 5.0);
@@ -84,9 +73,6 @@ fn two_thousand_starts_outside_a_disc() {
 /// p' = u, h = 10 − p, pushed against the wall; every row can be met, and is.
 #[test]
 fn a_wall_at_ten_metres() {
-    if waiting() {
-        return;
-    }
     let wall = |at: f64, push: f64, step: f64, deadline: f64| Case {
         reference: Reference::Outwards(push),
         horizon: 3.0 * at / push,
@@ -111,9 +97,6 @@ fn a_wall_at_ten_metres() {
 /// n = 1: −0.380 m, −0.020 m and −3.98 m at T itself, which falls between two samples.
 #[test]
 fn deadlines_between_samples() {
-    if waiting() {
-        return;
-    }
     let reach = |d: f64, deadline: f64, step: f64| {
         Case::plain(Plant::Chain(1), Set::within(line(1.0, d), deadline), &[0.0], step)
     };
@@ -160,29 +143,22 @@ fn chains(n: usize, count: usize, steps: Steps) -> Vec<Case> {
 /// 89, 16 and 6 of 2,000 for n = 1, 2, 3.
 #[test]
 fn missed_steps() {
-    if waiting() {
-        return;
-    }
-    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, missed"), &chains(n, 2000, Steps::Missed)));
+    let found =
+        [1, 2, 3].map(|n| broken(&format!("n = {n}, missed"), &chains(n, drawn(2000), Steps::Missed)));
     assert_eq!(found, [0; 3]);
 }
 
 /// 148, 82 and 37.
 #[test]
 fn steps_of_every_length() {
-    if waiting() {
-        return;
-    }
-    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, scattered"), &chains(n, 2000, Steps::Scattered)));
+    let found =
+        [1, 2, 3].map(|n| broken(&format!("n = {n}, scattered"), &chains(n, drawn(2000), Steps::Scattered)));
     assert_eq!(found, [0; 3]);
 }
 
 /// One step of 1e-12 s switched the filter off, and a wall at 10 m was left behind.
 #[test]
 fn a_very_short_step() {
-    if waiting() {
-        return;
-    }
     let wall = |n: usize, push: f64, steps: Steps| Case {
         reference: Reference::Outwards(push),
         steps,
@@ -204,16 +180,14 @@ fn a_very_short_step() {
         }
     }
     println!("walls left: {left} of 81");
-    let found = [1, 2, 3].map(|n| broken(&format!("n = {n}, short steps"), &chains(n, 500, Steps::Tiny)));
+    let found =
+        [1, 2, 3].map(|n| broken(&format!("n = {n}, short steps"), &chains(n, drawn(500), Steps::Tiny)));
     assert_eq!((found, left), ([0; 3], 0));
 }
 
 /// Few samples to a deadline: h dipped between two of them, though every sample was well.
 #[test]
 fn dips_between_samples() {
-    if waiting() {
-        return;
-    }
     let found = [Plant::PointMass, Plant::Unicycle, Plant::Bicycle { l_r: 2.0 }].map(|plant| {
         let mut numbers = Numbers::new(8);
         let mut draw = || {
@@ -229,7 +203,7 @@ fn dips_between_samples() {
             let reference = references[numbers.below(3)];
             Case { reference, ..Case::plain(plant, set, &start, 5.0 / numbers.within(10.0, 50.0).round()) }
         };
-        let cases: Vec<_> = (0..1000).map(|_| draw()).collect();
+        let cases: Vec<_> = (0..drawn(1000)).map(|_| draw()).collect();
         broken(&format!("{plant:?}"), &cases)
     });
     assert_eq!(found, [0; 3]);
@@ -238,9 +212,6 @@ fn dips_between_samples() {
 /// A barrier that was left begins anew, and does not claim that it had been kept.
 #[test]
 fn recovery_does_not_claim_what_was_lost() {
-    if waiting() {
-        return;
-    }
     let mut numbers = Numbers::new(11);
     let (mut claimed, mut recovered) = (0, 0);
     for i in 0..100 {
@@ -273,9 +244,6 @@ fn recovery_does_not_claim_what_was_lost() {
 /// A wall that swings by several radians between samples looks like one that swings slowly.
 #[test]
 fn a_wall_faster_than_the_samples() {
-    if waiting() {
-        return;
-    }
     let wall = |size: f64, angle: f64, n: usize| {
         let set = Set::within(Shape::Wave { size, rate: angle / 0.01 }, 2.0);
         Case::plain(Plant::Written(n), set, &[-1.0, 0.0][..n], 0.01)

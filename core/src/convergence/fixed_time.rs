@@ -366,9 +366,8 @@ impl FixedTime {
             Phase::Stay | Phase::Left if is_outside => Phase::Left,
             Phase::Stay => Phase::Stay,
             Phase::Left if is_inside => Phase::Stay,
-            // Until the deadline the profile may ask for less than staying does.
-            Phase::Approach if !is_over && keeps(state.margin) => Phase::Stay,
-            Phase::Approach if is_over && is_inside => Phase::Stay,
+            // Until then the approach goes on; from the deadline on it keeps h ≥ 0 too, with r = 0.
+            Phase::Approach if keeps(state.margin) => Phase::Stay,
             Phase::Late if is_inside => Phase::Stay,
             Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
             other => other,
@@ -496,7 +495,7 @@ impl FixedTime {
             Method::ReferenceProfile => {
                 rate = settings.rate.unwrap_or(if keeps { stay_rate } else { default_rate });
                 if keeps {
-                    margin += sampled::ROUND_OFF * h[0].abs();
+                    margin += if period > 0.0 { sampled::ROUND_OFF * h[0].abs() } else { 0.0 };
                 } else if !past && period > 0.0 {
                     let attenuation = self.attenuation(rate, deadline);
                     margin += sampled::margin(self.built_in(), &anchor[..n], deadline, attenuation, period);

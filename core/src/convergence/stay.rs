@@ -116,7 +116,7 @@ pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 const OVER_SMALLEST: f64 = 1.5;
 
 /// Where no period limits the rate: this many times what is asked for.
-const LARGEST_RATE_OVER_BASE: f64 = 1e6;
+const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
 /// How to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): `margin` μ and rate `base` > 0 where they will do, what is
 /// needed where they do not.

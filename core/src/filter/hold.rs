@@ -18,6 +18,10 @@ const DEPTH: u32 = 6;
 /// The part of h at an instant that η may lose on the way to the next before the interval is looked at more closely.
 const CLEAR: f64 = 0.5;
 
+/// How many times what twice as many steps change is taken for the error of the prediction: where an input turns the plant
+/// by more than a radian within the hold, both are off.
+const UNSURE: f64 = 10.0;
+
 /// η and η̇ at an instant.
 #[derive(Clone, Copy)]
 struct Node {
@@ -51,15 +55,16 @@ pub(super) struct Hold<'a> {
 }
 
 impl Hold<'_> {
-    /// A lower bound on h over `from` ≤ s ≤ `to` (s after the sample, `from` < `to`), and where; `scratch` has the length
+    /// A lower bound on h over `from` ≤ s ≤ `to` (s after the sample), and where; `scratch` has the length
     /// of the state. `None` where the source cannot predict.
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
-        let (first, last) = (self.node(from)?, self.node(to)?);
-        let found = self.between(first, last, DEPTH)?;
-        if found.h > CLEAR * first.h.min(last.h) && first.h > 0.0 {
-            return Some(found);
-        }
-        Some(Lowest { h: found.h - self.integration_error(to, last.h, scratch)?, ..found })
+        let last = self.node(to)?;
+        let found = match from < to {
+            true => self.between(self.node(from)?, last, DEPTH)?,
+            false => Lowest { h: last.h, at: to },
+        };
+        let error = UNSURE * self.integration_error(last, scratch)?;
+        Some(Lowest { h: found.h - error, ..found })
     }
 
     fn node(&self, at: f64) -> Option<Node> {
@@ -68,30 +73,36 @@ impl Hold<'_> {
         known.then_some(Node { at, h: ahead.value[0], slope: ahead.value[1] })
     }
 
-    /// What the prediction of h at `to` is off.
-    fn integration_error(&self, to: f64, h: f64, scratch: &mut [f64]) -> Option<f64> {
-        let half = to / 2.0;
+    /// What the prediction at the `last` node is off, of h and by its slope.
+    fn integration_error(&self, last: Node, scratch: &mut [f64]) -> Option<f64> {
+        let (to, half) = (last.at, last.at / 2.0);
         scratch.copy_from_slice(self.x);
         let mut ahead = Ahead::ZERO;
         let known = self.source.predict(scratch, self.u, half)
             && self.source.ahead(self.t + half, scratch, self.u, half, &mut ahead);
-        known.then(|| (ahead.value[0] - h).abs())
+        known.then(|| (ahead.value[0] - last.h).abs() + to * (ahead.value[1] - last.slope).abs())
     }
 
     fn between(&self, a: Node, b: Node, depth: u32) -> Option<Lowest> {
         let ends = Lowest { h: a.h, at: a.at }.or(Lowest { h: b.h, at: b.at });
         // A cubic leaves its ends by at most 4/27 of the way that each slope alone would take it.
         let moved = (b.at - a.at) * (a.slope.abs() + b.slope.abs()) * (4.0 / 27.0);
-        if ends.h < 0.0 || moved <= CLEAR * ends.h {
+        if ends.h < 0.0 || depth < DEPTH && moved <= CLEAR * ends.h {
             return Some(Lowest { h: ends.h - moved * f64::from(u8::from(ends.h >= 0.0)), ..ends });
         }
         let middle = self.node(0.5 * (a.at + b.at))?;
-        let foreseen = 0.5 * (a.h + b.h) + (b.at - a.at) * (a.slope - b.slope) / 8.0;
-        let off = (middle.h - foreseen).abs();
+        let length = b.at - a.at;
+        let foreseen = 0.5 * (a.h + b.h) + length * (a.slope - b.slope) / 8.0;
+        let slope = 1.5 * (b.h - a.h) / length - 0.25 * (a.slope + b.slope);
+        let off = (middle.h - foreseen).abs() + length / 4.0 * (middle.slope - slope).abs();
         let halves = dip(a, middle).or(dip(middle, b));
         let sure = halves.h - off / 16.0;
-        if middle.h < 0.0 || depth == 0 || sure >= 0.0 && off <= sure + CLEAR * ends.h {
-            return Some(Lowest { h: if halves.h < 0.0 { halves.h } else { sure }, ..halves });
+        // What is off must be small for the halves to be off by so much less; and once may be chance.
+        if middle.h < 0.0 || depth < DEPTH && sure >= off {
+            return Some(Lowest { h: if middle.h < 0.0 { halves.h } else { sure }, ..halves });
+        }
+        if depth == 0 {
+            return Some(Lowest { h: halves.h - off, ..halves });
         }
         let (left, right) = (self.between(a, middle, depth - 1)?, self.between(middle, b, depth - 1)?);
         Some(left.or(right))

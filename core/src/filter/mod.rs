@@ -68,8 +68,14 @@ impl Clone for FilterState {
 /// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
+/// Of steps in a row that do not meet a constraint, every such one looks far around for an input.
+const WIDE_EVERY: u32 = 64;
+
 /// Periods that differ by less than this part of them are one.
 const SAME_PERIOD: f64 = 1e-6;
+
+/// How much further from u_ref, or 1, an instant may move the input.
+const MUCH_FURTHER: f64 = 4.0;
 
 /// Scratch memory of a step; what it holds from the step before changes no bit of the next.
 struct Workspace {
@@ -296,6 +302,7 @@ impl SafetyFilter {
         }
 
         // Solve; where h would break its promise between the samples, once more with that instant as a row.
+        report.period = sampled.unwrap_or(0.0);
         if sampled.is_none() {
             conditions.clear();
         }
@@ -315,9 +322,12 @@ impl SafetyFilter {
             }
         }
         let last = self.state.time.map(|_| &self.state.input[..u.len()]);
+        // Where rows have not been met for some steps, looking far around at each would find what it found before.
+        let widens =
+            self.state.barriers.iter().all(|b| b.unmet.is_none_or(|unmet| unmet.steps % WIDE_EVERY == 0));
         let listed = conditions.len();
+        let (mut round, mut allowed) = (0, f64::INFINITY);
         let mut solution;
-        let mut round = 0;
         loop {
             let total = conditions.len().max(count);
             for (i, condition) in conditions.iter().enumerate() {
@@ -342,6 +352,7 @@ impl SafetyFilter {
                     correction_limit,
                     errors: &self.errors,
                     slopes: &slopes[..],
+                    widens,
                 };
                 problem.solve(rows, last, programme, u)
             });
@@ -360,13 +371,16 @@ impl SafetyFilter {
                 let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: held_from(i), u };
                 outlooks[i].look(&promises[i], &held, &reports[i].row.normal, hold, scratch);
             }
-            let met = matches!(solution.outcome, Outcome::Optimal);
+            // An input that turns the plant by many radians makes any prediction true.
+            let distance = u.iter().zip(u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+            let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
             if conditions.len() > listed && !met {
                 // That instant cannot be had as well: the flag says so.
                 conditions.truncate(listed);
                 round = ROUNDS;
                 continue;
             }
+            allowed = MUCH_FURTHER * u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
             let before = conditions.len();
             if round < ROUNDS && met && report.predicted {
                 for (i, outlook) in outlooks[..count].iter().enumerate() {
@@ -420,7 +434,8 @@ impl SafetyFilter {
             }
         }
         if blocked {
-            report.find_deadlocks(t, &next.barriers, programme.active());
+            let barrier = |row: usize| conditions.get(row).map_or(row, |condition| condition.channel);
+            report.find_deadlocks(t, &next.barriers, programme.active(), barrier);
         }
         Ok(())
     }
@@ -692,10 +707,12 @@ impl Outlook {
         let is_clear = |hold: f64| {
             self.n > 1 && h > 0.0 && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
         };
-        let begins = from < hold;
+        // The deadline at the very end of the hold is within it.
+        let begins = from <= hold * (1.0 + SAME_PERIOD);
         if !begins || is_clear(hold) {
             return;
         }
+        let from = from.min(hold);
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));

@@ -209,12 +209,20 @@ impl Report {
     }
 
     /// Finds which of the `active` rows blocks the barriers that are not met, and whether that is a deadlock.
-    pub(super) fn find_deadlocks(&mut self, t: f64, promises: &[FixedTimeState], active: &[Active]) {
+    /// `barrier` is the number of the barrier that a row belongs to.
+    pub(super) fn find_deadlocks(
+        &mut self,
+        t: f64,
+        promises: &[FixedTimeState],
+        active: &[Active],
+        barrier: impl Fn(usize) -> usize,
+    ) {
         for i in 0..self.barriers.len() {
             let Some(unmet) = promises[i].unmet else { continue };
             let (normal, mut worst, mut blocked_by) = (self.barriers[i].row.normal, 0.0, None);
             for active in active {
-                let Constraint::Row(j) = active.constraint else { continue };
+                let Constraint::Row(row) = active.constraint else { continue };
+                let j = barrier(row);
                 let other = &self.barriers[j].row.normal;
                 let cosine = dot(&normal, other) / (dot(&normal, &normal) * dot(other, other)).sqrt();
                 if j != i && cosine < worst {

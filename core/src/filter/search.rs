@@ -90,6 +90,8 @@ pub(super) struct Held<'a> {
     pub(super) errors: &'a MeasurementErrors,
     /// How the derivatives of h at `t` change with each error, one barrier after the other.
     pub(super) slopes: &'a [Slopes],
+    /// Whether to look far around for an input where the pointwise rows cannot be met either.
+    pub(super) widens: bool,
 }
 
 /// Models of the sampled rows, and how far each is from being met at the present u, in units of its terms.
@@ -188,9 +190,14 @@ impl Held<'_> {
         let mut best = best?;
         // An input that far out turns the plant by an angle: there the rows have other answers, which steps that
         // contract do not see.
-        let size = self.u_ref.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
+        let known = self.u_ref.iter().chain(last.into_iter().flatten());
+        let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
-        if !settled && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme) {
+        let widens = self.widens || best.is_met(soft) || first.outcome == Outcome::Optimal;
+        if !settled
+            && widens
+            && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme)
+        {
             (best, at_best) = (found, false);
         }
         at_best &= settled;

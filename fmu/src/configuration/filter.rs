@@ -125,6 +125,10 @@ pub struct FilterConfiguration {
     /// Jacobi master. The state is predicted over it. Default 0.
     #[serde(default)]
     pub actuation_delay: f64,
+    /// The longest time in s between two steps, ≥ 0: the promises then hold for steps of any length up to it. Default 0:
+    /// as long as each step says, or the ones before were.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub period_max: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
     /// reported as degenerate. Default 1e6.
     #[serde(default = "correction_limit")]
@@ -146,6 +150,10 @@ pub struct FilterConfiguration {
     /// The run it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn yes() -> bool {
@@ -377,6 +385,7 @@ impl FilterConfiguration {
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
             .and_then(|b| b.actuation_delay(self.actuation_delay))
+            .and_then(|b| if self.period_max == 0.0 { Ok(b) } else { b.period_max(self.period_max) })
             .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
             .and_then(|b| b.measurement_errors(&errors))
             .and_then(FilterBuilder::build)
