@@ -19,7 +19,8 @@ pub(crate) fn judge<'py>(
     if let Some(deadline) = deadline.filter(|deadline| deadline.is_nan() || *deadline <= 0.0) {
         return Err(PyValueError::new_err(format!("deadline: is {deadline}, must be > 0")));
     }
-    let straight = over_seconds(&units.0, 1) == units.1;
+    let (of_h, of_slack) = units;
+    let straight = over_seconds(&of_h, 1) == of_slack;
     let mut judge = Judge::new(deadline, if straight { Course::Straight } else { Course::Smooth });
     let mut started = false;
     for (t, h, phase, lost, status) in rows {

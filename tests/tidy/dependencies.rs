@@ -177,6 +177,7 @@ fn modules_of_the_core_use_modules_above_them() {
         &["filter"],
         &["plants", "barriers", "baselines", "nominal"],
         &["simulation"],
+        &["judge"],
         &["effort"],
     ]);
     Order { folder: "core/src/", lines, excepted: &[] }.check();

@@ -419,13 +419,8 @@ impl BarrierSection {
             None => "how fast h may go to the margin; 0: what the bounds can brake, at most 0.5 / step",
         };
         row("rate", "1/s", non_negative, meaning, |b| &mut b.rate);
-        row(
-            "stay_rate",
-            "1/s",
-            non_negative,
-            "rate of the constraint that keeps it inside; 0: as rate",
-            |b| &mut b.stay_rate,
-        );
+        let meaning = "rate of the constraint that keeps it inside; 0: as rate";
+        row("stay_rate", "1/s", non_negative, meaning, |b| &mut b.stay_rate);
         row("margin", unit, non_negative, "h to arrive and stay above", |b| b.margin.get_or_insert(0.0));
         row("recovery", "s", non_negative, "deadline for coming back after leaving; 0: none", |b| {
             &mut b.recovery
@@ -459,13 +454,8 @@ impl BarrierSection {
             row("radius", "m", positive, "radius of the disc", |b| b.radius.get_or_insert(0.0));
         }
         if self.shape.has(Field::Smoothing) {
-            row(
-                "smoothing",
-                "m",
-                non_negative,
-                "rounding of the distance at the centre; 0: the radius",
-                |b| b.smoothing.get_or_insert(0.0),
-            );
+            let meaning = "rounding of the distance at the centre; 0: the radius";
+            row("smoothing", "m", non_negative, meaning, |b| b.smoothing.get_or_insert(0.0));
         }
         if self.shape.has(Field::HalfAxes) {
             row("half_axes[1]", "m", positive, "half axis at the angle", |b| first(&mut b.half_axes));
@@ -487,18 +477,6 @@ impl BarrierSection {
             row("bound", unit, range, "the bound", |b| b.bound.get_or_insert(0.0));
         }
         rows
-    }
-
-    /// The position in m at which h is largest, on a plant with a name; `None` where that is not known.
-    pub(super) fn inmost(&self) -> Option<[f64; 2]> {
-        match self.shape {
-            ShapeName::Disc | ShapeName::QuadraticDisc | ShapeName::Ellipse | ShapeName::Rectangle => {
-                self.centre
-            }
-            // At rest, wherever that is.
-            ShapeName::SpeedLimit => Some([0.0; 2]),
-            _ => None,
-        }
     }
 
     /// The settings of its promise; 0 means "as the others say".

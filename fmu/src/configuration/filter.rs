@@ -74,6 +74,18 @@ impl Visitor for Adding<'_> {
     }
 }
 
+/// The position in m at which h of `section` is largest, on a plant with a name; `None` where that is not known.
+fn inmost(section: &BarrierSection) -> Option<[f64; 2]> {
+    match section.shape {
+        ShapeName::Disc | ShapeName::QuadraticDisc | ShapeName::Ellipse | ShapeName::Rectangle => {
+            section.centre
+        }
+        // At rest, wherever that is.
+        ShapeName::SpeedLimit => Some([0.0; 2]),
+        _ => None,
+    }
+}
+
 /// Why a filter cannot have `model`, which is not affine in its inputs.
 fn not_affine(model: ModelName) -> ConfigurationError {
     let (angle, advice) = match model {
@@ -251,7 +263,7 @@ impl FilterConfiguration {
         x.extend(self.barrier_inputs().iter().map(|input| input.start));
         let mut h = vec![0.0; self.barrier.len()];
         for (i, section) in self.barrier.iter().enumerate() {
-            let Some(centre) = section.inmost() else { continue };
+            let Some(centre) = inmost(section) else { continue };
             x[..2].copy_from_slice(&centre);
             let named = |e: punctual_core::Error| ConfigurationError::new(e.field(), e.message());
             filter.barrier_values(0.0, &x, &mut h).map_err(named)?;
