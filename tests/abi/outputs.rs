@@ -217,7 +217,7 @@ fn parameters_in_every_mode_before_the_steps() {
         slave.snapshot();
         set(2);
         let mut configuration = fmu.filter().clone();
-        configuration.barrier[0].deadline = 4.0;
+        configuration.barrier[0].deadline = Some(4.0);
         configuration.barrier[0].centre = Some([45.0, 30.0]);
         configuration.bounds.get_mut("u_x").unwrap()[1] = 3.0;
         let mut filter = configuration.build().unwrap();

@@ -72,7 +72,8 @@ where
             .barrier("goal", model, barrier, settings)
             .and_then(|b| b.build())
             .expect("a valid filter");
-        let steps = (2.0 * settings.deadline / STEP).round() as usize;
+        let deadline = settings.deadline.expect("a deadline");
+        let steps = (2.0 * deadline / STEP).round() as usize;
         let (mut arrival, mut outside) = (None, false);
         let schedule = Schedule { step: STEP, steps, substeps: 2 };
         closed_loop(
@@ -85,12 +86,12 @@ where
                 let b = &report.barriers[0];
                 arrival = b.arrival_time;
                 // Half a step early, so that round-off in t cannot skip the sample at the deadline.
-                outside |= t > settings.deadline - STEP / 2.0 && b.h < 0.0;
+                outside |= t > deadline - STEP / 2.0 && b.h < 0.0;
                 failures.unmet += usize::from(!report.status.is_satisfied());
             },
         )
         .expect("a valid schedule");
-        failures.late += usize::from(arrival.is_none_or(|t| t > settings.deadline));
+        failures.late += usize::from(arrival.is_none_or(|t| t > deadline));
         failures.outside += usize::from(outside);
     }
     failures

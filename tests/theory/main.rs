@@ -131,7 +131,8 @@ where
         .expect("valid filter");
     let mut run =
         Run { arrival: None, least_after: f64::INFINITY, peak: 0.0, peak_to_arrival: 0.0, satisfied: true };
-    let schedule = Schedule { step, steps: (2.0 * settings.deadline / step).round() as usize, substeps: 1 };
+    let deadline = settings.deadline.expect("a deadline");
+    let schedule = Schedule { step, steps: (2.0 * deadline / step).round() as usize, substeps: 1 };
     closed_loop(&mut filter, plant, x0.into(), schedule, nominal, |t, _, u, report| {
         let b = &report.barriers[0];
         run.arrival = b.arrival_time;
@@ -141,7 +142,7 @@ where
         }
         run.satisfied &= report.status.is_satisfied();
         // Half a step early, so that round-off in t cannot skip the sample at the deadline.
-        if t > settings.deadline - step / 2.0 {
+        if t > deadline - step / 2.0 {
             run.least_after = run.least_after.min(b.h);
         }
     })

@@ -413,8 +413,9 @@ impl FixedTime {
             None => f64::INFINITY,
         };
         let brakes = COMFORTABLE * (means.drift + means.reach);
-        let by_brakes = match brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
-            true => (brakes / h[0]).powf(1.0 / N as f64),
+        let by_brakes = match N <= 2 && brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
+            true if N == 1 => brakes / h[0],
+            true => (brakes / h[0]).sqrt(),
             false if by_time.is_finite() => by_time,
             false => FixedTimeSettings::DEFAULT_KEEP_RATE,
         };

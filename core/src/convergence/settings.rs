@@ -63,8 +63,8 @@ pub struct FixedTimeSettings {
     /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
     pub rates: Option<Operator>,
     /// a of the stay constraint in 1/s, finite, > 0; a larger one is taken where it must be
-    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T; where inputs have bounds at most what braking with
-    /// half of them allows, (b/2e)^{1/n}; without a deadline that alone, and 2/s without bounds.
+    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T; where inputs have bounds and n ≤ 2 at most
+    /// what braking with half of them allows, (b/2e)^{1/n}; without a deadline that alone, else 2/s.
     pub stay_rate: Option<f64>,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. What held inputs are expected
     /// to cost comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.

@@ -115,6 +115,12 @@ pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 /// would just do. (With the smallest rate it takes ė²/e.)
 const OVER_SMALLEST: f64 = 1.5;
 
+/// The part of the margin that is enough to keep the gentle rate.
+const ENOUGH: f64 = 0.5;
+
+/// The part of the largest influence on h since the anchor from which on it counts as full.
+const FULL_WEIGHT: f64 = 0.25;
+
 /// Where no period limits the rate: this many times what is asked for.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
@@ -122,44 +128,49 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 /// needed where they do not.
 ///
 /// 1. The margin is the one asked for, or what is affordable at the largest rate that samples can follow.
-/// 2. The rate is `base`, or 1.5 times the smallest that will do.
+/// 2. The rate is `base` where that affords half the margin; else the smallest that will do, for n = 2 1.5 times that.
 /// 3. It is raised where the input cannot give what it asks for: beyond what bounds allow (`means.reach`), and where h
 ///    can hardly be influenced (`means.weight`), by as much as the plant itself pulls h⁽ⁿ⁾ down there. At the centre of
 ///    a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
 pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
-    let affordable = affordable_margin(limit, h);
-    let (is_invariant_at_limit, kept) = (affordable >= 0.0, affordable.clamp(0.0, margin));
+    // What small dips have taken of the margin does not change the rate.
+    let at_base = affordable_margin(base, h);
+    let is_gentle = at_base >= ENOUGH * margin;
+    let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
+    let kept = affordable.clamp(0.0, margin);
     let mut e = [0.0; crate::MAX_RELATIVE_DEGREE];
     e[..h.len()].copy_from_slice(h);
     e[0] -= kept;
     let e = &e[..h.len()];
-    if !is_invariant_at_limit {
+    let is_invariant = affordable >= 0.0;
+    if !is_invariant {
         // As hard as it must be where that can be said, beyond what samples can follow.
         let rate = smallest_rate(e).map_or(limit, |rate| rate.max(base));
-        return Keep { rate, margin: kept, pull: 0.0, is_invariant: false };
+        return Keep { rate, margin: kept, pull: 0.0, is_invariant };
     }
-    let gentle = match is_invariant(base / OVER_SMALLEST, e) {
-        true => base,
-        false => smallest_rate(e).map_or(limit, |rate| OVER_SMALLEST * rate).clamp(base, limit),
-    };
+    let over_smallest = if h.len() == 2 { OVER_SMALLEST } else { 1.0 };
+    let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
+    let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
     let wanted = floor(gentle);
     // What the plant pulls down is left to later where h can hardly be influenced.
     let relieved = means.drift.min(0.0) + wanted.max(0.0);
-    let target =
-        if wanted > relieved { relieved + means.weight.powi(2) * (wanted - relieved) } else { wanted };
+    let strength = (means.weight / FULL_WEIGHT).min(1.0).powi(2);
+    let target = if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted };
     let possible = means.drift + means.reach;
     let target = target.min(possible);
-    let rate = match wanted <= target {
-        true => gentle,
-        false if floor(limit) > target => limit,
-        false => first(gentle, limit, |rate| floor(rate) <= target),
+    let rate = if wanted <= target {
+        gentle
+    } else if floor(limit) > target {
+        limit
+    } else {
+        first(gentle, limit, |rate| floor(rate) <= target)
     };
     let spare = if rate == gentle { (possible - wanted).max(0.0) } else { 0.0 };
     let pull = (base.powi(h.len() as i32) * (margin - kept)).min(spare);
-    Keep { rate, margin: kept, pull, is_invariant: true }
+    Keep { rate, margin: kept, pull, is_invariant }
 }
 
 #[cfg(test)]
