@@ -11,110 +11,13 @@ use super::profile::{self, Derivatives, Hermite, LowPeak, Profile, ProfileError}
 use super::repeated_root::{self, NoAdmissibleRate};
 use super::sampled;
 use super::settings::{FixedTimeSettings, Method, ProfileKind};
+use super::state::{FixedTimeState, Phase};
 use super::stay::{self, Means};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, positive};
 
 /// Round-off of h − μ − r, as a part of its terms.
 const MARGIN_TOLERANCE: f64 = 1e-12;
-
-/// Where a barrier stands with its promise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Phase {
-    /// Not anchored yet: no valid sample has been seen.
-    #[default]
-    Waiting = 0,
-    /// On the way, before the deadline.
-    Approach = 1,
-    /// The deadline passed outside the safe set; the approach goes on.
-    Late = 2,
-    /// To be kept: inside, from the start or since it has been reached, under the stay constraint.
-    Stay = 3,
-    /// Outside again after having been inside, with no recovery time set, or outside from the start without a
-    /// deadline; the stay constraint pulls back, without a deadline.
-    Left = 4,
-    /// Released: nothing is asked any more ([`End`](crate::filter::End)).
-    Released = 5,
-}
-
-/// What is remembered between samples: plain data, all that a snapshot needs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FixedTimeState {
-    /// Where the barrier stands.
-    pub phase: Phase,
-    /// Time in s of the sample from which its window counts ([`Begin`](crate::filter::Begin)).
-    pub start_time: Option<f64>,
-    /// Time of the anchor, t₀ in s.
-    pub anchor_time: f64,
-    /// T in s, counted from the anchor; infinite where there is none.
-    pub deadline: f64,
-    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
-    pub recoveries: u32,
-    /// How often a deadline that the input bounds do not allow was given up for a later one
-    /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
-    pub postponed: u32,
-    /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
-    pub anchor: Stack,
-    /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
-    pub rate: f64,
-    /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`]).
-    pub stay_rate: f64,
-    /// The margin of the stay constraint in the unit of h, and what leads back to `margin`, `[h]`/sⁿ: chosen there too.
-    pub stay_margin: f64,
-    /// See `stay_margin`.
-    pub pull: f64,
-    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor.
-    pub gain: f64,
-    /// μ in the unit of h, chosen at the anchor: the settings' margin and what held inputs cost.
-    pub margin: f64,
-    /// The sampling period in s that was accounted for at the anchor, 0 for none.
-    pub period: f64,
-    /// Whether the method could not be used from this anchor and another took its place
-    /// ([`FixedTime::refusal`] says why).
-    pub fallback: bool,
-    /// Time in s of the first sample with h ≥ 0 since the anchor.
-    pub arrival: Option<f64>,
-    /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
-    /// Whoever enforces the row clears this where it is not met, or where the held input breaks the promise on the way.
-    pub guaranteed: bool,
-    /// The steps in a row that did not meet its constraint, until now.
-    pub unmet: Option<Unmet>,
-}
-
-/// Steps in a row that did not meet a constraint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unmet {
-    /// How many, ≥ 1.
-    pub steps: u32,
-    /// Time in s of the first, or of the last progress since: a rise of h by a hundredth of its size.
-    pub since: f64,
-    /// h then, in its own unit.
-    pub h: f64,
-}
-
-impl Unmet {
-    const PROGRESS: f64 = 0.01;
-
-    /// With one more step, at time `t` with the value `h`.
-    pub(crate) fn after(before: Option<Self>, t: f64, h: f64) -> Self {
-        match before {
-            None => Self { steps: 1, since: t, h },
-            Some(unmet) => {
-                let steps = unmet.steps.saturating_add(1);
-                let progress = h - unmet.h > Self::PROGRESS * unmet.h.abs();
-                if progress { Self { steps, since: t, h } } else { Self { steps, ..unmet } }
-            }
-        }
-    }
-}
-
-impl FixedTimeState {
-    /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.
-    pub fn was_inside(&self) -> bool {
-        self.phase != Phase::Waiting && self.anchor[0] + self.margin >= 0.0
-    }
-}
 
 /// What the constraint asks for at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

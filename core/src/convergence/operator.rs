@@ -135,7 +135,7 @@ impl Operator {
         for i in 0..self.n {
             let margin = cascade[0] / product;
             // Not `f64::min`, which would drop what is not a number.
-            if !(margin >= least) {
+            if margin < least || margin.is_nan() {
                 least = margin;
             }
             for j in 0..self.n - 1 - i {

@@ -31,9 +31,10 @@
 //! the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
-use super::fixed_time::{FixedTime, FixedTimeState, Phase};
+use super::fixed_time::FixedTime;
 use super::profile::Profile;
 use super::settings::Method;
+use super::state::{FixedTimeState, Phase};
 use crate::MAX_RELATIVE_DEGREE;
 
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.

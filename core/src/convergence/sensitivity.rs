@@ -14,10 +14,11 @@
 //! profile a kink, it is the derivative of the piece in force.
 
 use super::comparison::{Stack, binomial, lower_terms};
-use super::fixed_time::{FixedTime, FixedTimeState, Phase};
+use super::fixed_time::FixedTime;
 use super::profile::Derivatives;
 use super::sampled::SampledDemand;
 use super::settings::Method;
+use super::state::{FixedTimeState, Phase};
 use super::{repeated_root, sampled};
 use crate::MAX_RELATIVE_DEGREE;
 

@@ -70,7 +70,7 @@ pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
         power *= rate;
         let margin = scaled_coefficient(rate, h, k) / power;
         // Not `f64::min`, which would drop what is not a number.
-        if !(margin >= least) {
+        if margin < least || margin.is_nan() {
             least = margin;
         }
     }

@@ -84,7 +84,7 @@ fn measured(state: &FilterState, t: f64, first: f64) -> f64 {
     let passed = t - last;
     match state.period {
         // A sample at the same time, or an earlier one, says nothing new.
-        known if !(passed > 0.0) => known.unwrap_or(first),
+        known if passed <= 0.0 => known.unwrap_or(first),
         Some(known) => passed.min(GROWTH * known).max(known - FORGOTTEN * passed),
         None if passed < TINY * first => first,
         None => passed,
