@@ -24,7 +24,7 @@ use crate::product::Product;
 const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// To be raised with every change of the layout. (The GUID changes with the version of the library.)
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;

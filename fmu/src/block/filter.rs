@@ -63,8 +63,6 @@ impl FilterBlock {
     fn sample(&mut self, t: f64, step: Option<f64>, values: &mut Values) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
-        // The master says how long its step is.
-        self.filter.expect_hold(step.filter(|h| *h > 0.0)).map_err(|e| e.to_string())?;
         let [x, u_ref] = self.inputs(&values.reals);
         let (filter, u) = (&mut self.filter, &mut self.u);
         let mut integrated = self.integrator.as_ref().map_or(0.0, Integrator::value);
@@ -159,7 +157,6 @@ impl Block for FilterBlock {
     ) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = self.hold();
-        self.filter.expect_hold(None).map_err(|e| e.to_string())?;
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
         let (filter, change) = (&mut self.filter, &mut self.change);
         let unknown = match &mut self.integrator {

@@ -138,7 +138,7 @@ pub struct FilterConfiguration {
     #[serde(default)]
     pub actuation_delay: f64,
     /// The longest time in s between two steps, ≥ 0: the promises then hold for steps of any length up to it. Default 0:
-    /// as long as each step says, or the ones before were.
+    /// as long as the ones before were.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub period_max: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
