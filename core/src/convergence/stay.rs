@@ -118,9 +118,6 @@ const OVER_SMALLEST: f64 = 1.5;
 /// The part of the margin that is enough to keep the gentle rate.
 const ENOUGH: f64 = 0.5;
 
-/// The part of the largest influence on h since the anchor from which on it counts as full.
-const FULL_WEIGHT: f64 = 0.25;
-
 /// Where no period limits the rate: this many times what is asked for.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
@@ -157,7 +154,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let wanted = floor(gentle);
     // What the plant pulls down is left to later where h can hardly be influenced.
     let relieved = means.drift.min(0.0) + wanted.max(0.0);
-    let strength = (means.weight / FULL_WEIGHT).min(1.0).powi(2);
+    let strength = means.weight.powi(2);
     let target = if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted };
     let possible = means.drift + means.reach;
     let target = target.min(possible);

@@ -3,17 +3,17 @@
 //! Let η(s) = h(t + s) along the model under the held input. Between two instants a < b at which η and η̇ are known, the
 //! cubic through them is off by at most max|η⁗| (b − a)⁴/384, and most in the middle. So the interval is halved, and what
 //! the cubic is off there bounds what the cubics of the halves, each off by a sixteenth of it, leave open. Where that is
-//! not enough to decide, the halves are looked at in turn, down to 1/64 of the hold.
+//! not enough to decide, the halves are looked at in turn, down to 1/256 of the hold.
 //!
 //! The model is integrated anew up to each instant. What its own steps are off at the end of the hold is seen by going
 //! there in twice as many, and counted too. That the fourth derivative of η does not change its size within a part is
-//! assumed, so an η that swings many times within one 64th of the hold can be missed; one that swings within the hold shows
+//! assumed, so an η that swings many times within one 256th of the hold can be missed; one that swings within the hold shows
 //! as slopes that do not fit its values.
 
 use crate::lie::{Ahead, DerivativeSource};
 
 /// Halvings of the hold.
-const DEPTH: u32 = 6;
+const DEPTH: u32 = 8;
 
 /// The part of h at an instant that η may lose on the way to the next before the interval is looked at more closely.
 const CLEAR: f64 = 0.5;

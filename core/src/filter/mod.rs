@@ -380,7 +380,11 @@ impl SafetyFilter {
                 round = ROUNDS;
                 continue;
             }
-            allowed = MUCH_FURTHER * u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
+            // With n = 1 the model hardly turns, and an instant soon after the sample takes what it takes.
+            let turns = outlooks[..count].iter().any(|outlook| outlook.n > 1 && outlook.lowest.is_some());
+            if turns {
+                allowed = MUCH_FURTHER * u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
+            }
             let before = conditions.len();
             if round < ROUNDS && met && report.predicted {
                 for (i, outlook) in outlooks[..count].iter().enumerate() {
