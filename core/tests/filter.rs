@@ -175,7 +175,7 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
             // The first step does not know the period yet and takes a hundredth of the deadline for it.
             // What rounding takes from the margin in force is given back by and by.
             assert!(
-                (b.profile - b.margin).abs() < 1e-6 && (0.0..1e-3).contains(&(b.margin - margin)),
+                (b.profile - b.margin).abs() < 1e-5 && (0.0..1e-3).contains(&(b.margin - margin)),
                 "{b:?}"
             );
         }
