@@ -33,7 +33,7 @@ pub struct FixedTimeState {
     pub anchor_time: f64,
     /// T in s, counted from the anchor; infinite where there is none.
     pub deadline: f64,
-    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`]).
+    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
     /// How often a deadline that the input bounds do not allow was given up for a later one
     /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
@@ -42,7 +42,7 @@ pub struct FixedTimeState {
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
     pub rate: f64,
-    /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`]).
+    /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`](super::stay::keep)).
     pub stay_rate: f64,
     /// The margin of the stay constraint in the unit of h, and what leads back to `margin`, `[h]`/sⁿ: chosen there too.
     pub stay_margin: f64,
@@ -55,7 +55,7 @@ pub struct FixedTimeState {
     /// The sampling period in s that was accounted for at the anchor, 0 for none.
     pub period: f64,
     /// Whether the method could not be used from this anchor and another took its place
-    /// ([`FixedTime::refusal`] says why).
+    /// ([`FixedTime::refusal`](super::FixedTime::refusal) says why).
     pub fallback: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
