@@ -32,7 +32,7 @@ centre = [12.0, 4.5]
 centre_input = true
 radius = 1.5
 deadline = 2.0
-stay_rate = 10.0
+stay_rate = 1.0
 "#;
 
 const HEADING: &str = r#"

@@ -19,16 +19,16 @@ fn system() -> String {
     crate::running::system(&[("step = 0.001", STEP), ("stop_time = 20.0", "stop_time = 12.0")])
 }
 
-/// A campaign of `runs` runs over starts and bounds: 1 m/s2 is too little, 20 is enough, and a lower bound
-/// above the upper one is refused.
+/// A campaign of `runs` runs over starts and bounds: 0.1 m/s2 both ways is too little, 20 either way is
+/// enough, and a lower bound above the upper one is refused.
 fn file(runs: u64, sampling: &str) -> String {
     format!(
         "system = \"system.toml\"\n[campaign]\nruns = {runs}\nseed = 7\nsampling = \"{sampling}\"\n\
          [vary.\"plant.x0.x_p\"]\ndistribution = \"uniform\"\nmin = 0\nmax = 20\n\
          [vary.\"plant.x0.v\"]\ndistribution = \"normal\"\nmean = 0\ndeviation = 2\n\
          [vary.\"plant.inner_step\"]\ndistribution = \"choice\"\nvalues = [0.05]\n\
-         [vary.\"filter.u_min.a\"]\ndistribution = \"choice\"\nvalues = [-20, -20, -20, 30]\n\
-         [vary.\"filter.u_max.a\"]\ndistribution = \"choice\"\nvalues = [1, 20, 20]\n"
+         [vary.\"filter.u_min.a\"]\ndistribution = \"choice\"\nvalues = [-20, -0.1, -0.1, 30]\n\
+         [vary.\"filter.u_max.a\"]\ndistribution = \"choice\"\nvalues = [0.1, 0.1, 20]\n"
     )
 }
 
@@ -249,7 +249,7 @@ fn a_campaign_can_be_ended_at_any_point() {
         (report["success"]["count"].as_u64(), report["runs"].as_u64()),
         (Some(count as u64), Some(MANY))
     );
-    // A third of the bounds is too little, a quarter contradicts: half succeed at most, which is
+    // A third of the bounds is too little, a quarter contradicts: half succeed at most, to
     // 1/√(4·120) = 0.046 for 120 runs; five of these.
     let rate = count as f64 / MANY as f64;
     assert!(rate > 0.0 && rate < 0.5 + 5.0 * 0.046, "{rate}");
