@@ -32,7 +32,7 @@ centre = [12.0, 4.5]
 centre_input = true
 radius = 1.5
 deadline = 2.0
-stay_rate = 1.0
+stay_rate = 10.0
 "#;
 
 const HEADING: &str = r#"
@@ -113,8 +113,8 @@ fn compare(slave: &Slave, values: &[f64], when: &str) {
 
 #[test]
 fn of_a_filter_in_every_mode_that_has_them() {
-    let goal = [30.0, 22.0, 3.0, 4.0, 1.0, -1.0];
-    let traffic = [8.0, 2.0, 0.3, 3.0, 12.0, 4.5, -0.5, 0.2, 2.0, 0.5];
+    let goal = [30.0, 22.0, 3.0, 4.0, -1.0, -1.5];
+    let traffic = [8.0, 2.0, 0.3, 3.0, 12.0, 4.5, -0.5, 0.2, -3.5, 0.5];
     let external = [-30.0, 3.0, -0.5, 0.8, -0.6, -1.0, 1.0];
     let steered = [3.0, -2.0, 0.45, 2.0, -0.5, 0.1];
     for (configuration, values) in
