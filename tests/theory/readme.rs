@@ -142,6 +142,14 @@ fn table_of_the_readme_drawn_at_random() {
     for found in worst.iter().take(3) {
         println!("\nFound::draw({}): {:?}\n{:?}\n{:?}", found.seed, found.promise, found.peaks, found.case);
     }
+    let mut hardest: Vec<&Found> = found.iter().filter(|f| f.case.bounds[0].is_infinite()).collect();
+    hardest.sort_by(|a, b| b.peaks[1].total_cmp(&a.peaks[1]));
+    for found in hardest.iter().take(5) {
+        println!(
+            "\npeaks {:.1?}, {:.1?}: Found::draw({}), {:?}",
+            found.peaks, found.largest, found.seed, found.case
+        );
+    }
     for found in &found {
         // Drawn bounds may not allow to stop inside: then nothing may be promised.
         let stays = !found.promise.out_after_arrival || found.case.bounds[0].is_finite();

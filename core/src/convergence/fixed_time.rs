@@ -270,7 +270,11 @@ impl FixedTime {
             Phase::Stay => Phase::Stay,
             Phase::Left if is_inside => Phase::Stay,
             // Until then the approach goes on; from the deadline on it keeps h ≥ 0 too, with r = 0.
-            Phase::Approach if keeps(state.margin) => Phase::Stay,
+            Phase::Approach if keeps(state.margin) => {
+                // How h can be influenced far outside says nothing of how it can be here.
+                state.gain *= means.weight;
+                Phase::Stay
+            }
             Phase::Late if is_inside => Phase::Stay,
             Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
             other => other,
@@ -290,7 +294,9 @@ impl FixedTime {
         let means = Means { drift, ..*means };
         let keep = stay::keep(lowest, state.margin, self.base_rate(lowest, &means), &means);
         (state.stay_rate, state.stay_margin, state.pull) = (keep.rate, keep.margin, keep.pull);
-        state.guaranteed = keep.is_invariant;
+        // Errors are bounded to first order; what is left of the margin is for the rest.
+        state.guaranteed =
+            keep.is_invariant && (lowest[..] == h[..N] || keep.margin >= stay::ENOUGH * state.margin);
         (keep.pull - lower_terms(keep.rate, &from_margin::<N>(h, keep.margin)), keep.margin)
     }
 
@@ -471,7 +477,8 @@ impl FixedTime {
         let can = self.settings.method == Method::ReferenceProfile
             && self.own.is_none()
             && self.condition.is_none();
-        if !lost || !can || left < (SAMPLES * period).max(PART * self.deadline()) {
+        // Without a period inputs are not held, or not known to be: there is no theorem to win back.
+        if !lost || !can || period <= 0.0 || left < (SAMPLES * period).max(PART * self.deadline()) {
             return false;
         }
         let FixedTimeState { arrival, gain, .. } = *state;

@@ -28,7 +28,7 @@
 //! **Any margin will do.** With e = h − μ all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n: the least of them,
 //! [`affordable_margin`], is the largest margin with which the lemma holds.
 
-use super::comparison::{lower_terms, scaled_coefficient};
+use super::comparison::{Stack, lower_terms, scaled_coefficient};
 use super::polynomial::first;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
@@ -116,7 +116,7 @@ pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 const OVER_SMALLEST: f64 = 1.5;
 
 /// The part of the margin that is enough to keep the gentle rate.
-const ENOUGH: f64 = 0.5;
+pub(super) const ENOUGH: f64 = 0.5;
 
 /// Where no period limits the rate: this many times what is asked for.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
@@ -151,23 +151,44 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
     let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
-    let wanted = floor(gentle);
-    // What the plant pulls down is left to later where h can hardly be influenced.
-    let relieved = means.drift.min(0.0) + wanted.max(0.0);
-    let strength = means.weight.powi(2);
-    let target = if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted };
     let possible = means.drift + means.reach;
-    let target = target.min(possible);
-    let rate = if wanted <= target {
-        gentle
-    } else if floor(limit) > target {
-        limit
-    } else {
-        first(gentle, limit, |rate| floor(rate) <= target)
+    // What the plant pulls down is left to later where h can hardly be influenced, or comes back to it by itself.
+    let strength = means.weight.powi(2) * outwards(e, base);
+    let target = |wanted: f64| {
+        let relieved = means.drift.min(0.0) + wanted.max(0.0);
+        possible.min(if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted })
     };
-    let spare = if rate == gentle { (possible - wanted).max(0.0) } else { 0.0 };
-    let pull = (base.powi(h.len() as i32) * (margin - kept)).min(spare);
+    let wanted = floor(gentle);
+    let most = target(wanted);
+    let rate = if wanted <= most {
+        gentle
+    } else {
+        // At the end of the hold too: until then h hardly follows an input.
+        let ahead = ahead(e, most, means.hold);
+        let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
+        if is_met(limit) { first(gentle, limit, is_met) } else { limit }
+    };
+    // The gentle rate with all of the margin, as far as that is possible.
+    let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
+    let pull = if kept < margin { (target(back) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
+}
+
+/// For n = 2 how much of e is being lost: 0 where ė ≥ a e, 1 where ė ≤ 0.
+fn outwards(e: &[f64], rate: f64) -> f64 {
+    let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
+    // Not `clamp`, which keeps what is not a number: 0/0 at rest on the boundary.
+    if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
+}
+
+/// The derivatives `e`, `hold` s later, with e⁽ⁿ⁾ = `highest`.
+fn ahead(e: &[f64], highest: f64, hold: f64) -> Stack {
+    let mut ahead = [0.0; crate::MAX_RELATIVE_DEGREE];
+    for j in 0..e.len() {
+        // Horner's scheme, from the highest derivative.
+        ahead[j] = (j..e.len()).rev().fold(highest, |sum, i| e[i] + sum * hold / (i + 1 - j) as f64);
+    }
+    ahead
 }
 
 #[cfg(test)]
