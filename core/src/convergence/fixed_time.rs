@@ -292,11 +292,17 @@ impl FixedTime {
     ) -> (f64, f64) {
         let drift = means.drift - self.settings.disturbance;
         let means = Means { drift, ..*means };
-        let keep = stay::keep(lowest, state.margin, self.base_rate(lowest, &means), &means);
+        let keep_from = |h: &[f64; N]| stay::keep(h, state.margin, self.base_rate(h, &means), &means);
+        let is_exact = lowest[..] == h[..N];
+        let mut keep = keep_from(&from_fn(|k| h[k]));
+        let is_kept = |rate: f64| stay::affordable_margin(rate, lowest) >= 0.0;
+        if !is_exact && !is_kept(keep.rate) {
+            keep = keep_from(lowest);
+        }
         (state.stay_rate, state.stay_margin, state.pull) = (keep.rate, keep.margin, keep.pull);
         // Errors are bounded to first order; what is left of the margin is for the rest.
-        state.guaranteed =
-            keep.is_invariant && (lowest[..] == h[..N] || keep.margin >= stay::ENOUGH * state.margin);
+        let is_covered = || is_kept(keep.rate) && keep.margin >= stay::ENOUGH * state.margin;
+        state.guaranteed = keep.is_invariant && (is_exact || is_covered());
         (keep.pull - lower_terms(keep.rate, &from_margin::<N>(h, keep.margin)), keep.margin)
     }
 

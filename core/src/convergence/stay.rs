@@ -124,11 +124,13 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 /// How to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): `margin` μ and rate `base` > 0 where they will do, what is
 /// needed where they do not.
 ///
-/// 1. The margin is the one asked for, or what is affordable at the largest rate that samples can follow.
-/// 2. The rate is `base` where that affords half the margin; else the smallest that will do, for n = 2 1.5 times that.
+/// 1. The rate is `base` where that affords half the margin, with all that it affords.
+/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow, and
+///    the rate is the smallest that will do, for n = 2 1.5 times that.
 /// 3. It is raised where the input cannot give what it asks for: beyond what bounds allow (`means.reach`), and where h
-///    can hardly be influenced (`means.weight`), by as much as the plant itself pulls h⁽ⁿ⁾ down there. At the centre of
-///    a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+///    can hardly be influenced (`means.weight`) or comes back by itself, by as much as the plant itself pulls h⁽ⁿ⁾ down
+///    there. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+/// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
@@ -136,11 +138,11 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let at_base = affordable_margin(base, h);
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
-    let kept = affordable.clamp(0.0, margin);
-    let mut e = [0.0; crate::MAX_RELATIVE_DEGREE];
-    e[..h.len()].copy_from_slice(h);
-    e[0] -= kept;
-    let e = &e[..h.len()];
+    let kept = affordable.clamp(0.0, if is_gentle { margin } else { ENOUGH * margin });
+    let mut own = [0.0; crate::MAX_RELATIVE_DEGREE];
+    own[..h.len()].copy_from_slice(h);
+    own[0] -= kept;
+    let e = &own[..h.len()];
     let is_invariant = affordable >= 0.0;
     if !is_invariant {
         // As hard as it must be where that can be said, beyond what samples can follow.
@@ -154,23 +156,23 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let possible = means.drift + means.reach;
     // What the plant pulls down is left to later where h can hardly be influenced, or comes back to it by itself.
     let strength = means.weight.powi(2) * outwards(e, base);
-    let target = |wanted: f64| {
+    let eased = |wanted: f64| {
         let relieved = means.drift.min(0.0) + wanted.max(0.0);
-        possible.min(if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted })
+        if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted }
     };
     let wanted = floor(gentle);
-    let most = target(wanted);
+    let most = eased(wanted).min(possible);
     let rate = if wanted <= most {
         gentle
     } else {
-        // At the end of the hold too: until then h hardly follows an input.
-        let ahead = ahead(e, most, means.hold);
+        // What is eased is so until the end of the hold: until then h hardly follows an input.
+        let ahead = if most < possible { ahead(e, most, means.hold) } else { own };
         let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
         if is_met(limit) { first(gentle, limit, is_met) } else { limit }
     };
     // The gentle rate with all of the margin, as far as that is possible.
     let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
-    let pull = if kept < margin { (target(back) - floor(rate)).max(0.0) } else { 0.0 };
+    let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
 }
 
