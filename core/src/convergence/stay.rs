@@ -165,8 +165,8 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let rate = if wanted <= most {
         gentle
     } else {
-        // What is eased is so until the end of the hold: until then h hardly follows an input.
-        let ahead = if most < possible { ahead(e, most, means.hold) } else { own };
+        // What is eased is so until the end of the hold, the more the less h follows an input until then.
+        let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { own };
         let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
         if is_met(limit) { first(gentle, limit, is_met) } else { limit }
     };
