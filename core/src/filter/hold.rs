@@ -67,6 +67,11 @@ impl Hold<'_> {
         Some(Lowest { h: found.h - error, ..found })
     }
 
+    /// h at an instant (s after the sample); `None` where the source cannot predict.
+    pub(super) fn value(&self, at: f64) -> Option<f64> {
+        self.node(at).map(|node| node.h)
+    }
+
     fn node(&self, at: f64) -> Option<Node> {
         let mut ahead = Ahead::ZERO;
         let known = self.source.ahead(self.t, self.x, self.u, at, &mut ahead) && ahead.is_finite();

@@ -89,9 +89,14 @@ impl Outlook {
         };
         let h = self.drift[0];
         let highest = self.drift[self.n] + qp::dot(normal, held.u);
-        // With n = 1 a set that moves faster than the samples shows in no derivative that is known here.
+        // With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
+        // radians shows where the hold ends.
         let is_clear = |hold: f64| {
-            self.n > 1 && h > 0.0 && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
+            let foreseen = self.polynomial(highest, hold, |term| term);
+            self.n > 1
+                && h > 0.0
+                && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
+                && held.value(hold).is_none_or(|end| (end - foreseen).abs() <= 0.5 * CLEAR * h)
         };
         // The deadline at the very end of the hold is within it.
         let begins = from <= hold * (1.0 + SAME_PERIOD);
