@@ -186,7 +186,7 @@ fn wait(workshop: &Workshop, child: &mut Child, kept_before: u64, more: Duration
     std::thread::sleep(more);
 }
 
-/// Enough to be ended three times, and not many more: a step takes a hundred times as long without optimisation.
+/// Enough to be ended three times, and not many more: what is not optimised takes long.
 const MANY: u64 = if cfg!(debug_assertions) { 120 } else { 40_000 };
 
 /// Killed, interrupted, killed again, on one and on two threads: the same file.

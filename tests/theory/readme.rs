@@ -215,8 +215,10 @@ fn the_readme_with_one_number_changed() {
                 found.largest
             );
             assert!(!late && !out && broken.is_none(), "{name}, {step}: {found:?}");
-            // Inputs are only told: what comes ahead of its profile brakes late.
-            assert!(found.peaks[0] < 2.0, "{name}, {step}: peaks {:?}", found.peaks);
+            // What coasts through the disc at 9 m/s has its radius of 2 m to stop in: 20 m/s², 8 times the profile's.
+            let most = if case.reference == Reference::Zero { 20.0 } else { 4.0 };
+            let [speed, input] = found.peaks;
+            assert!(speed < 2.0 && input < most, "{name}, {step}: peaks {:?}", found.peaks);
         }
     }
 }

@@ -44,11 +44,11 @@ pub struct FixedTimeState {
     pub rate: f64,
     /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`](super::stay::keep)).
     pub stay_rate: f64,
-    /// The margin of the stay constraint in the unit of h, and what leads back to `margin`, `[h]`/sⁿ: chosen there too.
+    /// The margin of the stay constraint in the unit of h, chosen there too.
     pub stay_margin: f64,
-    /// See `stay_margin`.
+    /// What leads back from `stay_margin` to `margin`, `[h]`/sⁿ, chosen there too.
     pub pull: f64,
-    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor.
+    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, and since the arrival where an approach has ended.
     pub gain: f64,
     /// μ in the unit of h, chosen at the anchor: the settings' margin and what held inputs cost.
     pub margin: f64,

@@ -84,7 +84,7 @@ pub struct Means {
     pub drift: f64,
     /// The most that inputs within their bounds add to it, `[h]`/sⁿ; infinite without bounds.
     pub reach: f64,
-    /// ‖L_gL_f^{n−1}h‖ as a part of the largest that has been seen, 0 ..= 1: how well h can be influenced now.
+    /// ‖L_gL_f^{n−1}h‖ as a part of the largest since the anchor or the arrival, 0 ..= 1: how well h can be influenced now.
     pub weight: f64,
     /// The longest time in s for which the input may be held, 0 where it is not known.
     pub hold: f64,

@@ -91,7 +91,7 @@ impl Outlook {
         let highest = self.drift[self.n] + qp::dot(normal, held.u);
         // With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
         // radians shows where the hold ends.
-        let is_clear = |hold: f64| {
+        let is_clear = || {
             let foreseen = self.polynomial(highest, hold, |term| term);
             self.n > 1
                 && h > 0.0
@@ -100,7 +100,7 @@ impl Outlook {
         };
         // The deadline at the very end of the hold is within it.
         let begins = from <= hold * (1.0 + SAME_PERIOD);
-        if !begins || is_clear(hold) {
+        if !begins || is_clear() {
             return;
         }
         let from = from.min(hold);
