@@ -2,7 +2,8 @@
 //! no other is nearer to u_ref by more than a hundredth.
 //!
 //! The oracle shares no part with the search. It has the rows' demands from the promises, evaluates them with
-//! `DerivativeSource::ahead` over grids of inputs, and refines what is nearest by a pattern search. With
+//! `DerivativeSource::ahead` over grids of inputs, and refines what is nearest by a pattern search. An input that
+//! leaves a set between two samples in which it is to be kept is no answer. With
 //! `PUNCTUAL_TABLES=1` and `--nocapture` there are more than 100,000 states, and a table.
 
 #![allow(clippy::print_stdout, reason = "it prints tables")]
@@ -14,7 +15,7 @@ use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::convergence::FixedTime;
 use punctual_core::convergence::sampled::SampledDemand;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
@@ -62,7 +63,12 @@ impl Barrier<4> for Set {
 struct Asked<'a> {
     source: &'a dyn DerivativeSource,
     demand: SampledDemand,
+    /// The least h between the samples, from so many seconds on.
+    floor: Option<(f64, f64)>,
 }
+
+/// Instants between two samples at which the oracle looks at what is kept.
+const INSTANTS: usize = 24;
 
 /// One sample: what is asked, and of which inputs.
 struct Case<'a> {
@@ -75,11 +81,11 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// The largest violation of a row, as a part of its terms; ≤ 0 where all hold.
+    /// The largest violation of a row at the next sample, as a part of its terms; ≤ 0 where all hold.
     fn violation(&self, u: [f64; 2]) -> f64 {
         let mut worst = f64::NEG_INFINITY;
         let mut ahead = Ahead::ZERO;
-        for Asked { source, demand } in &self.rows {
+        for Asked { source, demand, .. } in &self.rows {
             assert!(source.ahead(self.t, &self.x, &u, self.period, &mut ahead));
             let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
             for k in 0..2 {
@@ -87,6 +93,22 @@ impl Case<'_> {
                 terms += (demand.weights[k] * ahead.value[k]).abs();
             }
             worst = worst.max(-value / terms.max(1e-300));
+        }
+        worst
+    }
+
+    /// How far below its floor h falls between the samples, as a part of its size.
+    fn dip(&self, u: [f64; 2]) -> f64 {
+        let mut worst = 0.0_f64;
+        let mut ahead = Ahead::ZERO;
+        for Asked { source, floor, .. } in &self.rows {
+            let Some((from, floor)) = floor else { continue };
+            for k in 0..INSTANTS {
+                let at = from + (self.period - from) * k as f64 / INSTANTS as f64;
+                assert!(source.ahead(self.t, &self.x, &u, at, &mut ahead));
+                worst =
+                    worst.max((floor - ahead.value[0]) / (floor.abs() + ahead.value[0].abs()).max(1e-300));
+            }
         }
         worst
     }
@@ -102,9 +124,11 @@ impl Case<'_> {
         }
     }
 
-    /// (violation, distance), the former 0 where the rows hold.
+    /// (violation, distance), the former 0 where all is met.
     fn key(&self, u: [f64; 2]) -> (f64, f64) {
-        (self.violation(u).max(0.0), self.distance(u))
+        let violation = self.violation(u).max(0.0);
+        // Only what would be an answer is looked at closely.
+        (if violation <= 0.0 { self.dip(u) } else { violation }, self.distance(u))
     }
 
     /// A pattern search with shrinking steps, from a grid point.
@@ -295,10 +319,18 @@ fn run<P>(
             for ((promise, source), state) in promises.iter().zip(&states) {
                 let mut derivatives = Derivatives::ZERO;
                 source.evaluate(t, x.as_slice(), &mut derivatives);
+                let h = derivatives.drift[0];
                 let Some(demand) = promise.over_period(state, t, &derivatives.drift[..2], period) else {
                     return;
                 };
-                case.rows.push(Asked { source: &**source, demand });
+                let to_deadline = state.anchor_time + state.deadline - t;
+                let floor = match state.phase {
+                    // Half of the margin, where so much is left.
+                    Phase::Stay => Some((0.0, 0.5 * state.margin.min(h).max(0.0))),
+                    Phase::Approach if to_deadline <= period => Some((to_deadline, state.margin)),
+                    _ => None,
+                };
+                case.rows.push(Asked { source: &**source, demand, floor });
             }
             check(&case, status, u, fine, tally, name);
         }

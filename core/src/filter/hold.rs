@@ -1,26 +1,25 @@
 //! What h does while an input is held: the instants between two samples.
 //!
-//! Let η(s) = h(t + s) along the model under the held input. Between two instants a < b at which η and η̇ are known, the
-//! cubic through them is off by at most max|η⁗| (b − a)⁴/384, and most in the middle. So the interval is halved, and what
-//! the cubic is off there bounds what the cubics of the halves, each off by a sixteenth of it, leave open. Where that is
-//! not enough to decide, the halves are looked at in turn, down to 1/256 of the hold.
+//! Let η(s) = h(t + s) along the model under the held input. The model walks through the hold in parts, and η and η̇ are
+//! read between them. From instants a < m < b the cubic through a and b foresees η(m) and η̇(m). What it is off there bounds
+//! what the cubics of the two halves leave open: less than an eighth of it where η is smooth (max|η⁗| s⁴/384 on a length s),
+//! twice at a kink. The walk is repeated in twice as many parts until that and what two walks differ by decide whether h ≥ 0.
 //!
-//! The model is integrated anew up to each instant. What its own steps are off at the end of the hold is seen by going
-//! there in twice as many, and counted too. That the fourth derivative of η does not change its size within a part is
-//! assumed, so an η that swings many times within one 256th of the hold can be missed; one that swings within the hold shows
-//! as slopes that do not fit its values.
+//! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What cannot be
+//! decided with [`MOST`] parts, such as an input that turns the plant by a hundred radians within the hold, counts as h < 0.
 
+use crate::MAX_RELATIVE_DEGREE;
 use crate::lie::{Ahead, DerivativeSource};
 
-/// Halvings of the hold.
-const DEPTH: u32 = 8;
+/// Parts of the first walk.
+const FEWEST: usize = 4;
 
-/// The part of h at an instant that η may lose on the way to the next before the interval is looked at more closely.
-const CLEAR: f64 = 0.5;
+/// Parts of the last walk.
+const MOST: usize = 64;
 
-/// How many times what twice as many steps change is taken for the error of the prediction: where an input turns the plant
-/// by more than a radian within the hold, both are off.
-const UNSURE: f64 = 10.0;
+/// How many times what it is off in the middle a cubic may be off elsewhere. Where η has a fourth derivative it is less
+/// than once; at a kink, such as the path past a small disc, twice.
+const UNSURE: f64 = 4.0;
 
 /// η and η̇ at an instant.
 #[derive(Clone, Copy)]
@@ -28,6 +27,10 @@ struct Node {
     at: f64,
     h: f64,
     slope: f64,
+}
+
+impl Node {
+    const ZERO: Self = Self { at: 0.0, h: 0.0, slope: 0.0 };
 }
 
 /// Where h is lowest.
@@ -41,8 +44,8 @@ pub(super) struct Lowest {
 
 impl Lowest {
     pub(super) fn or(self, other: Self) -> Self {
-        // Not `<`: what is not a number counts as lowest.
-        if self.h >= other.h { other } else { self }
+        // What is not a number counts as lowest.
+        if self.h < other.h || self.h.is_nan() { self } else { other }
     }
 }
 
@@ -58,60 +61,95 @@ impl Hold<'_> {
     /// A lower bound on h over `from` ≤ s ≤ `to` (s after the sample), and where; `scratch` has the length
     /// of the state. `None` where the source cannot predict.
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
-        let last = self.node(to)?;
-        let found = match from < to {
-            true => self.between(self.node(from)?, last, DEPTH)?,
-            false => Lowest { h: last.h, at: to },
-        };
-        let error = UNSURE * self.integration_error(last, scratch)?;
-        Some(Lowest { h: found.h - error, ..found })
+        let (mut coarse, mut fine) = ([Node::ZERO; MOST + 1], [Node::ZERO; MOST + 1]);
+        let mut parts = FEWEST;
+        self.walk([from, to], scratch, &mut coarse[..=parts])?;
+        loop {
+            self.walk([from, to], scratch, &mut fine[..=2 * parts])?;
+            let mut differ = 0.0;
+            for (a, b) in coarse[..=parts].iter().zip(fine.iter().step_by(2)) {
+                // Not `max`, which would drop what is not a number.
+                let by = (a.h - b.h).abs() + (to - from) / parts as f64 * (a.slope - b.slope).abs();
+                differ = if by <= differ { differ } else { by };
+            }
+            let (mut seen, mut sure) = (LARGEST, LARGEST);
+            for three in fine[..=2 * parts].array_windows().step_by(2) {
+                let (found, off) = dips(three);
+                let unsure = differ + UNSURE * off;
+                sure = sure.or(Lowest { h: found.h - unsure, ..found });
+                seen = seen.or(Lowest { h: found.h + unsure, ..found });
+            }
+            parts *= 2;
+            if sure.h >= 0.0 || seen.h < 0.0 || parts == MOST {
+                return Some(sure);
+            }
+            std::mem::swap(&mut coarse, &mut fine);
+        }
     }
 
-    /// h at an instant (s after the sample); `None` where the source cannot predict.
-    pub(super) fn value(&self, at: f64) -> Option<f64> {
-        self.node(at).map(|node| node.h)
+    /// h⁽⁰⁾ … h⁽ⁿ⁾ at an instant (s after the sample); `None` where the source cannot predict.
+    pub(super) fn derivatives(&self, at: f64) -> Option<[f64; MAX_RELATIVE_DEGREE + 1]> {
+        self.ahead(self.x, 0.0, at).map(|ahead| ahead.value)
     }
 
-    fn node(&self, at: f64) -> Option<Node> {
+    /// Reads η and η̇ at `from`, `to` and between them.
+    fn walk(&self, [from, to]: [f64; 2], x: &mut [f64], nodes: &mut [Node]) -> Option<()> {
+        x.copy_from_slice(self.x);
+        let parts = nodes.len() - 1;
+        let mut at = 0.0;
+        if from > 0.0 {
+            for k in 1..=parts {
+                let next = instant([0.0, from], k, parts);
+                self.source.predict(x, self.u, next - at).then_some(())?;
+                at = next;
+            }
+        }
+        nodes[0] = self.node(x, at)?;
+        for (k, node) in nodes.iter_mut().enumerate().skip(1) {
+            let next = instant([from, to], k, parts);
+            self.source.predict(x, self.u, next - at).then_some(())?;
+            at = next;
+            *node = self.node(x, at)?;
+        }
+        Some(())
+    }
+
+    /// η and η̇ at the instant `at`, at which the state is `x`.
+    fn node(&self, x: &[f64], at: f64) -> Option<Node> {
+        self.ahead(x, at, 0.0).map(|ahead| Node { at, h: ahead.value[0], slope: ahead.value[1] })
+    }
+
+    /// What is `later` s after the instant `at`, at which the state is `x`.
+    fn ahead(&self, x: &[f64], at: f64, later: f64) -> Option<Ahead> {
         let mut ahead = Ahead::ZERO;
-        let known = self.source.ahead(self.t, self.x, self.u, at, &mut ahead) && ahead.is_finite();
-        known.then_some(Node { at, h: ahead.value[0], slope: ahead.value[1] })
+        self.source.ahead(self.t + at, x, self.u, later, &mut ahead).then_some(ahead)
     }
+}
 
-    /// What the prediction at the `last` node is off, of h and by its slope.
-    fn integration_error(&self, last: Node, scratch: &mut [f64]) -> Option<f64> {
-        let (to, half) = (last.at, last.at / 2.0);
-        scratch.copy_from_slice(self.x);
-        let mut ahead = Ahead::ZERO;
-        let known = self.source.predict(scratch, self.u, half)
-            && self.source.ahead(self.t + half, scratch, self.u, half, &mut ahead);
-        known.then(|| (ahead.value[0] - last.h).abs() + to * (ahead.value[1] - last.slope).abs())
-    }
+/// Above every other.
+const LARGEST: Lowest = Lowest { h: f64::INFINITY, at: 0.0 };
 
-    fn between(&self, a: Node, b: Node, depth: u32) -> Option<Lowest> {
-        let ends = Lowest { h: a.h, at: a.at }.or(Lowest { h: b.h, at: b.at });
-        // A cubic leaves its ends by at most 4/27 of the way that each slope alone would take it.
-        let moved = (b.at - a.at) * (a.slope.abs() + b.slope.abs()) * (4.0 / 27.0);
-        if ends.h < 0.0 || depth < DEPTH && moved <= CLEAR * ends.h {
-            return Some(Lowest { h: ends.h - moved * f64::from(u8::from(ends.h >= 0.0)), ..ends });
-        }
-        let middle = self.node(0.5 * (a.at + b.at))?;
-        let length = b.at - a.at;
-        let foreseen = 0.5 * (a.h + b.h) + length * (a.slope - b.slope) / 8.0;
-        let slope = 1.5 * (b.h - a.h) / length - 0.25 * (a.slope + b.slope);
-        let off = (middle.h - foreseen).abs() + length / 4.0 * (middle.slope - slope).abs();
-        let halves = dip(a, middle).or(dip(middle, b));
-        let sure = halves.h - off / 16.0;
-        // What is off must be small for the halves to be off by so much less; and once may be chance.
-        if middle.h < 0.0 || depth < DEPTH && sure >= off {
-            return Some(Lowest { h: if middle.h < 0.0 { halves.h } else { sure }, ..halves });
-        }
-        if depth == 0 {
-            return Some(Lowest { h: halves.h - off, ..halves });
-        }
-        let (left, right) = (self.between(a, middle, depth - 1)?, self.between(middle, b, depth - 1)?);
-        Some(left.or(right))
+/// Number `k` of the ends of so many `parts`, which grow from 0.8 to 1.2 times the mean.
+fn instant([from, to]: [f64; 2], k: usize, parts: usize) -> f64 {
+    const UNEVEN: f64 = 0.2;
+    let z = k as f64 / parts as f64;
+    if k == parts { to } else { from + (to - from) * z * (1.0 - UNEVEN * (1.0 - z)) }
+}
+
+/// The least value of the cubics between three instants, and what the one through the outer two is off in the middle.
+fn dips(&[a, middle, b]: &[Node; 3]) -> (Lowest, f64) {
+    let length = b.at - a.at;
+    if length <= 0.0 {
+        return (Lowest { h: middle.h, at: middle.at }, 0.0);
     }
+    let z = (middle.at - a.at) / length;
+    let (left, right, rise) = (a.slope * length, b.slope * length, b.h - a.h);
+    // a.h + left z + c z² + d z³.
+    let (c, d) = (3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise);
+    let foreseen = a.h + z * (left + z * (c + z * d));
+    let slope = (left + z * (2.0 * c + 3.0 * z * d)) / length;
+    let off = (middle.h - foreseen).abs() + length / 4.0 * (middle.slope - slope).abs();
+    (dip(a, middle).or(dip(middle, b)), off)
 }
 
 /// The least value of the cubic through two nodes.

@@ -68,8 +68,9 @@ impl Clone for FilterState {
 /// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
-/// Of steps in a row that do not meet a constraint, every such one looks far around for an input.
-const WIDE_EVERY: u32 = 64;
+/// Of steps in a row that do not meet a constraint, so many of the first look far around for an input, and then every
+/// such one.
+const WIDE: (u32, u32) = (8, 16);
 
 /// Periods that differ by less than this part of them are one.
 const SAME_PERIOD: f64 = 1e-6;
@@ -212,6 +213,7 @@ impl SafetyFilter {
         let since = self.state.time.map_or(0.0, |last| (t - last).max(0.0));
         let hold = period.unwrap_or(since).max(self.period_max);
         let measures = matches!(self.sampling, Sampling::Measured { .. });
+        let long = self.sampling.longest(hold, self.expected.is_some() || self.period_max > 0.0);
         let mut sampled = period;
         // Within the capacity: a step does not allocate.
         conditions.clear();
@@ -323,8 +325,8 @@ impl SafetyFilter {
         }
         let last = self.state.time.map(|_| &self.state.input[..u.len()]);
         // Where rows have not been met for some steps, looking far around at each would find what it found before.
-        let widens =
-            self.state.barriers.iter().all(|b| b.unmet.is_none_or(|unmet| unmet.steps % WIDE_EVERY == 0));
+        let widens = |b: &FixedTimeState| b.unmet.is_none_or(|u| u.steps < WIDE.0 || u.steps % WIDE.1 == 0);
+        let widens = self.state.barriers.iter().all(widens);
         let listed = conditions.len();
         let (mut round, mut allowed) = (0, f64::INFINITY);
         let mut solution;
@@ -369,7 +371,7 @@ impl SafetyFilter {
             };
             for i in 0..count {
                 let held = hold::Hold { source: &*self.channels[i].source, t: begin, x: held_from(i), u };
-                outlooks[i].look(&promises[i], &held, &reports[i].row.normal, hold, scratch);
+                outlooks[i].look(&promises[i], &held, &reports[i].row.normal, [hold, long], scratch);
             }
             // An input that turns the plant by many radians makes any prediction true.
             let distance = u.iter().zip(u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));

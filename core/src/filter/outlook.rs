@@ -50,12 +50,18 @@ impl Outlook {
         Self { n, drift: derivatives.drift, lowest: None }
     }
 
-    /// The Taylor polynomial of order n of h, `s` seconds later; every term but the first as `sign` says.
-    fn polynomial(&self, highest: f64, s: f64, sign: impl Fn(f64) -> f64) -> f64 {
-        let (mut power, mut sum) = (1.0, self.drift[0]);
+    /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order n of h, with h⁽ⁿ⁾ = `highest`.
+    fn foreseen(&self, j: usize, highest: f64, s: f64) -> f64 {
+        // Horner's scheme.
+        (j..self.n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
+    }
+
+    /// The most by which the terms of that polynomial but the first can move h.
+    fn moved(&self, highest: f64, s: f64) -> f64 {
+        let (mut power, mut sum) = (1.0, 0.0);
         for k in 1..=self.n {
             power *= s / k as f64;
-            sum += sign(power * if k == self.n { highest } else { self.drift[k] });
+            sum += power * if k == self.n { highest } else { self.drift[k] }.abs();
         }
         sum
     }
@@ -64,17 +70,18 @@ impl Outlook {
     pub(super) fn row_at(&self, condition: &Condition, normal: &[f64; MAX_INPUTS]) -> Row {
         let s = condition.duration;
         let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
-        let floor = (condition.demand.floor - self.polynomial(self.drift[self.n], s, |term| term)) / power;
+        let floor = (condition.demand.floor - self.foreseen(0, self.drift[self.n], s)) / power;
         Row { normal: *normal, floor }
     }
 
-    /// Finds out whether the promise holds at every instant of the `hold` (s) that begins, along the model.
+    /// Finds out whether the promise holds at every instant of the `hold` (s) that begins, along the model; in a set that
+    /// is kept, of one that may last as `long`.
     pub(super) fn look(
         &mut self,
         promise: &FixedTimeState,
         held: &Hold,
         normal: &[f64; MAX_INPUTS],
-        hold: f64,
+        [hold, long]: [f64; 2],
         scratch: &mut [f64],
     ) {
         /// Round-off, as a part of the size of h.
@@ -82,9 +89,9 @@ impl Outlook {
         /// The part of h that must be left for the model not to be asked.
         const CLEAR: f64 = 0.5;
         self.lowest = None;
-        let from = match promise.phase {
-            Phase::Stay => 0.0,
-            Phase::Approach => (promise.anchor_time + promise.deadline - held.t).max(0.0),
+        let (from, hold) = match promise.phase {
+            Phase::Stay => (0.0, long),
+            Phase::Approach => ((promise.anchor_time + promise.deadline - held.t).max(0.0), hold),
             _ => return,
         };
         let h = self.drift[0];
@@ -92,11 +99,17 @@ impl Outlook {
         // With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
         // radians shows where the hold ends.
         let is_clear = || {
-            let foreseen = self.polynomial(highest, hold, |term| term);
+            let agrees = |end: [f64; MAX_RELATIVE_DEGREE + 1]| {
+                let mut power = 1.0;
+                (0..=self.n).all(|k| {
+                    power *= if k == 0 { 1.0 } else { hold / k as f64 };
+                    power * (end[k] - self.foreseen(k, highest, hold)).abs() <= 0.5 * CLEAR * h
+                })
+            };
             self.n > 1
                 && h > 0.0
-                && self.polynomial(highest, hold, |term| -term.abs()) >= CLEAR * h
-                && held.value(hold).is_none_or(|end| (end - foreseen).abs() <= 0.5 * CLEAR * h)
+                && self.moved(highest, hold) <= (1.0 - CLEAR) * h
+                && held.derivatives(hold).is_none_or(agrees)
         };
         // The deadline at the very end of the hold is within it.
         let begins = from <= hold * (1.0 + SAME_PERIOD);
@@ -117,7 +130,7 @@ impl Outlook {
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)
-            .map(|i| Lowest { h: self.polynomial(highest, at(i), |term| term), at: at(i) })
+            .map(|i| Lowest { h: self.foreseen(0, highest, at(i)), at: at(i) })
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 

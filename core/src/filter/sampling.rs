@@ -70,6 +70,17 @@ impl Sampling {
             }
         }
     }
+
+    /// How long in s a hold may turn out that is thought to last `hold`, if nobody `told` its length.
+    pub(super) fn longest(self, hold: f64, told: bool) -> f64 {
+        /// Of steps drawn at random between half of the longest and the longest, what was measured not long ago is
+        /// seldom less than the next one by more.
+        const JITTER: f64 = 1.25;
+        match self {
+            Self::Measured { .. } if !told => JITTER * hold,
+            _ => hold,
+        }
+    }
 }
 
 /// The period in s that samples up to `t` show: that of the last step, or of longer ones not long before.
