@@ -474,3 +474,46 @@ fn an_input_is_found_where_one_exists() {
     println!("{samples} samples: {missed} missed, {far} too far");
     assert!(missed == 0 && far == 0, "{samples} samples: {missed} missed, {far} too far");
 }
+
+/// A step taken again from the same sample, as masters do that try the size of their steps, gives the same input
+/// although the input before it is another one. What passes the centre of its disc and could turn to either side must not
+/// brake when asked first and turn when asked again.
+#[test]
+fn a_step_taken_again_gives_the_same_input() {
+    const STEP: f64 = 0.01;
+    let (mut samples, mut others) = (0, Vec::new());
+    for seed in 1..=if std::env::var_os("PUNCTUAL_TABLES").is_some() { 2000 } else { 60 } {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let centre = [random.between(-50.0, 50.0), random.between(-50.0, 50.0)];
+        let disc = DistanceDisc::new(centre, 2.0, 2.0).expect("valid disc");
+        let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(3.0, 12.0)) };
+        let mut filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", Unicycle, disc, settings)
+            .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        // Headed for the centre.
+        let mut x = SVector::from([0.0, 0.0, centre[1].atan2(centre[0]) + random.between(-1e-2, 1e-2), 0.0]);
+        for k in 0..(1.5 * settings.deadline.expect("a deadline") / STEP) as usize {
+            let t = k as f64 * STEP;
+            let state = filter.state().clone();
+            filter.expect_hold(Some(10.0_f64.powf(random.between(-6.0, -1.5)))).expect("valid hold");
+            let mut u = [[0.0; 2]; 3];
+            for u in &mut u {
+                filter.step(t, x.as_slice(), &[0.0; 2], u).expect("right dimensions");
+            }
+            samples += 1;
+            let [first, again, once_more] = u.map(|u| u[0].hypot(u[1]));
+            // As near to u_ref; there may be one answer on either side.
+            if (first - again).abs().max((first - once_more).abs()) > 1e-2 * (1.0 + first) {
+                others.push((seed, t, u));
+            }
+            filter.restore(&state).expect("its own state");
+            filter.expect_hold(None).expect("valid hold");
+            filter.step(t, x.as_slice(), &[0.0; 2], &mut u[0]).expect("right dimensions");
+            x = rk4_step(&Unicycle, &x, &SVector::from(u[0]), STEP);
+        }
+    }
+    println!("{samples} samples: {} give another input when taken again", others.len());
+    assert!(others.is_empty(), "{} of {samples}, such as {:?}", others.len(), others[0]);
+}

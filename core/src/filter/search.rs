@@ -18,8 +18,10 @@
 //! count as equal: a sample taken again gives the same bits.
 //!
 //! An answer is settled where its steps contracted like that, or where both guesses end at it, and it is not far
-//! out against u_ref, where the plant turns and other answers exist. Any other one, above all one that does not meet
-//! the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
+//! out against u_ref, where the plant turns and other answers exist, nor one aside of which the row that u_ref violates
+//! leaves more room than the way there costs: a vehicle that brakes straight ahead where it could turn to either side is at
+//! rest between two answers. So a step taken again, or cut in two, by a master that looks for the size of its steps gives
+//! the same. Any other one, above all one that does not meet the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
 //! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
 //! programme says, by priority.
 //!
@@ -44,6 +46,8 @@ const ROUND_OFF: f64 = 1e-12;
 const SAME: f64 = 1e-6;
 /// An answer further from u_ref than this many times the size of that, or of 1, is looked at by the wide search.
 const FAR: f64 = 8.0;
+/// How far aside of an answer a nearer one is looked for, as a part of its distance from u_ref.
+const ASIDE: f64 = 0.5;
 /// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
@@ -107,6 +111,13 @@ impl Linearised<'_> {
         (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
     }
 
+    /// The row that is furthest from being met, if any is not.
+    fn most_violated(&self) -> Option<usize> {
+        let worst =
+            (0..self.rows.len()).max_by(|i, j| self.violations[*i].total_cmp(&self.violations[*j]))?;
+        (self.violations[worst] > 0.0).then_some(worst)
+    }
+
     /// The rows that are violated, one bit each.
     fn violated(&self) -> u64 {
         (0..self.rows.len()).fold(0, |bits, i| bits | u64::from(self.violations[i] > 0.0) << i)
@@ -157,6 +168,7 @@ impl Held<'_> {
             }
         }
         let watched = doubtful | at.violated();
+        let against = at.most_violated();
         let mut best: Option<Guess> = None;
         let mut guess = [0.0; MAX_INPUTS];
         // Whether the rows are linearised at the best guess.
@@ -193,6 +205,7 @@ impl Held<'_> {
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
+        settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, i, &mut at));
         let widens = self.widens || best.is_met(soft) || first.outcome == Outcome::Optimal;
         if !settled
             && widens
@@ -349,6 +362,36 @@ impl Held<'_> {
         let change = |k: usize| (condition.demand.weights[k] * (there.value[k] - here.value[k])).abs() / PART;
         let size = (0..n).map(change).sum::<f64>() / condition.divisor(n);
         if known && size.is_finite() { size } else { 0.0 }
+    }
+
+    /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.
+    fn is_nearer_aside(&self, u: &[f64], i: usize, at: &mut Linearised) -> bool {
+        let (m, far) = (u.len(), self.distance(u));
+        let kept = (at.rows[i], at.violations[i]);
+        let mut found = false;
+        // In a plane one axis has both directions.
+        for (axis, sign) in (0..(m - 1)).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+            // The axis without its part along u − u_ref.
+            let along = (u[axis] - self.u_ref[axis]) / far;
+            let mut aside: [f64; MAX_INPUTS] = std::array::from_fn(|j| {
+                if j < m {
+                    f64::from(u8::from(j == axis)) - along * (u[j] - self.u_ref[j]) / far
+                } else {
+                    0.0
+                }
+            });
+            let size = aside.iter().fold(0.0, |s: f64, v| s.hypot(*v));
+            for (j, v) in aside[..m].iter_mut().enumerate() {
+                *v = self.bounds.clamp(j, u[j] + sign * ASIDE * far * *v / size);
+            }
+            let aside = &aside[..m];
+            if self.linearise(aside, 1 << i, at).is_some() {
+                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| s.hypot(*a));
+                found |= at.rows[i].slack(aside) > (self.distance(aside) - far) * normal;
+            }
+        }
+        (at.rows[i], at.violations[i]) = kept;
+        found
     }
 
     /// Newton's method from `u`, on the rows that the linearised programme does not give up; those of the bits

@@ -75,18 +75,27 @@ impl Start {
 }
 
 /// The best starting points, the best first.
-struct Starts([Start; STARTS]);
+struct Starts {
+    kept: [Start; STARTS],
+    /// Points further from u_ref are of no use.
+    limit: f64,
+}
 
 impl Starts {
+    fn within(limit: f64) -> Self {
+        Self { kept: [Start::NONE; STARTS], limit }
+    }
+
     fn insert(&mut self, start: Start) {
-        let Some(at) = self.0.iter().position(|other| start.better_than(other)) else { return };
-        self.0[at..].rotate_right(1);
-        self.0[at] = start;
+        let found = self.kept.iter().position(|other| start.better_than(other));
+        let Some(at) = found.filter(|_| start.distance <= self.limit) else { return };
+        self.kept[at..].rotate_right(1);
+        self.kept[at] = start;
     }
 
     /// The distance of the nearest one that meets the rows.
     fn nearest(&self) -> f64 {
-        if self.0[0].violation <= 0.0 { self.0[0].distance } else { f64::INFINITY }
+        if self.kept[0].violation <= 0.0 { self.kept[0].distance } else { f64::INFINITY }
     }
 }
 
@@ -108,7 +117,7 @@ impl Held<'_> {
             nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
-        let mut starts = Starts([Start::NONE; STARTS]);
+        let mut starts = Starts::within(f64::INFINITY);
         let zero = [0.0; MAX_INPUTS];
         for guess in [Some(&*u), Some(self.u_ref), Some(&zero[..m])].iter().chain(guesses).flatten() {
             let mut start = Start::NONE;
@@ -123,9 +132,16 @@ impl Held<'_> {
         if !known {
             found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
         }
-        let mut starts = Starts([Start::NONE; STARTS]);
-        self.scan_all(nearest.distance, given_up, at, &mut starts);
-        found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+        // Once more from the first answer: inputs near u_ref that all but meet the rows come after all that do.
+        for _ in 0..2 {
+            let limit = nearest.distance;
+            let mut starts = Starts::within(NEAR * limit);
+            self.scan_all(limit, given_up, at, &mut starts);
+            found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+            if limit.is_finite() || nearest.distance.is_infinite() {
+                break;
+            }
+        }
         if !found && (!known || best.ended) {
             return None;
         }
@@ -168,7 +184,7 @@ impl Held<'_> {
         programme: &mut Workspace,
     ) -> bool {
         let mut found = false;
-        for start in &mut starts.0 {
+        for start in &mut starts.kept {
             // Where an answer is known, one that is to be nearer begins near.
             let near = |start: &Start| start.distance < NEAR * nearest.distance;
             if !start.distance.is_finite() || !near(start) {
