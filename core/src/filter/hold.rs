@@ -18,7 +18,8 @@ const FEWEST: usize = 4;
 const MOST: usize = 64;
 
 /// How many times what it is off in the middle a cubic may be off elsewhere. Where η has a fourth derivative it is less
-/// than once; at a kink, such as the path past a small disc, twice.
+/// than once; at a kink, such as the path past a small disc, twice. What two walks differ by counts as often: where they
+/// do not resolve a turn, both are off.
 const UNSURE: f64 = 4.0;
 
 /// η and η̇ at an instant.
@@ -75,7 +76,7 @@ impl Hold<'_> {
             let (mut seen, mut sure) = (LARGEST, LARGEST);
             for three in fine[..=2 * parts].array_windows().step_by(2) {
                 let (found, off) = dips(three);
-                let unsure = differ + UNSURE * off;
+                let unsure = UNSURE * (differ + off);
                 sure = sure.or(Lowest { h: found.h - unsure, ..found });
                 seen = seen.or(Lowest { h: found.h + unsure, ..found });
             }

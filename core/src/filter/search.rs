@@ -369,8 +369,10 @@ impl Held<'_> {
         let (m, far) = (u.len(), self.distance(u));
         let kept = (at.rows[i], at.violations[i]);
         let mut found = false;
-        // In a plane one axis has both directions.
-        for (axis, sign) in (0..(m - 1)).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        // The axis that is most along u − u_ref has nothing aside that the others have not.
+        let way = |i: usize| (u[i] - self.u_ref[i]).abs();
+        let main = (0..m).fold(0, |main, i| if way(i) > way(main) { i } else { main });
+        for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
             // The axis without its part along u − u_ref.
             let along = (u[axis] - self.u_ref[axis]) / far;
             let mut aside: [f64; MAX_INPUTS] = std::array::from_fn(|j| {

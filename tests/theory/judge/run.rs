@@ -172,9 +172,6 @@ impl<'a> Judge<'a> {
     fn hold(&mut self, t: f64, x: &State, u: &Input, hold: f64) -> State {
         self.part(t, x, u, hold);
         let mut state = *x;
-        if self.spins {
-            return state;
-        }
         self.states.clear();
         for k in 0..self.grid.len() {
             if k > 0 {
