@@ -21,8 +21,8 @@ const CASES: [Case; 13] = [
     ("step-10-obstacles", |times| step(goal_and_obstacles(10), SAFE, times)),
     ("step-60-obstacles", |times| step(goal_and_obstacles(60), SAFE, times)),
     // Two rows active of eleven; the second alternates between two such answers.
-    ("programme-same", |times| programme([[0.1, -0.2]; 2], times)),
-    ("programme-other", |times| programme([[0.1, -0.2], [8.0, 9.0]], times)),
+    ("qp-same", |times| qp([[0.1, -0.2]; 2], times)),
+    ("qp-other", |times| qp([[0.1, -0.2], [8.0, 9.0]], times)),
     ("jets-2", |times| jets::<4>(2, times)),
     ("jets-4", |times| jets::<8>(4, times)),
     ("jets-8", |times| jets::<16>(8, times)),
@@ -48,7 +48,7 @@ fn step(builder: FilterBuilder, u_ref: [f64; 2], times: u32) {
 }
 
 /// Solves for the references in turn.
-fn programme(references: [[f64; 2]; 2], times: u32) {
+fn qp(references: [[f64; 2]; 2], times: u32) {
     let row = |normal: [f64; 2], floor: f64| {
         let mut row = Row { floor, ..Row::ZERO };
         row.normal[..2].copy_from_slice(&normal);

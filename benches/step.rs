@@ -1,7 +1,7 @@
 //! Cost of one filter step and of its parts: `cargo bench --bench step`.
 //!
-//! The quadratic programme by itself: `programme.rs`. The states are on the way to the disc, where the row
-//! is active, so that every step solves its quadratic programme; those with obstacles also from a reference
+//! The quadratic program by itself: `qp.rs`. The states are on the way to the disc, where the row
+//! is active, so that every step solves its quadratic program; those with obstacles also from a reference
 //! input that needs no solving. "by hand" is what the first step computes, written out for that one plant,
 //! barrier and order.
 

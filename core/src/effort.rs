@@ -73,7 +73,7 @@ impl Running<'_> {
         let run = &mut self.run;
         run.unmet += usize::from(!report.status.is_satisfied());
         for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
-            judge.see(t, b.h, standing(b.phase), b.late_certain);
+            judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
             let enforced = standing(b.phase) == Standing::InForce;
             if b.unmet_steps > 0 || enforced && report.status as u8 >= Status::InvalidInput as u8 {
                 seen.unmet += 1;
@@ -92,7 +92,7 @@ impl Running<'_> {
         filter.barrier_values(t, x, &mut self.h)?;
         let barriers = &filter.report().barriers;
         for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
-            judge.see(t, *h, standing(b.phase), b.late_certain);
+            judge.see(t, *h, standing(b.phase), b.deadline_unreachable);
         }
         self.bound(x);
         Ok(())

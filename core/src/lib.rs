@@ -85,5 +85,5 @@ pub const MAX_RELATIVE_DEGREE: usize = 8;
 /// Largest number of inputs, dim u.
 pub const MAX_INPUTS: usize = 12;
 
-/// Largest number of rows of a quadratic programme, and so of barriers.
+/// Largest number of rows of a quadratic program, and so of barriers.
 pub const MAX_ROWS: usize = 64;

@@ -2,7 +2,7 @@
 //!
 //! h is the first state, so the floor under h⁽ⁿ⁾ is the floor under the input; the held input moves a
 //! chain along a polynomial, which is evaluated exactly. The promise alone is on trial here: no plant,
-//! no jets, no programme; with the constraint at the samples and a margin of 1 %, and with the constraint
+//! no jets, no program; with the constraint at the samples and a margin of 1 %, and with the constraint
 //! over the period and the margin that it chooses itself.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]

@@ -127,7 +127,7 @@ fn without_a_prediction_a_step_is_pointwise_and_a_delay_refused() {
     for (x, status) in [
         ([f64::NAN, 0.0, 2.0], Status::InvalidInput),
         ([-1.0, 0.0, f64::INFINITY], Status::InvalidInput),
-        ([-1.0, 0.0, 0.0], Status::Degenerate),
+        ([-1.0, 0.0, 0.0], Status::NoAuthority),
     ] {
         assert_eq!(filter.step(0.1, &x, &[0.0], &mut u).expect("lengths").status, status);
         assert_eq!(u, [0.0]);

@@ -22,7 +22,7 @@ fn tell(line: &str) {
     }
 }
 
-/// A programme, and what must come of it.
+/// A program, and what must come of it.
 struct Case {
     name: &'static str,
     rows: Vec<Row>,
@@ -130,7 +130,7 @@ fn cases() -> Vec<Case> {
             bounds: unit(),
             u_ref: [0.25, 0.5],
             enforcement: hard(&[0]),
-            outcome: Outcome::Degenerate,
+            outcome: Outcome::IllConditioned,
             u: [0.25, 0.5],
             violations: vec![1.0],
         },
@@ -138,8 +138,8 @@ fn cases() -> Vec<Case> {
 }
 
 #[test]
-fn programmes_that_cannot_be_met() {
-    tell("| programme | rows | bounds | priority | status | u | violation |\n|---|---|---|---|---|---|---|");
+fn programs_that_cannot_be_met() {
+    tell("| program | rows | bounds | priority | status | u | violation |\n|---|---|---|---|---|---|---|");
     let mut workspace = Workspace::default();
     for c in cases() {
         let mut u = [f64::NAN; 2];
@@ -168,7 +168,7 @@ fn programmes_that_cannot_be_met() {
         assert!(near(&violations, &c.violations), "{}: {violations:?}", c.name);
         for (i, (violation, enforcement)) in violations.iter().zip(&c.enforcement).enumerate() {
             let lost = *violation > ROUND_OFF && matches!(enforcement, Enforcement::Hard { .. });
-            let named = workspace.is_relaxed(i) || workspace.is_degenerate(i);
+            let named = workspace.is_relaxed(i) || workspace.is_ill_conditioned(i);
             assert_eq!(named, lost, "{}: row {i}", c.name);
         }
     }

@@ -1,4 +1,4 @@
-//! The quadratic programme with one row: known answers, enumeration of active sets, extreme data.
+//! The quadratic program with one row: known answers, enumeration of active sets, extreme data.
 //! Several rows: `qp_several_rows.rs`.
 
 mod quadratic;
@@ -95,7 +95,7 @@ proptest! {
         }
         prop_assert_eq!((solution.solver, solution.iterations), (Solver::ClosedForm, 0));
         if row.normal == Row::ZERO.normal {
-            prop_assert_eq!(solution.outcome, Outcome::Degenerate);
+            prop_assert_eq!(solution.outcome, Outcome::IllConditioned);
             prop_assert_eq!(u, clamped);
             return Ok(());
         }
@@ -192,13 +192,13 @@ proptest! {
 }
 
 #[test]
-fn a_vanishing_normal_is_degenerate_and_leaves_the_reference() {
+fn a_vanishing_normal_is_ill_conditioned_and_leaves_the_reference() {
     let u_ref = [3.0, -4.0];
     let least = f64::from_bits(1);
     for normal in [[0.0, 0.0], [-0.0, 0.0], [least, 0.0], [0.0, -least], [1e-310, 1e-310], [1e-300, 0.0]] {
         let mut u = [f64::NAN; 2];
         let solution = solve(&[row(&normal, 1.0)], &Bounds::NONE, &u_ref, 1e6, &mut u);
-        assert_eq!(solution.outcome, Outcome::Degenerate, "{normal:?}");
+        assert_eq!(solution.outcome, Outcome::IllConditioned, "{normal:?}");
         assert_eq!(u, u_ref, "{normal:?}");
         // Bounded: the least violation, in the direction that is left.
         let solution = solve(&[row(&normal, 1.0)], &bounds(&[-5.0; 2], &[5.0; 2]), &u_ref, 1e6, &mut u);
@@ -218,8 +218,8 @@ fn a_vanishing_normal_that_asks_for_nothing_is_met() {
 }
 
 #[test]
-fn the_correction_limit_divides_filtered_from_degenerate() {
-    for (limit, outcome, wanted) in [(10.0, Outcome::Optimal, 10.0), (9.999, Outcome::Degenerate, 0.0)] {
+fn the_correction_limit_divides_filtered_from_ill_conditioned() {
+    for (limit, outcome, wanted) in [(10.0, Outcome::Optimal, 10.0), (9.999, Outcome::IllConditioned, 0.0)] {
         let mut u = [f64::NAN];
         // u ≥ 10 from 0 needs a correction of exactly 10.
         let solution = solve(&[row(&[2.0], 20.0)], &Bounds::NONE, &[0.0], limit, &mut u);

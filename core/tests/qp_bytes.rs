@@ -1,5 +1,5 @@
-//! The quadratic programme on arbitrary bytes: every pattern of 64 bits may become a number.
-//! `PUNCTUAL_QP_CASES` programmes, some thousand by default. Needs no fuzzing engine: the bytes come
+//! The quadratic program on arbitrary bytes: every pattern of 64 bits may become a number.
+//! `PUNCTUAL_QP_CASES` programs, some thousand by default. Needs no fuzzing engine: the bytes come
 //! from the test's own generator.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
@@ -36,7 +36,7 @@ fn any_bytes_give_a_finite_input_within_bounds() {
         if random.below(16) == 0 {
             count = 1 + random.below(MAX_ROWS);
         }
-        // Some programmes are of moderate numbers only, some repeat their rows.
+        // Some programs are of moderate numbers only, some repeat their rows.
         let tame = random.below(2) == 0;
         let number = |random: &mut Random| if tame { random.within(8.0).round() } else { number(random) };
         let mut rows = vec![Row::ZERO; count];
@@ -102,5 +102,5 @@ fn any_bytes_give_a_finite_input_within_bounds() {
             assert_eq!(bits(&again), bits(&u), "{case}");
         }
     }
-    println!("{failed} of {count} programmes without convergence");
+    println!("{failed} of {count} programs without convergence");
 }

@@ -1,5 +1,5 @@
 //! The active-set method against enumeration in double-double arithmetic: `PUNCTUAL_QP_CASES` random
-//! programmes of every class, a few thousand by default. Prints the largest errors (`--nocapture`).
+//! programs of every class, a few thousand by default. Prints the largest errors (`--nocapture`).
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -117,11 +117,11 @@ fn size(case: &Case, found: &Found) -> f64 {
     u.chain(case.u_ref.iter().map(|v| v.abs())).chain(offsets).fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// Of a class: programmes, with an answer, unequal statuses, the largest errors of u relative to its size
+/// Of a class: programs, with an answer, unequal statuses, the largest errors of u relative to its size
 /// and to size / sine, the largest residual.
 #[derive(Debug, Default)]
 struct Tally {
-    programmes: u64,
+    programs: u64,
     feasible: u64,
     rounds: u64,
     most_rounds: u32,
@@ -146,18 +146,18 @@ fn run(class: Class, count: u64) -> Tally {
         let solution = workspace.solve(&p, &mut u);
         assert!(bounds.contain(&u), "{number}: {u:?}");
         let found = minimiser(&constraints(rows, bounds, m), m, &point(u_ref), 1e-24);
-        tally.programmes += 1;
+        tally.programs += 1;
         tally.rounds += u64::from(solution.iterations);
         tally.most_rounds = tally.most_rounds.max(solution.iterations);
         let clamped: Vec<f64> = u_ref.iter().enumerate().map(|(i, r)| bounds.clamp(i, *r)).collect();
         let wanted = match &found {
             None => Outcome::Infeasible,
-            Some(found) if distance(&clamped, &found.u) > *limit => Outcome::Degenerate,
+            Some(found) if distance(&clamped, &found.u) > *limit => Outcome::IllConditioned,
             Some(_) => Outcome::Optimal,
         };
         // What cannot be met may also be out of reach.
         let fits = solution.outcome == wanted
-            || (wanted, solution.outcome) == (Outcome::Infeasible, Outcome::Degenerate)
+            || (wanted, solution.outcome) == (Outcome::Infeasible, Outcome::IllConditioned)
                 && matches!(class, Class::Parallel);
         // Nearly parallel rows may contradict each other by less than round-off.
         let marginal = (wanted, solution.outcome) == (Outcome::Infeasible, Outcome::Optimal)
@@ -186,7 +186,7 @@ fn run(class: Class, count: u64) -> Tally {
 }
 
 #[test]
-fn programmes_equal_enumeration() {
+fn programs_equal_enumeration() {
     for class in [Class::General, Class::Whole, Class::Parallel, Class::Scaled] {
         let tally = run(class, cases(10_000) / 4);
         assert_eq!(tally.wrong, 0, "{class:?}: unequal statuses");

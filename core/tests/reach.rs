@@ -147,11 +147,11 @@ fn late_is_certain_exactly_when_it_is() {
         // The state of the run at full input, exactly.
         let x = [t * t, 0.0, 2.0 * t, 0.0];
         let report = on_time.step(t, &x, &[0.0; 2], &mut u).expect("lengths");
-        assert!(!report.barriers[0].late_certain, "at {t} s");
+        assert!(!report.barriers[0].deadline_unreachable, "at {t} s");
         let report = waiting.step(t, &[0.0; 4], &[0.0; 2], &mut u).expect("lengths");
-        assert_eq!(report.barriers[0].late_certain, k > 0, "at {t} s");
+        assert_eq!(report.barriers[0].deadline_unreachable, k > 0, "at {t} s");
         let report = given_up.step(t, &[0.0; 4], &[0.0; 2], &mut u).expect("lengths");
-        if report.barriers[0].late_certain {
+        if report.barriers[0].deadline_unreachable {
             first.get_or_insert(t);
         }
     }
@@ -180,7 +180,7 @@ fn a_deadline_out_of_reach_is_postponed_and_kept() {
                 // Twice the 3 s that no input can do without.
                 assert!(b.postponed == 1 && (b.time_left - 6.0).abs() < 1e-5, "{b:?}");
             }
-            assert!(u[0].abs() <= 2.0 && !b.late_certain);
+            assert!(u[0].abs() <= 2.0 && !b.deadline_unreachable);
             arrival = b.arrival_time;
             last = Some(b);
         })
@@ -193,7 +193,7 @@ fn a_deadline_out_of_reach_is_postponed_and_kept() {
     let mut reported = filter(BarrierSettings::within(1.0), 2.0);
     let report = reported.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("lengths");
     let b = report.barriers[0];
-    assert!(b.late_certain && b.postponed == 0 && b.time_left == 1.0, "{b:?}");
+    assert!(b.deadline_unreachable && b.postponed == 0 && b.time_left == 1.0, "{b:?}");
 }
 
 /// From rest the bound with which a profile is followed is its peak: 6 d/T² against 4 d/T².
@@ -234,6 +234,6 @@ fn what_a_disturbance_may_do_is_not_ruled_out() {
         assert_eq!(filter.is_ruled_out(0, 0.0, &start, 1.0).expect("valid"), known);
         assert_eq!(filter.soonest(0, 0.0, &start, 9.0).expect("valid").is_some(), known);
         let report = filter.step(0.0, &start, &[0.0; 2], &mut [0.0; 2]).expect("valid");
-        assert_eq!(report.barriers[0].late_certain, known);
+        assert_eq!(report.barriers[0].deadline_unreachable, known);
     }
 }

@@ -413,7 +413,7 @@ fn every_answer_is_optimal() {
             let status = report.expect("right dimensions").status;
             let residuals = filter.residuals(&u_ref, u.as_slice()).expect("right dimensions");
             if status.is_satisfied() {
-                let r = residuals.expect("a programme was solved");
+                let r = residuals.expect("a program was solved");
                 let worst = r.stationarity.max(r.violation).max(r.negativity).max(r.complementarity);
                 assert!(worst <= tolerance, "{sampling:?} at {k}: {r:?}");
                 filtered += u32::from(status == Status::Filtered);

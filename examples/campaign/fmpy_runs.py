@@ -11,7 +11,7 @@ from pathlib import Path
 from fmpy import extract, fmi2, read_model_description
 
 KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
-BARRIER = ["h", "phase", "unmet_steps", "slack", "late_certain"]
+BARRIER = ["h", "phase", "unmet_steps", "slack", "deadline_unreachable"]
 SAME_TIME = 1e-9  # round-off of a time, as a part of it where that is more than 1 s
 TOLERANCE, LEAST_TOLERANCE = 1e-9, 1e-12  # round-off of h, as a part of the largest |h| seen, and at least
 WHOLE = 1e-6  # steps by which an experiment may differ from a whole number of them

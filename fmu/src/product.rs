@@ -179,7 +179,7 @@ pub fn describe(status: Status) -> (&'static str, &'static str) {
         Status::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
         Status::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
         Status::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
-        Status::Degenerate => ("degenerate", "the barrier cannot be influenced at this state"),
+        Status::NoAuthority => ("no_authority", "the barrier cannot be influenced at this state"),
         Status::InvalidInput => ("invalid_input", "an input is not a number or infinite: u nearest 0"),
         Status::Singular => ("singular", "the model is not finite at this state: u nearest 0"),
         Status::WrongRelativeDegree => {
@@ -351,7 +351,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
         table.add(name("guaranteed"), guaranteed, output, flag());
         let late = "no input within the bounds is inside at the deadline, or it passed outside";
-        table.add(name("late_certain"), late, output, flag());
+        table.add(name("deadline_unreachable"), late, output, flag());
         let deadlocked = "other barriers block the way, and h does not rise: needs another u_ref";
         table.add(name("deadlocked"), deadlocked, output, flag());
         table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));

@@ -17,9 +17,9 @@ use punctual_core::scalar::Scalar;
 use punctual_core::{MAX_INPUTS, MAX_ROWS};
 
 use crate::motion::{self, Equations};
-use crate::programme::{Operation, Record, Register, Step, Value};
 use crate::series::Series;
 use crate::syntax::{Function, Operator};
+use crate::tape::{Operation, Record, Register, Step, Value};
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
 
 /// A number that is computed with: a name for it, to hand back.

@@ -31,7 +31,7 @@
 //!
 //! # How they are computed
 //!
-//! Trees become one list of operations, each done once (`programme`), and the list gives Taylor coefficient after
+//! Trees become one list of operations, each done once (`tape`), and the list gives Taylor coefficient after
 //! Taylor coefficient of all of them (`series`): a step costs what its operations cost, and allocates nothing.
 //!
 //! Layers, each using only those above it:
@@ -41,7 +41,7 @@
 //! | `error` | what is wrong, and where |
 //! | `syntax` | text to tree |
 //! | `affine` | whether inputs enter linearly |
-//! | `programme` | trees to one list of operations, constants folded, equal ones merged |
+//! | `tape` | trees to one list of operations, constants folded, equal ones merged |
 //! | `series` | Taylor coefficients of a list of operations |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
 //! | `evaluated` | plants and barriers that somebody else's code computes |
@@ -53,9 +53,9 @@ mod error;
 pub mod evaluated;
 mod model;
 mod motion;
-mod programme;
 mod series;
 mod syntax;
+mod tape;
 
 pub use error::Error;
 pub use model::{Barrier, Model};

@@ -8,9 +8,9 @@ use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 
 use crate::motion::{self, Equations};
-use crate::programme::{Programme, Record, Register, Step, Value, needed, unknown};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
+use crate::tape::{Record, Register, Step, Tape, Value, needed, unknown};
 use crate::{Error, MAX_STATES, affine};
 
 /// A plant `ẋ = f(x) + g(x) u` given by an expression for each component.
@@ -21,7 +21,7 @@ pub struct Model {
     states: Vec<String>,
     inputs: Vec<String>,
     parameters: Vec<(String, f64)>,
-    programme: Programme,
+    tape: Tape,
     /// Where the derivative of each state is.
     derivatives: Vec<Register>,
 }
@@ -68,7 +68,7 @@ impl Model {
             states: owned(states),
             inputs: owned(inputs),
             parameters: parameters.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
-            programme: Programme::new(states.len() + inputs.len() + 1),
+            tape: Tape::new(states.len() + inputs.len() + 1),
             derivatives: Vec::new(),
         };
         for (state, text) in states.iter().zip(derivatives) {
@@ -108,8 +108,8 @@ impl Model {
                 }
             }
         };
-        let value = self.programme.add(tree, &resolve)?;
-        Ok(self.programme.register(value))
+        let value = self.tape.add(tree, &resolve)?;
+        Ok(self.tape.register(value))
     }
 
     /// The plant, to simulate.
@@ -187,7 +187,7 @@ struct Listed {
 impl Model {
     /// Its operations, with those of the barrier in `h`.
     fn equations(&self, h: Option<Register>) -> Listed {
-        let Programme { steps, registers, .. } = &self.programme;
+        let Tape { steps, registers, .. } = &self.tape;
         let wanted: Vec<_> = self.derivatives.iter().copied().chain(h).collect();
         Listed {
             states: self.states.len(),

@@ -11,8 +11,8 @@ use punctual_core::lie::{
 use punctual_core::scalar::Scalar;
 
 use crate::Error;
-use crate::programme::Register;
 use crate::series::Series;
+use crate::tape::Register;
 
 /// The operations of a plant, or of a barrier along one. Registers: states, inputs, time, then results.
 pub(crate) trait Equations: Clone + Send + 'static {

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use punctual_core::scalar::Scalar;
 
-use crate::programme::{Operation, Register, Step};
+use crate::tape::{Operation, Register, Step};
 
 /// The coefficients of every register.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ class Status(IntEnum):
     """u is the safe input nearest to u_ref."""
     INFEASIBLE = 2
     """Not possible within the input bounds: the input of least violation."""
-    DEGENERATE = 3
+    NO_AUTHORITY = 3
     """The barrier cannot be influenced at this state: the input of least violation, or the best that was found."""
     INVALID_INPUT = 4
     """Time, state or u_ref is not a number or infinite: the admissible input nearest 0."""

@@ -55,10 +55,10 @@ def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = 
 
     - `deadline`: in s after the first step. Default: what the filter had in that run.
 
-    The result must have the fields `status` and `h`, `phase`, `late_certain` and `unmet_steps` of the barrier, as it has
+    The result must have the fields `status` and `h`, `phase`, `deadline_unreachable` and `unmet_steps` of the barrier, as it has
     unless `record` says otherwise. Raises `Error` where one is missing.
     """
-    fields = ["time", "status", *(f"{barrier}.{field}" for field in ("h", "phase", "late_certain", "unmet_steps"))]
+    fields = ["time", "status", *(f"{barrier}.{field}" for field in ("h", "phase", "deadline_unreachable", "unmet_steps"))]
     names = result.dtype.names or ()
     missing = [field for field in fields if field not in names]
     if missing:

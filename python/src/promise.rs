@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Judges a barrier by its h at the instants of a run: rows of (time, h, phase, late_certain, status). `units` are those
+/// Judges a barrier by its h at the instants of a run: rows of (time, h, phase, deadline_unreachable, status). `units` are those
 /// of h and of its slack, which tell the relative degree 1 from others.
 #[pyfunction]
 pub(crate) fn judge<'py>(

@@ -58,7 +58,7 @@ pub(crate) struct BarrierReport {
     postponed: u32,
     /// Whether no input within the bounds has h >= 0 at the deadline.
     #[pyo3(get)]
-    late_certain: bool,
+    deadline_unreachable: bool,
     /// Whether other barriers block the way and h gets nowhere.
     #[pyo3(get)]
     deadlocked: bool,
@@ -91,7 +91,7 @@ impl From<&filter::BarrierReport> for BarrierReport {
             sampling_loss: b.sampling_loss,
             unmet_steps: b.unmet_steps,
             postponed: b.postponed,
-            late_certain: b.late_certain,
+            deadline_unreachable: b.deadline_unreachable,
             deadlocked: b.deadlocked,
         }
     }

@@ -15,7 +15,7 @@ use super::system::{Order, System};
 use crate::host::{Causality, Description};
 
 /// The outputs of a barrier that are looked at.
-const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "late_certain", "phase"];
+const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
 
 /// What a promise came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::contender::Contender;
+use super::baseline::Baseline;
 use super::table::{Cell, Table};
 use super::trial::{self, CENTRE, Nominal, Outcome, RADIUS, Setup, Vehicle};
 use super::{Figure, Options};
@@ -18,11 +18,11 @@ const STEP: f64 = 1e-3;
 /// Bounds on |u_1| and |u_2| in the pictures of inputs.
 const BOUNDS: [f64; 2] = [8.0, 3.0];
 
-/// Existing method in the pictures: gains and exponent as [`Contender::defaults`] has them.
-const EXISTING: Contender = Contender::FiniteTime([1.0, 1.0], 0.5);
+/// Existing method in the pictures: gains and exponent as [`Baseline::defaults`] has them.
+const EXISTING: Baseline = Baseline::FiniteTime([1.0, 1.0], 0.5);
 
 /// The same as [`super::search`] finds it for all three vehicles in the setting that we advise.
-const SEARCHED: Contender = Contender::FiniteTime([4.0, 4.0], 0.5);
+const SEARCHED: Baseline = Baseline::FiniteTime([4.0, 4.0], 0.5);
 
 /// A recorded loop.
 struct Trace {
@@ -36,9 +36,9 @@ struct Trace {
 }
 
 impl Trace {
-    fn new(vehicle: Vehicle, contender: Contender, setup: &Setup, x0: [f64; 4]) -> Result<Self, Error> {
+    fn new(vehicle: Vehicle, baseline: Baseline, setup: &Setup, x0: [f64; 4]) -> Result<Self, Error> {
         let (mut t, mut x, mut u, mut h, mut bound) = (vec![], vec![], vec![], vec![], vec![]);
-        let outcome = trial::observed(vehicle, contender, setup, x0, |s| {
+        let outcome = trial::observed(vehicle, baseline, setup, x0, |s| {
             t.push(s.t);
             x.push(s.x);
             u.push(s.u);
@@ -125,11 +125,11 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
         Vehicle::PointMass => [0.0, 0.0, -10.0, 0.0],
         Vehicle::Unicycle | Vehicle::Bicycle => [0.0, 0.0, 0.0, -20.0],
     };
-    let trace = |contender, setup: Setup| Trace::new(vehicle, contender, &setup, x0);
-    let paper = trace(Contender::RepeatedRoot, Setup::paper(T, STEP))?.cut_at_arrival();
+    let trace = |baseline, setup: Setup| Trace::new(vehicle, baseline, &setup, x0);
+    let paper = trace(Baseline::RepeatedRoot, Setup::paper(T, STEP))?.cut_at_arrival();
     let existing = trace(EXISTING, Setup::paper(T, STEP))?;
     let searched = trace(SEARCHED, Setup::advised(T, STEP))?;
-    let ours = trace(Contender::Profile, Setup::advised(T, STEP))?;
+    let ours = trace(Baseline::Profile, Setup::advised(T, STEP))?;
     let late = |o: &Outcome| match o.arrival {
         Some(t) => format!("arrives at {t:.3} s"),
         None => "never arrives".to_owned(),
@@ -173,10 +173,10 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
 /// The paper's figure over time: T = 10, start (0, 0, −10, 0).
 fn depths(vehicle: Vehicle) -> Result<Figure, Error> {
     let x0 = [0.0, 0.0, -10.0, 0.0];
-    let trace = |contender, setup: Setup| Trace::new(vehicle, contender, &setup, x0);
-    let paper = trace(Contender::RepeatedRoot, Setup::paper(DEADLINE, STEP))?;
+    let trace = |baseline, setup: Setup| Trace::new(vehicle, baseline, &setup, x0);
+    let paper = trace(Baseline::RepeatedRoot, Setup::paper(DEADLINE, STEP))?;
     let existing = trace(EXISTING, Setup::paper(DEADLINE, STEP))?;
-    let ours = trace(Contender::Profile, Setup::advised(DEADLINE, STEP))?;
+    let ours = trace(Baseline::Profile, Setup::advised(DEADLINE, STEP))?;
     let line = |trace: &Trace, label, colour, style| trace.over_time(trace.depth(), label, colour, style);
     let chart = Chart {
         title: format!("{}: how deep inside the disc", vehicle.title()),
@@ -204,7 +204,7 @@ fn depths(vehicle: Vehicle) -> Result<Figure, Error> {
 /// h and the bound it is promised to stay above.
 fn profile(vehicle: Vehicle) -> Result<Figure, Error> {
     let x0 = [0.0, 0.0, -10.0, 0.0];
-    let trace = Trace::new(vehicle, Contender::Profile, &Setup::advised(DEADLINE, STEP), x0)?;
+    let trace = Trace::new(vehicle, Baseline::Profile, &Setup::advised(DEADLINE, STEP), x0)?;
     let chart = Chart {
         title: format!("{}: h and its promised bound", vehicle.title()),
         x: Scaling::linear("time (s)"),
@@ -234,7 +234,7 @@ fn inputs(vehicle: Vehicle) -> Result<Vec<Figure>, Error> {
         Vehicle::Unicycle | Vehicle::Bicycle => BOUNDS,
     };
     let setup = Setup { bounds: Some(bounds), ..Setup::advised(DEADLINE, STEP) };
-    let trace = Trace::new(vehicle, Contender::Profile, &setup, x0)?;
+    let trace = Trace::new(vehicle, Baseline::Profile, &setup, x0)?;
     let names = vehicle.inputs();
     let curve = |i: usize, colour: usize| {
         trace.over_time(trace.u.iter().map(|u| u[i]).collect(), names[i], colour, Style::Steps)
@@ -279,14 +279,14 @@ fn phase_portrait() -> Result<Figure, Error> {
     let speeds = [-10.0, -5.0, 0.0, 5.0, 10.0];
     let mut curves = Vec::new();
     for (method, setup, colour, style) in [
-        (Contender::Profile, Setup::advised(T, STEP), 0, Style::Solid),
-        (Contender::RepeatedRoot, Setup { margin: 0.0, ..Setup::advised(T, STEP) }, 1, Style::Dashed),
+        (Baseline::Profile, Setup::advised(T, STEP), 0, Style::Solid),
+        (Baseline::RepeatedRoot, Setup { margin: 0.0, ..Setup::advised(T, STEP) }, 1, Style::Dashed),
     ] {
         for (i, speed) in speeds.into_iter().enumerate() {
             // Along the line of sight, from the middle of the box.
             let part = speed / f64::sqrt(2.0);
             let mut trace = Trace::new(Vehicle::PointMass, method, &setup, [10.0, 10.0, part, part])?;
-            if method == Contender::RepeatedRoot {
+            if method == Baseline::RepeatedRoot {
                 // What follows would hide everything else.
                 trace = trace.cut_at_arrival();
             }
@@ -410,15 +410,15 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
         Curve { label, x: periods.clone(), y: shown, style, colour, dots: true, ends: [None; 2] }
     };
     let methods = [
-        (Contender::RepeatedRoot, "repeated root", Style::Dashed),
-        (Contender::ProfilePointwise, "profile, pointwise", Style::Solid),
-        (Contender::Profile, "profile, compensated", Style::Solid),
+        (Baseline::RepeatedRoot, "repeated root", Style::Dashed),
+        (Baseline::ProfilePointwise, "profile, pointwise", Style::Solid),
+        (Baseline::Profile, "profile, compensated", Style::Solid),
     ];
     let mut late = Vec::new();
     for (i, vehicle) in Vehicle::ALL.into_iter().enumerate() {
         for (method, name, style) in methods {
             let setup = match method {
-                Contender::RepeatedRoot => Setup::paper(DEADLINE, STEP),
+                Baseline::RepeatedRoot => Setup::paper(DEADLINE, STEP),
                 _ => Setup::advised(DEADLINE, STEP),
             };
             let one = |&step: &f64| {
@@ -456,7 +456,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
             if vehicle == Vehicle::PointMass && y.iter().any(|v| *v > 0.0) {
                 short.push(curve(named("shortfall", &y), y, [1, 4, 0][i], style));
             }
-            if vehicle == Vehicle::PointMass && method == Contender::Profile && start == starts[0].0 {
+            if vehicle == Vehicle::PointMass && method == Baseline::Profile && start == starts[0].0 {
                 let clear: Vec<f64> =
                     added.iter().zip(&periods).map(|(m, p)| if *p < CLEAR { 0.0 } else { *m }).collect();
                 add(MARGIN, vehicle, name, &added);
@@ -530,28 +530,28 @@ fn deadlines() -> Result<Figure, Error> {
             curves: vec![
                 curve(
                     "repeated root, quadratic disc, u_ref = 0",
-                    Contender::RepeatedRoot,
+                    Baseline::RepeatedRoot,
                     Setup::paper,
                     1,
                     Style::Dashed,
                 )?,
                 curve(
                     "reference profile, quadratic disc, u_ref = 0",
-                    Contender::Profile,
+                    Baseline::Profile,
                     Setup::paper,
                     4,
                     Style::Dashed,
                 )?,
                 curve(
                     "reference profile, distance-shaped, damping",
-                    Contender::Profile,
+                    Baseline::Profile,
                     Setup::advised,
                     0,
                     Style::Solid,
                 )?,
                 curve(
                     "low-peak profile, distance-shaped, damping",
-                    Contender::LowPeak,
+                    Baseline::LowPeak,
                     Setup::advised,
                     2,
                     Style::Solid,

@@ -3,7 +3,7 @@
 //! Everything runs in process: the filter of `punctual-core`, a plant that moves by the integrator named, inputs held
 //! between samples. Every number is a pure function of the options but the times.
 
-pub mod contender;
+pub mod baseline;
 pub mod figures;
 pub mod guide;
 pub mod page;

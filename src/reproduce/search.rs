@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use rayon::prelude::*;
 
-use super::contender::Contender;
+use super::baseline::Baseline;
 use super::starts::drawn;
 use super::trial::{self, Setup, Vehicle};
 use super::{Options, Watch};
@@ -30,11 +30,11 @@ impl Score {
     }
 }
 
-fn score(vehicle: Vehicle, contender: Contender, setup: &Setup, starts: &[[f64; 4]]) -> Result<Score, Error> {
+fn score(vehicle: Vehicle, baseline: Baseline, setup: &Setup, starts: &[[f64; 4]]) -> Result<Score, Error> {
     let mut peaks = Vec::new();
     let (mut kept, mut on_time) = (0, 0);
     for x0 in starts {
-        let outcome = trial::run(vehicle, contender, setup, *x0)?;
+        let outcome = trial::run(vehicle, baseline, setup, *x0)?;
         kept += usize::from(outcome.kept(setup.deadline));
         on_time += usize::from(outcome.by(setup.deadline));
         peaks.push(outcome.peak[0]);
@@ -44,7 +44,7 @@ fn score(vehicle: Vehicle, contender: Contender, setup: &Setup, starts: &[[f64; 
 }
 
 /// How many loops [`best`] runs, for the progress.
-pub fn loops(method: Contender, options: &Options) -> usize {
+pub fn loops(method: Baseline, options: &Options) -> usize {
     let (coarse, fine, finalists) = options.search;
     method.candidates().len() * coarse + finalists * fine
 }
@@ -55,16 +55,16 @@ pub fn loops(method: Contender, options: &Options) -> usize {
 ///
 /// A parameter out of range.
 pub fn best(
-    method: Contender,
+    method: Baseline,
     vehicle: Vehicle,
     setup: &Setup,
     options: &Options,
     watch: &Watch,
-) -> Result<Contender, Error> {
+) -> Result<Baseline, Error> {
     let (coarse, fine, finalists) = options.search;
-    let rank = |candidates: &[Contender], setup: &Setup, count: usize| -> Result<Vec<Contender>, Error> {
+    let rank = |candidates: &[Baseline], setup: &Setup, count: usize| -> Result<Vec<Baseline>, Error> {
         let starts = drawn(SEED, count);
-        let each = |&candidate: &Contender| {
+        let each = |&candidate: &Baseline| {
             let found = score(vehicle, candidate, setup, &starts).map(|score| (score, candidate));
             watch.done(count);
             found

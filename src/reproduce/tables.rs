@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::contender::Contender;
+use super::baseline::Baseline;
 use super::starts::{drawn, hundred};
 use super::table::{Cell, Table};
 use super::trial::{self, Integrator, Outcome, Setup, Vehicle};
@@ -18,7 +18,7 @@ const SEED_STEP: f64 = 0.01;
 
 /// A method with its parameters in one setting, and what came of it.
 struct Row {
-    contender: Contender,
+    baseline: Baseline,
     origin: &'static str,
     setup: Setup,
     vehicle: Vehicle,
@@ -53,11 +53,11 @@ fn settings() -> [Setup; 2] {
 }
 
 /// The methods of the main table without parameters, in one setting.
-fn fixed(setup: &Setup) -> Vec<Contender> {
+fn fixed(setup: &Setup) -> Vec<Baseline> {
     if setup.is_advised() {
-        vec![Contender::RepeatedRoot, Contender::ProfilePointwise, Contender::Profile]
+        vec![Baseline::RepeatedRoot, Baseline::ProfilePointwise, Baseline::Profile]
     } else {
-        vec![Contender::RepeatedRoot, Contender::ProfilePointwise]
+        vec![Baseline::RepeatedRoot, Baseline::ProfilePointwise]
     }
 }
 
@@ -65,7 +65,7 @@ fn fixed(setup: &Setup) -> Vec<Contender> {
 pub(super) fn loops(options: &Options) -> usize {
     let mut loops = 0;
     for setup in settings() {
-        let methods = Contender::defaults(RANDOM);
+        let methods = Baseline::defaults(RANDOM);
         let searched: usize = methods.iter().map(|method| search::loops(*method, options)).sum();
         loops += Vehicle::ALL.len() * (searched + (fixed(&setup).len() + 2 * methods.len()) * options.runs);
     }
@@ -75,7 +75,7 @@ pub(super) fn loops(options: &Options) -> usize {
 /// All tables, and whether ours kept every deadline in them.
 pub(super) fn all(options: &Options, watch: &Watch) -> Result<(Vec<Table>, bool), Error> {
     let rows = methods(options, watch)?;
-    let ours = |row: &&Row| row.setup.is_advised() && row.contender == Contender::Profile;
+    let ours = |row: &&Row| row.setup.is_advised() && row.baseline == Baseline::Profile;
     let kept = |row: &Row| row.outcomes.iter().all(|o| o.kept(RANDOM));
     let (seeds, seeds_kept) = seeds(options, watch)?;
     let all_kept = seeds_kept && rows.iter().filter(ours).all(kept);
@@ -95,14 +95,14 @@ fn methods(options: &Options, watch: &Watch) -> Result<Vec<Row>, Error> {
     let mut rows = Vec::new();
     for setup in settings() {
         for vehicle in Vehicle::ALL {
-            let mut contenders: Vec<_> = fixed(&setup).into_iter().map(|c| (c, "-")).collect();
-            for method in Contender::defaults(RANDOM) {
-                contenders.push((method, "default"));
-                contenders.push((search::best(method, vehicle, &setup, options, watch)?, "searched"));
+            let mut baselines: Vec<_> = fixed(&setup).into_iter().map(|c| (c, "-")).collect();
+            for method in Baseline::defaults(RANDOM) {
+                baselines.push((method, "default"));
+                baselines.push((search::best(method, vehicle, &setup, options, watch)?, "searched"));
             }
-            for (contender, origin) in contenders {
-                let outcomes = together(vehicle, contender, &setup, &starts, watch)?;
-                rows.push(Row { contender, origin, setup, vehicle, outcomes, nanoseconds: None });
+            for (baseline, origin) in baselines {
+                let outcomes = together(vehicle, baseline, &setup, &starts, watch)?;
+                rows.push(Row { baseline, origin, setup, vehicle, outcomes, nanoseconds: None });
             }
         }
     }
@@ -110,7 +110,7 @@ fn methods(options: &Options, watch: &Watch) -> Result<Vec<Row>, Error> {
     if options.timed {
         for row in &mut rows {
             let x0 = starts.first().copied().unwrap_or_default();
-            let seconds = trial::seconds_per_step(row.vehicle, row.contender, &row.setup, x0)?;
+            let seconds = trial::seconds_per_step(row.vehicle, row.baseline, &row.setup, x0)?;
             row.nanoseconds = Some(1e9 * seconds);
         }
     }
@@ -119,13 +119,13 @@ fn methods(options: &Options, watch: &Watch) -> Result<Vec<Row>, Error> {
 
 fn together(
     vehicle: Vehicle,
-    contender: Contender,
+    baseline: Baseline,
     setup: &Setup,
     starts: &[[f64; 4]],
     watch: &Watch,
 ) -> Result<Vec<Outcome>, Error> {
     let one = |x0: &[f64; 4]| {
-        let outcome = trial::run(vehicle, contender, setup, *x0);
+        let outcome = trial::run(vehicle, baseline, setup, *x0);
         watch.done(1);
         outcome
     };
@@ -160,13 +160,13 @@ pub(super) fn discretisation(options: &Options) -> Result<Table, Error> {
             if step < options.finest {
                 continue;
             }
-            let arrive = |contender, setup| trial::run(vehicle, contender, &setup, [0.0; 4]);
+            let arrive = |baseline, setup| trial::run(vehicle, baseline, &setup, [0.0; 4]);
             let end = 1.05 * DEADLINE;
             let paper_setup = Setup { end, ..Setup::paper(DEADLINE, step) };
-            let by = |integrator| arrive(Contender::RepeatedRoot, Setup { integrator, ..paper_setup });
+            let by = |integrator| arrive(Baseline::RepeatedRoot, Setup { integrator, ..paper_setup });
             let [euler, semi, rk4] = Integrator::ALL.map(by);
             let (rk4, ours) =
-                (rk4?, arrive(Contender::Profile, Setup { end, ..Setup::advised(DEADLINE, step) })?);
+                (rk4?, arrive(Baseline::Profile, Setup { end, ..Setup::advised(DEADLINE, step) })?);
             let time = |o: &Outcome| Cell::optional(o.arrival, 4, "never");
             table.rows.push(vec![
                 vehicle.title().into(),
@@ -218,12 +218,11 @@ fn random_starts(rows: &[Row], options: &Options) -> Table {
     .note("99 against our count of point masses by 5 s: most of them are late by a few steps, so that the paper's count must allow for some;")
     .note("how many it does not say. The counts of the vehicles are of other starts.");
     for (vehicle, paper) in Vehicle::ALL.into_iter().zip(PAPER_COUNTS) {
-        let of = |contender, advised| {
+        let of = |baseline, advised| {
             rows.iter()
-                .find(|r| r.vehicle == vehicle && r.contender == contender && r.setup.is_advised() == advised)
+                .find(|r| r.vehicle == vehicle && r.baseline == baseline && r.setup.is_advised() == advised)
         };
-        let (Some(its), Some(ours)) = (of(Contender::RepeatedRoot, false), of(Contender::Profile, true))
-        else {
+        let (Some(its), Some(ours)) = (of(Baseline::RepeatedRoot, false), of(Baseline::Profile, true)) else {
             continue;
         };
         table.rows.push(vec![
@@ -266,18 +265,18 @@ fn comparison(rows: &[Row], options: &Options) -> Table {
         ]);
     }
     let listed =
-        |c: Contender| matches!(c, Contender::FiniteTime(..) | Contender::RepeatedRoot | Contender::Profile);
-    for row in rows.iter().filter(|r| r.vehicle == Vehicle::PointMass && listed(r.contender)) {
+        |c: Baseline| matches!(c, Baseline::FiniteTime(..) | Baseline::RepeatedRoot | Baseline::Profile);
+    for row in rows.iter().filter(|r| r.vehicle == Vehicle::PointMass && listed(r.baseline)) {
         let percent = |count: usize| Cell::Number(100.0 * count as f64 / row.outcomes.len() as f64, 0);
         let time = row.nanoseconds.map_or(Cell::Nothing("-"), |ns| format!("{ns:.0} ns").into());
         table.rows.push(vec![
             match row.origin {
-                "-" => row.contender.title().into(),
-                origin => format!("{}, {origin}", row.contender.title()).into(),
+                "-" => row.baseline.title().into(),
+                origin => format!("{}, {origin}", row.baseline.title()).into(),
             },
             row.setup.title().into(),
-            Cell::count(row.contender.parameter_count()),
-            row.contender.parameters().into(),
+            Cell::count(row.baseline.parameter_count()),
+            row.baseline.parameters().into(),
             percent(row.by(RANDOM)),
             percent(row.by(2.0 * RANDOM)),
             time,
@@ -324,8 +323,8 @@ fn every_method(rows: &[Row], options: &Options) -> Table {
         let [earliest, latest] = row.arrivals();
         table.rows.push(vec![
             row.setup.title().into(),
-            row.contender.title().into(),
-            row.contender.parameters().into(),
+            row.baseline.title().into(),
+            row.baseline.parameters().into(),
             row.origin.into(),
             row.vehicle.title().into(),
             Cell::count(row.by(RANDOM)),
@@ -360,15 +359,9 @@ fn seeds(options: &Options, watch: &Watch) -> Result<(Table, bool), Error> {
         let mut cells = vec![Cell::count(seed as usize)];
         let (mut latest, mut depth) = (None, f64::INFINITY);
         for vehicle in Vehicle::ALL {
-            let outcomes = together(vehicle, Contender::Profile, &setup, &starts, watch)?;
-            let row = Row {
-                contender: Contender::Profile,
-                origin: "-",
-                setup,
-                vehicle,
-                outcomes,
-                nanoseconds: None,
-            };
+            let outcomes = together(vehicle, Baseline::Profile, &setup, &starts, watch)?;
+            let row =
+                Row { baseline: Baseline::Profile, origin: "-", setup, vehicle, outcomes, nanoseconds: None };
             let kept = row.count(|o| o.kept(RANDOM));
             all &= kept == starts.len();
             latest = row.arrivals()[1].into_iter().chain(latest).reduce(f64::max);
@@ -384,7 +377,7 @@ fn seeds(options: &Options, watch: &Watch) -> Result<(Table, bool), Error> {
 fn cost(rows: &[Row], options: &Options) -> Table {
     let mut table = Table::new(
         "cost",
-        "Time of one step (ns): derivatives, constraint, quadratic programme, report",
+        "Time of one step (ns): derivatives, constraint, quadratic program, report",
         &["setting", "method", "chosen", "point mass", "unicycle", "bicycle"],
     )
     .note("Along the states of one run at 1 ms until T, one thread, the least mean of 7 passes; on a shared machine.");
@@ -393,10 +386,10 @@ fn cost(rows: &[Row], options: &Options) -> Table {
     }
     for row in rows.iter().filter(|row| row.vehicle == Vehicle::PointMass) {
         let same = |other: &&Row| {
-            std::mem::discriminant(&other.contender) == std::mem::discriminant(&row.contender)
+            std::mem::discriminant(&other.baseline) == std::mem::discriminant(&row.baseline)
                 && (other.origin, other.setup.shape) == (row.origin, row.setup.shape)
         };
-        let mut cells = vec![row.setup.title().into(), row.contender.title().into(), row.origin.into()];
+        let mut cells = vec![row.setup.title().into(), row.baseline.title().into(), row.origin.into()];
         cells.extend(rows.iter().filter(same).map(|r| Cell::optional(r.nanoseconds, 0, "-")));
         table.rows.push(cells);
     }

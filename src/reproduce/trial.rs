@@ -10,7 +10,7 @@ use punctual_core::nalgebra::SVector;
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::simulation::{Schedule, closed_loop_by};
 
-use super::contender::Contender;
+use super::baseline::Baseline;
 use crate::error::Error;
 
 /// Centre of the safe disc in m.
@@ -310,19 +310,19 @@ impl Outcome {
     }
 }
 
-/// Runs `vehicle` with `contender` from `x0`; `observe` sees every sample.
+/// Runs `vehicle` with `baseline` from `x0`; `observe` sees every sample.
 ///
 /// # Errors
 ///
 /// A parameter out of range.
 pub fn observed(
     vehicle: Vehicle,
-    contender: Contender,
+    baseline: Baseline,
     setup: &Setup,
     x0: [f64; 4],
     mut observe: impl FnMut(&Sample),
 ) -> Result<Outcome, Error> {
-    let mut filter = contender.filter(vehicle.source(setup.shape)?, setup).map_err(Error::from)?;
+    let mut filter = baseline.filter(vehicle.source(setup.shape)?, setup).map_err(Error::from)?;
     let schedule =
         Schedule { step: setup.step, steps: (setup.end / setup.step).round() as usize, substeps: 1 };
     let mut out = Outcome {
@@ -386,8 +386,8 @@ pub fn observed(
 /// # Errors
 ///
 /// As for [`observed`].
-pub fn run(vehicle: Vehicle, contender: Contender, setup: &Setup, x0: [f64; 4]) -> Result<Outcome, Error> {
-    observed(vehicle, contender, setup, x0, |_| {})
+pub fn run(vehicle: Vehicle, baseline: Baseline, setup: &Setup, x0: [f64; 4]) -> Result<Outcome, Error> {
+    observed(vehicle, baseline, setup, x0, |_| {})
 }
 
 /// Seconds of a filter's step, along the states of the loop from `x0`: the least mean of several passes.
@@ -397,18 +397,18 @@ pub fn run(vehicle: Vehicle, contender: Contender, setup: &Setup, x0: [f64; 4]) 
 /// As for [`observed`].
 pub fn seconds_per_step(
     vehicle: Vehicle,
-    contender: Contender,
+    baseline: Baseline,
     setup: &Setup,
     x0: [f64; 4],
 ) -> Result<f64, Error> {
     const PASSES: usize = 7;
     let setup = Setup { end: setup.deadline, ..*setup };
     let mut samples = Vec::new();
-    observed(vehicle, contender, &setup, x0, |s| samples.push((s.t, s.x, s.u_ref)))?;
+    observed(vehicle, baseline, &setup, x0, |s| samples.push((s.t, s.x, s.u_ref)))?;
     let mut best = f64::INFINITY;
     for _ in 0..PASSES {
         let mut filter: SafetyFilter =
-            contender.filter(vehicle.source(setup.shape)?, &setup).map_err(Error::from)?;
+            baseline.filter(vehicle.source(setup.shape)?, &setup).map_err(Error::from)?;
         let mut u = [0.0; 2];
         let begin = Instant::now();
         for (t, x, u_ref) in &samples {

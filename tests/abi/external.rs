@@ -90,5 +90,5 @@ fn what_is_no_number_is_an_invalid_input() {
     assert_eq!((slave.integer("status"), slave.real("u.u_x")), (1, before));
     // No input changes h: the constraint cannot be met, and that is said.
     slave.set_inputs(&[-30.0, 3.0, -0.5, 0.0, 0.0, -1.0, 1.0]);
-    assert_eq!(slave.integer("status"), 3, "degenerate");
+    assert_eq!(slave.integer("status"), 3, "no_authority");
 }

@@ -283,7 +283,7 @@ impl<'a> Slave<'a> {
             for (field, wanted) in [
                 ("arrived", b.arrived),
                 ("guaranteed", b.guaranteed),
-                ("late_certain", b.late_certain),
+                ("deadline_unreachable", b.deadline_unreachable),
                 ("deadlocked", b.deadlocked),
             ] {
                 assert_eq!(self.flag(&format!("{name}.{field}")), wanted, "{name}.{field} {when}");

@@ -140,12 +140,12 @@ fn a_start_without_a_guarantee_is_code_one() {
 
 /// Standing still and heading across the line to the goal: no input moves h at that instant.
 #[test]
-fn a_degenerate_start_is_code_one() {
+fn a_start_without_authority_is_code_one() {
     let across = format!("theta={}", 0.75 * std::f64::consts::PI);
     let pointwise = ("[plant]", "sampling = \"pointwise\"\n[plant]");
     let done = workshop(&[COARSE, pointwise]).punctual(["check", "filter.toml", "--x0", &across]);
     assert_eq!(done.code, 1, "{done:#?}");
-    assert!(done.stdout.contains("first step with u_ref = 0: degenerate\n"), "{done:#?}");
+    assert!(done.stdout.contains("first step with u_ref = 0: no_authority\n"), "{done:#?}");
     assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");
 }
 

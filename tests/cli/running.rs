@@ -51,7 +51,7 @@ fn header_and_rows() {
     let table = recorded(&[("stop_time = 20.0", "stop_time = 0.01")], "");
     let outputs = ["u.a", "u.omega", "status", "goal.h", "goal.profile", "goal.time_left", "goal.slack"];
     let rest = ["margin_used", "sampling_loss", "unmet_steps", "postponed"];
-    let flags = ["arrived", "guaranteed", "late_certain", "deadlocked", "phase"];
+    let flags = ["arrived", "guaranteed", "deadline_unreachable", "deadlocked", "phase"];
     let rest: Vec<_> = rest.iter().chain(&flags).map(|field| format!("goal.{field}")).collect();
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];
     let mut names = vec!["time".to_owned()];

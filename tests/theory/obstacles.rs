@@ -41,7 +41,7 @@ struct Run {
     /// Steps that were infeasible, and among them those in which an obstacle's constraint was not met.
     infeasible: [usize; 2],
     /// Steps in which no input moves a barrier that should, as at the centre of the goal.
-    degenerate: usize,
+    no_authority: usize,
     /// Whether a deadlock was reported.
     deadlocked: bool,
 }
@@ -78,7 +78,7 @@ where
         arrival: None,
         kept: true,
         infeasible: [0; 2],
-        degenerate: 0,
+        no_authority: 0,
         deadlocked: false,
     };
     for k in 0..=(2.0 * DEADLINE / STEP).round() as usize {
@@ -95,7 +95,7 @@ where
         let infeasible = report.status == Status::Infeasible;
         run.infeasible[0] += usize::from(infeasible);
         run.infeasible[1] += usize::from(infeasible && report.unmet().any(|i| i > 0));
-        run.degenerate += usize::from(report.status == Status::Degenerate);
+        run.no_authority += usize::from(report.status == Status::NoAuthority);
         run.deadlocked |= report.barriers[0].deadlocked;
         let inside = report.barriers[0].h >= 0.0;
         if inside && run.arrival.is_none() {
@@ -150,7 +150,7 @@ fn table(count: usize) {
     ];
     println!(
         "| vehicle | starts | collisions | least clearance | on time | inside from T to 2T | infeasible steps \
-         (an obstacle's) | degenerate steps | deadlocks reported |"
+         (an obstacle's) | steps without authority | deadlocks reported |"
     );
     println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|");
     for (name, runs) in &rows {
@@ -165,7 +165,7 @@ fn table(count: usize) {
             count(|r| r.kept),
             sum(|r| r.infeasible[0]),
             sum(|r| r.infeasible[1]),
-            sum(|r| r.degenerate),
+            sum(|r| r.no_authority),
             count(|r| r.deadlocked),
         );
     }
@@ -173,7 +173,7 @@ fn table(count: usize) {
         let collision = runs.iter().find(|r| r.clearance < 0.0);
         let from = collision.map(|r| r.start);
         assert!(collision.is_none(), "{name}, from {from:?}: {collision:?}");
-        let silent = runs.iter().find(|r| !r.kept && r.infeasible[0] + r.degenerate == 0);
+        let silent = runs.iter().find(|r| !r.kept && r.infeasible[0] + r.no_authority == 0);
         assert!(silent.is_none(), "{name}, late without a word: {silent:?}");
         let late = runs.iter().find(|r| !r.kept);
         assert!(late.is_none() || name.ends_with("10 m"), "{name}: {late:?}");

@@ -183,9 +183,9 @@ fn modules_of_the_core_use_modules_above_them() {
     Order { folder: "core/src/", lines, excepted: &[] }.check();
 }
 
-/// The constraint sees derivatives as numbers, never a model; the programme knows no barrier.
+/// The constraint sees derivatives as numbers, never a model; the program knows no barrier.
 #[test]
-fn constraints_and_programmes_know_no_model() {
+fn constraints_and_programs_know_no_model() {
     for source in SOURCES.iter().filter(|s| !s.is_test()) {
         if ["core/src/convergence/", "core/src/qp/"].iter().any(|folder| source.path.starts_with(folder)) {
             for (line, used) in used_modules(&source.without_tests(), true) {

@@ -60,7 +60,7 @@ impl Centre {
 /// Interior of a disc, the paper's form: h = R² − d², in m².
 ///
 /// The first two states are the position. The gradient vanishes at the centre, where the barrier
-/// cannot be influenced (the filter reports it as degenerate).
+/// cannot be influenced (the filter reports `NoAuthority`).
 #[derive(Clone, Copy, Debug)]
 pub struct QuadraticDisc {
     centre: Centre,

@@ -1,7 +1,7 @@
 //! The seam for constraints that are not this project's: any floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
 //!
 //! [`FixedTime::with_condition`](super::FixedTime::with_condition) puts one in the place of the method of the settings, so that
-//! everything else of a filter (derivatives, rows, programme, report) stays as it is: what is compared
+//! everything else of a filter (derivatives, rows, program, report) stays as it is: what is compared
 //! then is the constraint alone. [`baselines`](crate::baselines) has those of the literature.
 
 /// A constraint h⁽ⁿ⁾ ≥ φ(e₀, τ, e) for a barrier of relative degree n = the length of `anchor`.

@@ -33,7 +33,7 @@ pub struct FilterBuilder {
 }
 
 impl FilterBuilder {
-    /// ‖u − u_ref‖ that a single sample may need before its row counts as degenerate, in units of u.
+    /// ‖u − u_ref‖ that a single sample may need before its row counts as out of reach of the inputs, in units of u.
     pub const DEFAULT_CORRECTION_LIMIT: f64 = 1e6;
 
     pub(super) fn new(state_dim: usize, input_dim: usize) -> Self {
@@ -258,7 +258,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Which method solves programmes of several rows. Default: [`Backend::DualActiveSet`], which does not
+    /// Which method solves programs of several rows. Default: [`Backend::DualActiveSet`], which does not
     /// allocate; the other is for comparison and knows no priorities.
     pub fn backend(mut self, backend: Backend) -> Self {
         self.backend = backend;
@@ -295,7 +295,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// The ‖u − u_ref‖ beyond which a row counts as degenerate; finite, > 0, in units of u. Default:
+    /// The ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u. Default:
     /// [`Self::DEFAULT_CORRECTION_LIMIT`].
     ///
     /// # Errors
@@ -349,7 +349,7 @@ impl FilterBuilder {
     /// unit of x_i. Rows, anchors and phases are then such that the promises hold for the true state, to first order in
     /// the errors. Default: none.
     ///
-    /// Needs the reference profile and a prediction over the period; `late_certain` then stays false until the deadline
+    /// Needs the reference profile and a prediction over the period; `deadline_unreachable` then stays false until the deadline
     /// has passed, and there are no directional derivatives. Some four times the work of a step per measured state.
     ///
     /// # Errors
@@ -435,7 +435,7 @@ impl FilterBuilder {
             outlooks: vec![Outlook::NONE; channels.len()],
             scratch: vec![0.0; state_dim],
             report: Report::new(channels.len()),
-            programme: qp::Workspace::new(backend),
+            qp: qp::Workspace::new(backend),
         };
         let deadlines = channels.iter().map(|c| c.promise.deadline());
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));

@@ -1,7 +1,7 @@
 //! The safety filter: from time, state and reference input to a safe input and a report.
 //!
 //! [`SafetyFilter::step`] reads in the order of the mathematics: evaluate the derivatives of every
-//! barrier, move its phase, build its row, solve the quadratic programme, report. What is remembered
+//! barrier, move its phase, build its row, solve the quadratic program, report. What is remembered
 //! between samples is [`FilterState`], plain data; everything else can be rebuilt without changing a
 //! bit of the result.
 
@@ -96,7 +96,7 @@ struct Workspace {
     /// One state.
     scratch: Vec<f64>,
     report: Report,
-    programme: qp::Workspace,
+    qp: qp::Workspace,
 }
 
 /// Turns barriers with deadlines into a filter on the input: `min ½‖u − u_ref‖²` under one row per
@@ -147,7 +147,7 @@ impl SafetyFilter {
     /// - `u_ref`: the input wanted by whoever is in control.
     /// - `u`: receives the safe input: always finite and within the bounds.
     ///
-    /// Does not allocate. Numerical outcomes (infeasible, degenerate, not-a-number
+    /// Does not allocate. Numerical outcomes (infeasible, no control authority, not-a-number
     /// inputs) are the report's [`Status`], never an error.
     ///
     /// # Errors
@@ -198,7 +198,7 @@ impl SafetyFilter {
             outlooks,
             scratch,
             report,
-            programme,
+            qp,
         } = &mut self.workspace;
         next.clone_from(&self.state);
         report.reset(t);
@@ -272,13 +272,14 @@ impl SafetyFilter {
             if channel.promise.restart(promise, begin, &lowest[..n], period.map_or(0.0, |_| hold)) {
                 demand = channel.promise.advance_by(promise, begin, stack, &unsure, &means);
             }
-            let mut late_certain = promise.phase == Phase::Late;
-            if late_certain || self.bounded {
+            let mut deadline_unreachable = promise.phase == Phase::Late;
+            if deadline_unreachable || self.bounded {
                 let (now, time_left) = ((begin, from), demand.time_left);
-                late_certain = channel.is_lost(promise, now, &self.bounds, time_left);
-                if late_certain && channel.postpone(promise, now, &self.bounds, &lowest[..n], period) {
+                deadline_unreachable = channel.is_lost(promise, now, &self.bounds, time_left);
+                if deadline_unreachable && channel.postpone(promise, now, &self.bounds, &lowest[..n], period)
+                {
                     demand = channel.promise.advance_by(promise, begin, stack, &unsure, &means);
-                    late_certain = false;
+                    deadline_unreachable = false;
                 }
             }
             // Row: L_f^n h + L_g L_f^(n−1) h u ≥ that floor.
@@ -293,7 +294,7 @@ impl SafetyFilter {
                 conditions.push(Condition { channel: i, demand: demands[i], duration: period });
             }
             outlooks[i] = Outlook::new(derivatives, n);
-            reports[i] = BarrierReport { late_certain, ..BarrierReport::of(promise, h, demand, row) };
+            reports[i] = BarrierReport { deadline_unreachable, ..BarrierReport::of(promise, h, demand, row) };
             if !row.floor.is_finite() {
                 report.status = Status::Singular;
             }
@@ -356,7 +357,7 @@ impl SafetyFilter {
                     slopes: &slopes[..],
                     widens,
                 };
-                problem.solve(rows, last, programme, u)
+                problem.solve(rows, last, qp, u)
             });
             report.predicted = matches!(found, Some(Some(_)));
             solution = match found.flatten() {
@@ -366,7 +367,7 @@ impl SafetyFilter {
                     let (rows, enforcement) = (&rows[..count], &enforcement[..count]);
                     let problem =
                         Problem { enforcement, ..Problem::new(rows, bounds, u_ref, correction_limit) };
-                    programme.solve(&problem, u)
+                    qp.solve(&problem, u)
                 }
             };
             for i in 0..count {
@@ -410,7 +411,7 @@ impl SafetyFilter {
             Outcome::Optimal if u == u_ref => Status::Unchanged,
             Outcome::Optimal => Status::Filtered,
             Outcome::Infeasible => Status::Infeasible,
-            Outcome::Degenerate => Status::Degenerate,
+            Outcome::IllConditioned => Status::NoAuthority,
             Outcome::Failed => Status::SolverFailed,
         };
         let mut blocked = false;
@@ -441,7 +442,7 @@ impl SafetyFilter {
         }
         if blocked {
             let barrier = |row: usize| conditions.get(row).map_or(row, |condition| condition.channel);
-            report.find_deadlocks(t, &next.barriers, programme.active(), barrier);
+            report.find_deadlocks(t, &next.barriers, qp.active(), barrier);
         }
         Ok(())
     }
@@ -483,9 +484,9 @@ impl SafetyFilter {
     }
 
     /// How far `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, is from satisfying the
-    /// conditions of optimality of its programme: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
+    /// conditions of optimality of its qp: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
     /// the search stops where it looked over the period ([`Report::predicted`]; of the rows linearised at `u`).
-    /// `None` where no programme was solved. Costs another solve: a check, not for every step. Behind an [`Integrator`]
+    /// `None` where no program was solved. Costs another solve: a check, not for every step. Behind an [`Integrator`]
     /// u and u_ref are those of the rate.
     ///
     /// # Errors
@@ -494,7 +495,7 @@ impl SafetyFilter {
     pub fn residuals(&mut self, u_ref: &[f64], u: &[f64]) -> Result<Option<Residuals>, Error> {
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        let Workspace { rows, enforcement, conditions, report, programme, .. } = &mut self.workspace;
+        let Workspace { rows, enforcement, conditions, report, qp, .. } = &mut self.workspace;
         use Status::{InvalidInput, Singular, SolverFailed, WrongRelativeDegree};
         let unsolved = matches!(report.status, InvalidInput | Singular | WrongRelativeDegree | SolverFailed);
         if unsolved || report.time.is_nan() {
@@ -505,8 +506,8 @@ impl SafetyFilter {
             enforcement: &enforcement[..count],
             ..Problem::new(&rows[..count], &self.bounds, u_ref, self.correction_limit)
         };
-        programme.solve(&problem, &mut [0.0; MAX_INPUTS][..u.len()]);
-        Ok(Some(programme.residuals(&problem, u)))
+        qp.solve(&problem, &mut [0.0; MAX_INPUTS][..u.len()]);
+        Ok(Some(qp.residuals(&problem, u)))
     }
 
     /// The names of the barriers, in the order of the report.

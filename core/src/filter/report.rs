@@ -22,7 +22,7 @@ pub enum Status {
     /// influenced at this instant): the bounded input of least violation, or u_ref without bounds. Where
     /// the constraint is enforced on a predicted state ([`Sampling`](super::Sampling)), also: no input was
     /// found that meets it, and the returned one is the best of the search, finite and within bounds.
-    Degenerate = 3,
+    NoAuthority = 3,
     /// Time, state or reference input is not a number or infinite: the admissible input nearest 0.
     /// Nothing is remembered but that guarantees already given are lost.
     InvalidInput = 4,
@@ -41,7 +41,7 @@ impl Status {
         Self::Unchanged,
         Self::Filtered,
         Self::Infeasible,
-        Self::Degenerate,
+        Self::NoAuthority,
         Self::InvalidInput,
         Self::Singular,
         Self::WrongRelativeDegree,
@@ -81,11 +81,11 @@ pub struct BarrierReport {
     pub recoveries: u32,
     /// Whether no input within the bounds has h ≥ 0 at the deadline ([`reach`](crate::reach)): true from the
     /// first sample of the approach at which that is certain, for plants and barriers that know it.
-    pub late_certain: bool,
+    pub deadline_unreachable: bool,
     /// How often a deadline that the bounds do not allow was given up for a later one, which time left,
     /// profile and guarantee are then about (the settings' `infeasible`).
     pub postponed: u32,
-    /// The row aᵀu ≥ b given to the quadratic programme; a and b in `[h]`/sⁿ. Where the step looked
+    /// The row aᵀu ≥ b given to the quadratic program; a and b in `[h]`/sⁿ. Where the step looked
     /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
@@ -119,7 +119,7 @@ impl BarrierReport {
         margin: 0.0,
         fallback: false,
         recoveries: 0,
-        late_certain: false,
+        deadline_unreachable: false,
         postponed: 0,
         row: Row::ZERO,
         slack: 0.0,
@@ -129,7 +129,7 @@ impl BarrierReport {
         sampling_loss: 0.0,
     };
 
-    /// Before the programme is solved.
+    /// Before the program is solved.
     #[inline]
     pub(super) fn of(promise: &FixedTimeState, h: f64, demand: Demand, row: Row) -> Self {
         Self {
@@ -144,7 +144,7 @@ impl BarrierReport {
             fallback: promise.fallback,
             recoveries: promise.recoveries,
             postponed: promise.postponed,
-            late_certain: false,
+            deadline_unreachable: false,
             row,
             slack: 0.0,
             unmet_steps: 0,
@@ -175,7 +175,7 @@ pub struct Report {
     pub time: f64,
     /// How the step ended.
     pub status: Status,
-    /// Which method solved the quadratic programme.
+    /// Which method solved the quadratic program.
     pub solver: Solver,
     /// Rounds of the active-set method, iterations of the interior-point method, else 0. The one number here that
     /// depends on what the filter did before other than by its state: a step is faster where the same rows and bounds

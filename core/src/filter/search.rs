@@ -4,8 +4,8 @@
 //! The row of the pointwise constraint is affine in u; its integral over the period
 //! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
 //! through the plant. It is solved by Newton's method on the rows: linearise them at the present
-//! guess, solve the quadratic programme, and go towards its answer as far as the violation decreases
-//! (halving the way), that of the rows which the programme does not give up. On the way only rows that are
+//! guess, solve the quadratic program, and go towards its answer as far as the violation decreases
+//! (halving the way), that of the rows which the program does not give up. On the way only rows that are
 //! active or violated are linearised anew; the others keep their last linearisation, at first the pointwise
 //! row, and all are evaluated where the search ends.
 //!
@@ -23,7 +23,7 @@
 //! rest between two answers. So a step taken again, or cut in two, by a master that looks for the size of its steps gives
 //! the same. Any other one, above all one that does not meet the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
 //! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
-//! programme says, by priority.
+//! program says, by priority.
 //!
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of, not
 //! against what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
@@ -124,9 +124,9 @@ impl Linearised<'_> {
     }
 }
 
-/// The rows that are active in the last answer of `programme`, one bit each.
-fn active(programme: &Workspace) -> u64 {
-    programme.active().iter().fold(0, |bits, active| match active.constraint {
+/// The rows that are active in the last answer of `qp`, one bit each.
+fn active(qp: &Workspace) -> u64 {
+    qp.active().iter().fold(0, |bits, active| match active.constraint {
         Constraint::Row(i) => bits | 1 << i,
         Constraint::Lower(_) | Constraint::Upper(_) => bits,
     })
@@ -143,19 +143,19 @@ impl Held<'_> {
         &self,
         rows: &mut [Row],
         last: Option<&[f64]>,
-        programme: &mut Workspace,
+        qp: &mut Workspace,
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
         let mut at = Linearised { rows, violations: [0.0; MAX_ROWS] };
         let mut pointwise = [0.0; MAX_INPUTS];
         let pointwise = &mut pointwise[..m];
-        let first = programme.solve(&self.problem(at.rows), pointwise);
+        let first = qp.solve(&self.problem(at.rows), pointwise);
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
         }
         // Nothing to do where u_ref meets the sampled rows, those first of which it is doubtful.
-        let doubtful = active(programme);
+        let doubtful = active(qp);
         self.linearise(u, doubtful, &mut at)?;
         if at.violated() & doubtful == 0 {
             self.linearise(u, ALL, &mut at)?;
@@ -182,7 +182,7 @@ impl Held<'_> {
                 guess[i] = self.bounds.clamp(i, start[i]);
             }
             at_best = false;
-            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, programme) {
+            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, qp) {
                 let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
                     && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
                 settled |= same && found.ended;
@@ -209,7 +209,7 @@ impl Held<'_> {
         let widens = self.widens || best.is_met(soft) || first.outcome == Outcome::Optimal;
         if !settled
             && widens
-            && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, programme)
+            && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, qp)
         {
             (best, at_best) = (found, false);
         }
@@ -217,15 +217,15 @@ impl Held<'_> {
         if !at_best {
             self.judge(u, &mut at)?;
             // What is active at the answer.
-            programme.solve(&self.problem(at.rows), &mut guess[..m]);
+            qp.solve(&self.problem(at.rows), &mut guess[..m]);
         }
         let outcome = match best.outcome {
             Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
             // The linearised rows can be met, the rows themselves could not.
             Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
-            Outcome::Optimal => Outcome::Degenerate,
+            Outcome::Optimal => Outcome::IllConditioned,
             // What was given up on the way has been met after all.
-            Outcome::Infeasible | Outcome::Degenerate if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
+            Outcome::Infeasible | Outcome::IllConditioned if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
@@ -396,14 +396,14 @@ impl Held<'_> {
         found
     }
 
-    /// Newton's method from `u`, on the rows that the linearised programme does not give up; those of the bits
+    /// Newton's method from `u`, on the rows that the linearised program does not give up; those of the bits
     /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
     fn newton(
         &self,
         u: &mut [f64],
         mut watched: u64,
         at: &mut Linearised,
-        programme: &mut Workspace,
+        qp: &mut Workspace,
     ) -> Option<Guess> {
         let m = u.len();
         self.linearise(u, watched, at)?;
@@ -423,8 +423,8 @@ impl Held<'_> {
         let mut ended = false;
         for _ in 0..ITERATIONS {
             let target = &mut target[..m];
-            let solution = programme.solve(&self.problem(at.rows), target);
-            let lost = |i: usize| programme.is_relaxed(i) || programme.is_degenerate(i);
+            let solution = qp.solve(&self.problem(at.rows), target);
+            let lost = |i: usize| qp.is_relaxed(i) || qp.is_ill_conditioned(i);
             found.given_up = (0..at.rows.len()).filter(|i| lost(*i)).fold(soft, |bits, i| bits | 1 << i);
             found.outcome = solution.outcome;
             found.solver = solution.solver;
@@ -450,7 +450,7 @@ impl Held<'_> {
             }
             found.sure &= way <= CONTRACTION * last_way;
             last_way = way;
-            watched |= active(programme) | at.violated();
+            watched |= active(qp) | at.violated();
             let mut part = 1.0;
             let mut moved = false;
             for _ in 0..=HALVINGS {
@@ -494,7 +494,7 @@ struct Guess {
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
-    /// Whether the programme linearised at it does not move it any more.
+    /// Whether the program linearised at it does not move it any more.
     ended: bool,
     /// Whether it met every row by steps that contracted: there is no other answer near.
     sure: bool,

@@ -149,7 +149,7 @@ impl SafetyFilter {
     /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
     ///   in components that a bound holds.
     /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and
-    ///   [`Degenerate`](Status::Degenerate): (8) with the active rows, those that hold back a row that cannot be
+    ///   [`NoAuthority`](Status::NoAuthority): (8) with the active rows, those that hold back a row that cannot be
     ///   met among them; rows given up or left out take no part. A single row that cannot be met: 0 in the
     ///   components at their bounds, the direction of u_ref in the others.
     /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
@@ -233,21 +233,21 @@ impl SafetyFilter {
         let report = &workspace.report;
         let limit = self.correction_limit;
         let problem = Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) };
-        let mut programme = qp::Workspace::default();
+        let mut qp = qp::Workspace::default();
         let mut again = [0.0; MAX_INPUTS];
         let again = &mut again[..u.len()];
         for (i, v) in again.iter_mut().enumerate() {
             *v = self.bounds.clamp(i, u_ref[i]);
         }
         if !matches!(report.solver, Solver::Unchanged) && report.status != Status::SolverFailed {
-            programme.solve(&problem, again);
+            qp.solve(&problem, again);
         }
         let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
         let same = if report.status.is_satisfied() { SAME_INPUT } else { SAME_INPUT_UNMET };
         if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
             return Err(NoDerivative::NotConverged);
         }
-        let active = programme.active();
+        let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
             let mut equations = Equations::new(du_ref);
             for active in active {

@@ -39,10 +39,10 @@ pub(super) fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], limit: f64, u:
     let met = |rows: &[Row], u: &[f64]| rows.iter().all(|row| row.slack(u) >= -MET * size(row, u));
     let within_reach = |row: &&Row| row.floor - dot(&row.normal, u_ref) <= limit;
     let outcome = if answer(&units, &[None], u) && met(&units, u) {
-        if lost { Outcome::Degenerate } else { Outcome::Optimal }
+        if lost { Outcome::IllConditioned } else { Outcome::Optimal }
     } else if answer(&units, &relaxed, u) {
         match (met(&units, u), lost) {
-            (_, true) => Outcome::Degenerate,
+            (_, true) => Outcome::IllConditioned,
             (true, false) => Outcome::Optimal,
             (false, false) => Outcome::Infeasible,
         }
@@ -55,7 +55,7 @@ pub(super) fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], limit: f64, u:
                 *ui = bounds.clamp(i, u_ref[i]);
             }
         }
-        if far || lost || converged { Outcome::Degenerate } else { Outcome::Failed }
+        if far || lost || converged { Outcome::IllConditioned } else { Outcome::Failed }
     };
     Solution { outcome, solver: Solver::InteriorPoint, iterations }
 }

@@ -1,4 +1,4 @@
-//! The quadratic programme `min ½‖u − u_ref‖²` under affine rows and bounds: linear algebra only.
+//! The quadratic program `min ½‖u − u_ref‖²` under affine rows and bounds: linear algebra only.
 //!
 //! ```text
 //! minimise ½ (u − u_ref)ᵀ W (u − u_ref)  subject to  a_iᵀ u ≥ b_i (i = 1 … m),  u_min ≤ u ≤ u_max
@@ -18,7 +18,7 @@
 //! that do so the one nearest to u_ref is returned. Soft rows ([`Enforcement::Soft`]) yield to every hard
 //! one. The outcome says which it was, [`Workspace::is_relaxed`] which rows.
 //!
-//! A row whose normal vanishes, or that would move u by more than the correction limit, is degenerate:
+//! A row whose normal vanishes, or that would move u by more than the correction limit, is ill-conditioned:
 //! where there are several rows it is left out and the others are met.
 //!
 //! A workspace starts warm: where several rows or bounds are active it tries those of its last answer first. The
@@ -144,7 +144,7 @@ pub enum Enforcement {
     },
 }
 
-/// One programme.
+/// One program.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// At most [`MAX_ROWS`].
@@ -158,7 +158,7 @@ pub struct Problem<'a> {
     /// Of each row; rows beyond its end are hard with priority 0.
     pub enforcement: &'a [Enforcement],
     /// How far, > 0 in units of u, the rows may move u from the reference within its bounds: one that needs
-    /// more is degenerate.
+    /// more is ill-conditioned.
     pub correction_limit: f64,
 }
 
@@ -205,7 +205,7 @@ pub enum Outcome {
     /// A row cannot be met because its normal is too small: meeting it would change u by more than the
     /// correction limit. One row alone: the bounded input of least violation, u_ref where there are no
     /// bounds. Several: the row is left out, the others are met as they can be.
-    Degenerate,
+    IllConditioned,
     /// The method did not converge: u_ref within its bounds.
     Failed,
 }
@@ -315,7 +315,7 @@ impl Workspace {
             match outcome {
                 Outcome::Optimal => self.take_over(p, u, multiplier),
                 Outcome::Infeasible => self.relaxed = 1,
-                Outcome::Degenerate | Outcome::Failed => self.lost = 1,
+                Outcome::IllConditioned | Outcome::Failed => self.lost = 1,
             }
             return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
         }
@@ -385,9 +385,9 @@ impl Workspace {
         i < MAX_ROWS && self.relaxed >> i & 1 == 1
     }
 
-    /// Whether row `i` of the last solve was degenerate ([`Outcome::Degenerate`]). Unknown to the
+    /// Whether row `i` of the last solve was ill-conditioned ([`Outcome::IllConditioned`]). Unknown to the
     /// interior-point method.
-    pub fn is_degenerate(&self, i: usize) -> bool {
+    pub fn is_ill_conditioned(&self, i: usize) -> bool {
         i < MAX_ROWS && self.lost >> i & 1 == 1
     }
 
@@ -398,7 +398,7 @@ impl Workspace {
     }
 }
 
-/// Solves one programme of hard rows with W = 1 into `u`, as [`Workspace::solve`] does: a workspace saves the
+/// Solves one program of hard rows with W = 1 into `u`, as [`Workspace::solve`] does: a workspace saves the
 /// cost of making one.
 ///
 /// # Panics

@@ -1,4 +1,4 @@
-//! u_ref itself, or one active row in closed form: the answer of most programmes.
+//! u_ref itself, or one active row in closed form: the answer of most programs.
 //!
 //! The point of a row's plane nearest to u_ref, `u = u_ref + λ a` with λ = (b − aᵀu_ref)/‖a‖², has a
 //! multiplier λ > 0. Where it also satisfies all other rows and the bounds, it satisfies every condition of

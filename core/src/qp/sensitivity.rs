@@ -1,4 +1,4 @@
-//! How the solution of a programme moves: one linear system.
+//! How the solution of a program moves: one linear system.
 //!
 //! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Along a
 //! direction in which everything they are made of moves, with the multipliers' change μ,

@@ -20,7 +20,7 @@ pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &m
     let m = u.len();
     let Some(Row { normal: a, floor }) = scaled(row) else {
         least_violation(row, bounds, u_ref, u);
-        return (Outcome::Degenerate, 0.0);
+        return (Outcome::IllConditioned, 0.0);
     };
     let moves = |i: usize| a[i].abs() >= NEGLIGIBLE;
     // The multipliers between which component i moves: a reference outside its bounds moves only once
@@ -69,12 +69,12 @@ pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &m
                 return (Outcome::Optimal, solution.max(lambda) * power_of_two(&row.normal).unwrap_or(1.0));
             }
             least_violation(row, bounds, u_ref, u);
-            return (Outcome::Degenerate, 0.0);
+            return (Outcome::IllConditioned, 0.0);
         }
         if next.is_infinite() {
             // Every component that can help is at its bound, or too flat to get there.
             let outcome = match least_violation(row, bounds, u_ref, u) {
-                false => Outcome::Degenerate,
+                false => Outcome::IllConditioned,
                 true if slope == 0.0 && row.holds(u) => Outcome::Optimal,
                 true => Outcome::Infeasible,
             };

@@ -1,4 +1,4 @@
-//! The exact answer of small quadratic programmes, by enumeration of active sets in double-double
+//! The exact answer of small quadratic programs, by enumeration of active sets in double-double
 //! arithmetic (about 32 digits).
 
 #![allow(dead_code, reason = "each test binary uses its part")]

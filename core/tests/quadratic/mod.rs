@@ -1,4 +1,4 @@
-//! Quadratic programmes for the tests: short constructors and proptest strategies.
+//! Quadratic programs for the tests: short constructors and proptest strategies.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 

@@ -118,7 +118,7 @@ impl FilterBlock {
             for (i, count) in [b.unmet_steps, b.postponed].into_iter().enumerate() {
                 values.integers[at + 6 + i] = i32::try_from(count).unwrap_or(i32::MAX);
             }
-            let flags = [b.arrived, b.guaranteed, b.late_certain, b.deadlocked];
+            let flags = [b.arrived, b.guaranteed, b.deadline_unreachable, b.deadlocked];
             values.booleans[at + 8..][..4].copy_from_slice(&flags);
             values.integers[at + 12] = b.phase as i32;
             at += BARRIER_OUTPUTS;

@@ -142,7 +142,7 @@ pub struct FilterConfiguration {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub period_max: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
-    /// reported as degenerate. Default 1e6.
+    /// reported as `no_authority`. Default 1e6.
     #[serde(default = "correction_limit")]
     pub correction_limit: f64,
     /// The plant that the filter is for.

@@ -10,12 +10,12 @@
 //! a factor until they exceed the distance of an input that is known to meet the rows. What is kept are the
 //! local minima over the grid: of the distance where the rows hold, of the violation elsewhere.
 //!
-//! **Restoration.** From there to the rows by the shortest way: the linearised programme with u in place of
+//! **Restoration.** From there to the rows by the shortest way: the linearised program with u in place of
 //! u_ref, and back to a third of the way as long as the violation does not decrease.
 //!
-//! **Polishing.** From an input that meets the rows towards the answer of the linearised programme. Each trial is
+//! **Polishing.** From an input that meets the rows towards the answer of the linearised qp. Each trial is
 //! restored (the correction of second order), and taken where it is nearer to u_ref by a part of what the
-//! programme promises. So every iterate meets the rows, and the distance only falls.
+//! program promises. So every iterate meets the rows, and the distance only falls.
 //!
 //! **Sharpening.** The distance is flat at its least, so that polishing ends at about the root of the tolerance. If
 //! Newton's method does not converge from there, steps of the secant method along the row do.
@@ -49,7 +49,7 @@ const FIRST_PART: f64 = 0.3;
 const LARGEST_PART: f64 = 10.0;
 /// Trials of one step.
 const TRIALS: usize = 4;
-/// The part of what the linearised programme promises that must come true.
+/// The part of what the linearised program promises that must come true.
 const SUFFICIENT: f64 = 0.1;
 /// Starts are looked at up to this part of the distance of the answer that is known.
 const NEAR: f64 = 1.2;
@@ -108,7 +108,7 @@ impl Held<'_> {
         guesses: &[Option<&[f64]>],
         best: &Guess,
         at: &mut Linearised,
-        programme: &mut Workspace,
+        qp: &mut Workspace,
     ) -> Option<Guess> {
         let m = u.len();
         let given_up = self.soft();
@@ -130,14 +130,14 @@ impl Held<'_> {
         let iterations = best.iterations;
         let mut found = false;
         if !known {
-            found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+            found |= self.finish(&mut starts, &mut nearest, given_up, at, qp);
         }
         // Once more from the first answer: inputs near u_ref that all but meet the rows come after all that do.
         for _ in 0..2 {
             let limit = nearest.distance;
             let mut starts = Starts::within(NEAR * limit);
             self.scan_all(limit, given_up, at, &mut starts);
-            found |= self.finish(&mut starts, &mut nearest, given_up, at, programme);
+            found |= self.finish(&mut starts, &mut nearest, given_up, at, qp);
             if limit.is_finite() || nearest.distance.is_infinite() {
                 break;
             }
@@ -151,7 +151,7 @@ impl Held<'_> {
             nearest.distance = best.distance;
         }
         let mut exact = nearest.u;
-        if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, programme)
+        if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, qp)
             && guess.is_met(given_up)
             && guess.ended
             && guess.distance <= (1.0 + NEARER) * nearest.distance
@@ -159,7 +159,7 @@ impl Held<'_> {
             u.copy_from_slice(&exact[..m]);
             return Some(Guess { iterations: iterations + guess.iterations, ..guess });
         }
-        self.sharpen(&mut nearest, given_up, at, programme);
+        self.sharpen(&mut nearest, given_up, at, qp);
         u.copy_from_slice(&nearest.u[..m]);
         Some(Guess {
             given_up,
@@ -181,7 +181,7 @@ impl Held<'_> {
         nearest: &mut Start,
         given_up: u64,
         at: &mut Linearised,
-        programme: &mut Workspace,
+        qp: &mut Workspace,
     ) -> bool {
         let mut found = false;
         for start in &mut starts.kept {
@@ -190,10 +190,10 @@ impl Held<'_> {
             if !start.distance.is_finite() || !near(start) {
                 continue;
             }
-            self.restore(start, RESTORING[0], given_up, at, programme);
+            self.restore(start, RESTORING[0], given_up, at, qp);
             if start.violation <= 0.0 && near(start) {
                 let wanted = (1.0 - NEARER) * nearest.distance;
-                self.polish(start, wanted, given_up, at, programme);
+                self.polish(start, wanted, given_up, at, qp);
                 if start.distance < wanted || nearest.distance.is_infinite() {
                     (*nearest, found) = (*start, true);
                 }
@@ -309,7 +309,7 @@ impl Held<'_> {
         steps: usize,
         given_up: u64,
         at: &mut Linearised,
-        programme: &mut Workspace,
+        qp: &mut Workspace,
     ) {
         let m = self.u_ref.len();
         self.measure(start, m, given_up, at);
@@ -319,7 +319,7 @@ impl Held<'_> {
             }
             let mut target = [0.0; MAX_INPUTS];
             let nearest = Problem { u_ref: &start.u[..m], ..self.problem(at.rows) };
-            programme.solve(&nearest, &mut target[..m]);
+            qp.solve(&nearest, &mut target[..m]);
             let way = (0..m).fold(0.0, |w: f64, i| w.max((target[i] - start.u[i]).abs()));
             if way <= MET * start.u.iter().fold(1.0, |s: f64, v| s.max(v.abs())) {
                 return;
@@ -343,19 +343,12 @@ impl Held<'_> {
 
     /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that
     /// promises to be nearer than `known`.
-    fn polish(
-        &self,
-        start: &mut Start,
-        known: f64,
-        given_up: u64,
-        at: &mut Linearised,
-        programme: &mut Workspace,
-    ) {
+    fn polish(&self, start: &mut Start, known: f64, given_up: u64, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         for step in 0..POLISHING {
             self.measure(start, m, given_up, at);
             let mut target = [0.0; MAX_INPUTS];
-            programme.solve(&self.problem(at.rows), &mut target[..m]);
+            qp.solve(&self.problem(at.rows), &mut target[..m]);
             let there = self.distance(&target[..m]);
             let promised = start.distance - there;
             let hopeless = step > 0 && there >= known && start.distance >= known;
@@ -365,7 +358,7 @@ impl Held<'_> {
             let (mut part, mut moved) = (1.0, false);
             for _ in 0..TRIALS {
                 let mut trial = self.between(start, &target, part);
-                self.restore(&mut trial, RESTORING[1], given_up, at, programme);
+                self.restore(&mut trial, RESTORING[1], given_up, at, qp);
                 if trial.violation <= 0.0 && trial.distance <= start.distance - SUFFICIENT * part * promised {
                     (*start, moved) = (trial, true);
                     break;
@@ -378,13 +371,13 @@ impl Held<'_> {
         }
     }
 
-    /// Moves from a polished answer, known to about the root of the tolerance, to where the programme linearised there
+    /// Moves from a polished answer, known to about the root of the tolerance, to where the program linearised there
     /// does not move it any more.
     ///
-    /// Where the rows curve, full steps towards the programme's answer overshoot. With two of them, Δu and the
+    /// Where the rows curve, full steps towards the program's answer overshoot. With two of them, Δu and the
     /// change ΔR of what is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the
     /// row.
-    fn sharpen(&self, start: &mut Start, given_up: u64, at: &mut Linearised, programme: &mut Workspace) {
+    fn sharpen(&self, start: &mut Start, given_up: u64, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         let (mut point, mut least) = (*start, f64::INFINITY);
         let mut before: Option<(Input, Input)> = None;
@@ -394,7 +387,7 @@ impl Held<'_> {
                 return;
             }
             let mut target = [0.0; MAX_INPUTS];
-            programme.solve(&self.problem(at.rows), &mut target[..m]);
+            qp.solve(&self.problem(at.rows), &mut target[..m]);
             let left: Input = std::array::from_fn(|i| target[i] - point.u[i]);
             let way = left.iter().fold(0.0, |w: f64, d| w.max(d.abs()));
             if way < least && point.distance <= (1.0 + NEARER) * start.distance {
@@ -417,7 +410,7 @@ impl Held<'_> {
             }
             before = Some((point.u, left));
             point = self.between(&point, &target, part);
-            self.restore(&mut point, RESTORING[1], given_up, at, programme);
+            self.restore(&mut point, RESTORING[1], given_up, at, qp);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Several rows: a dual active-set method of the Goldfarb-Idnani family.
 //!
-//! In the variables δ = √W (u − u_ref) the programme is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active
+//! In the variables δ = √W (u − u_ref) the program is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active
 //! rows, with normals N = Q R (module `factors`) and multipliers λ ≥ 0, give δ = Nλ. Each round takes
 //! the row p that is violated most by its distance, and raises its multiplier by t:
 //!
@@ -149,7 +149,7 @@ impl<const N: usize> DualActiveSet<N> {
                 if self.lost == 0 {
                     Outcome::Optimal
                 } else {
-                    Outcome::Degenerate
+                    Outcome::IllConditioned
                 }
             }
             _ => {
@@ -271,7 +271,7 @@ impl<const N: usize> DualActiveSet<N> {
         if stuck && self.rounds > self.limit {
             Outcome::Failed
         } else if self.lost != 0 {
-            Outcome::Degenerate
+            Outcome::IllConditioned
         } else if self.relaxed != 0 {
             Outcome::Infeasible
         } else {

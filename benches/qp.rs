@@ -1,4 +1,4 @@
-//! Cost of the quadratic programme by itself: `cargo bench --bench programme`. The interior-point method
+//! Cost of the quadratic program by itself: `cargo bench --bench qp`. The interior-point method
 //! runs beside the active-set method on the same problems.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
@@ -23,7 +23,7 @@ fn goal_and(others: usize) -> Vec<Row> {
     std::iter::once(row([0.7, 0.3], 0.8)).chain((0..others).map(around)).collect()
 }
 
-fn programmes(c: &mut Criterion) {
+fn programs(c: &mut Criterion) {
     let mut bounds = Bounds::NONE;
     bounds.min[..2].fill(-1.25);
     bounds.max[..2].fill(1.25);
@@ -51,7 +51,7 @@ fn programmes(c: &mut Criterion) {
             let outcome = workspace.solve(&Problem::new(rows, bounds, &u_ref, 1e6), &mut u).outcome;
             let wanted = if name.starts_with("infeasible") { Outcome::Infeasible } else { Outcome::Optimal };
             assert_eq!(outcome, wanted, "{name}");
-            c.bench_function(&format!("programme/{name}{suffix}"), |b| {
+            c.bench_function(&format!("qp/{name}{suffix}"), |b| {
                 b.iter(|| {
                     let p = Problem::new(black_box(rows), bounds, black_box(&u_ref), 1e6);
                     workspace.solve(&p, &mut u).iterations
@@ -63,10 +63,10 @@ fn programmes(c: &mut Criterion) {
             let p = Problem::new(rows, bounds, &u_ref, 1e6);
             let mut u = [0.0; 2];
             workspace.solve(&p, &mut u);
-            c.bench_function("programme/residuals", |b| b.iter(|| workspace.residuals(&p, black_box(&u))));
+            c.bench_function("qp/residuals", |b| b.iter(|| workspace.residuals(&p, black_box(&u))));
         }
     }
 }
 
-criterion_group!(benches, programmes);
+criterion_group!(benches, programs);
 criterion_main!(benches);

@@ -7,7 +7,7 @@ use punctual_core::lie::DerivativeSource;
 
 /// A constraint with its parameters, for relative degree 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Contender {
+pub enum Baseline {
     /// The paper's.
     RepeatedRoot,
     /// Ours: the Hermite profile with its default rate, held inputs accounted for, their period known from the start.
@@ -28,7 +28,7 @@ pub enum Contender {
     Tube(usize, f64),
 }
 
-impl Contender {
+impl Baseline {
     /// Its name in tables, without parameters.
     pub fn title(self) -> &'static str {
         match self {

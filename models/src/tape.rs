@@ -113,13 +113,13 @@ pub(crate) enum Value {
 
 /// A list of operations under construction.
 #[derive(Clone, Debug)]
-pub(crate) struct Programme {
+pub(crate) struct Tape {
     pub(crate) steps: Vec<Step>,
     pub(crate) registers: usize,
     known: HashMap<Operation, Register>,
 }
 
-impl Programme {
+impl Tape {
     /// Without operations; the first `variables` registers are given from outside.
     pub(crate) fn new(variables: usize) -> Self {
         Self { steps: Vec::new(), registers: variables, known: HashMap::new() }
@@ -167,7 +167,7 @@ impl Programme {
     }
 }
 
-impl Record for Programme {
+impl Record for Tape {
     fn done(&mut self, operation: Operation) -> Register {
         if let Some(&register) = self.known.get(&operation) {
             return register;
