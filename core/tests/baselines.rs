@@ -4,7 +4,7 @@
 //! constraint with equality; held inputs of `STEP` seconds leave an error of first order in it.
 
 use punctual_core::barrier::Barrier;
-use punctual_core::baselines::{Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Tube};
+use punctual_core::baselines::{Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Sample, Tube};
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::ControlAffine;
@@ -144,7 +144,7 @@ fn a_tube_is_kept_until_it_is_the_set() {
     let start = [-4.0, 0.0, 0.0];
     let (h, _, _) = follow(tube, start.into(), 3.0);
     for (k, h) in h.iter().enumerate() {
-        let bound = tube.lower_bound(&start, DEADLINE, k as f64 * STEP).unwrap();
+        let bound = tube.bound(&Sample::new(&start, DEADLINE, k as f64 * STEP, &start)).lower;
         // What held inputs cost.
         assert!(*h >= bound - STEP, "{h} below {bound} at {}", k as f64 * STEP);
     }

@@ -4,7 +4,8 @@
 
 use proptest::prelude::*;
 use punctual_core::convergence::comparison::{factorial, lower_bound, lower_terms};
-use punctual_core::convergence::hermite::HermiteProfile;
+use punctual_core::convergence::hermite::Hermite;
+use punctual_core::convergence::profile::Profile;
 
 /// One step of the classical Runge–Kutta method for e⁽ⁿ⁾ = `top`(τ, e).
 fn rk4(e: &[f64], tau: f64, step: f64, top: impl Fn(f64, &[f64]) -> f64) -> Vec<f64> {
@@ -67,8 +68,7 @@ proptest! {
     #[test]
     fn the_profile_is_the_smoothest(e in prop::collection::vec(-1.0..1.0_f64, 1..=8)) {
         let n = e.len();
-        let profile = HermiteProfile::new(&e, 1.0);
-        let values: Vec<f64> = (0..=n).map(|i| profile.evaluate(0.1 * i as f64)[n]).collect();
+        let values: Vec<f64> = (0..=n).map(|i| Hermite.evaluate(&e, 1.0, 0.1 * i as f64)[n]).collect();
         let mut differences = values.clone();
         for _ in 0..n {
             differences = differences.windows(2).map(|w| w[1] - w[0]).collect();
@@ -91,7 +91,7 @@ fn the_profile_equals_exact_rationals() {
         let number = |text: &str| text.parse::<f64>().expect("a number");
         let fields: Vec<Vec<f64>> = row.split(',').map(|f| f.split(' ').map(number).collect()).collect();
         let [deadline, elapsed, e, wanted, size] = &fields[..] else { panic!("{row}") };
-        let found = HermiteProfile::new(e, deadline[0]).evaluate(elapsed[0]);
+        let found = Hermite.evaluate(e, deadline[0], elapsed[0]);
         for k in 0..=e.len() {
             let error = (found[k] - wanted[k]).abs();
             assert!(error <= ROUND_OFF * size[k], "{row}: order {k}, {} for {}", found[k], wanted[k]);

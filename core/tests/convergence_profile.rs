@@ -1,8 +1,9 @@
 //! Profiles of one's own: the check accepts what is right and names what is not; distinct rates.
 
 use punctual_core::convergence::comparison::factorial;
-use punctual_core::convergence::hermite::HermiteProfile;
+use punctual_core::convergence::hermite::Hermite;
 use punctual_core::convergence::operator::Operator;
+use punctual_core::convergence::profile::Profile;
 use punctual_core::convergence::profile::{Derivatives, Hermite, LowPeak, Profile, ProfileError, check};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, ProfileKind, Refusal};
 
@@ -15,7 +16,7 @@ struct Broken {
 
 impl Profile for Broken {
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
-        let mut r = HermiteProfile::new(anchor, deadline).evaluate(elapsed);
+        let mut r = Hermite.evaluate(anchor, deadline, elapsed);
         if elapsed >= self.from {
             r[self.order] += self.by;
         }

@@ -13,7 +13,7 @@ use std::time::Instant;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::convergence::FixedTime;
-use punctual_core::convergence::sampled::SampledDemand;
+use punctual_core::convergence::sampled::PeriodBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
@@ -62,7 +62,7 @@ impl Barrier<4> for Set {
 /// One row as the oracle sees it.
 struct Asked<'a> {
     source: &'a dyn DerivativeSource,
-    demand: SampledDemand,
+    demand: PeriodBound,
     /// The least h between the samples, from so many seconds on.
     floor: Option<(f64, f64)>,
 }

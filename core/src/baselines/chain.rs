@@ -1,6 +1,6 @@
 //! High-order control barrier functions: a chain of class-K functions.
 
-use super::{Condition, checked_order};
+use super::{Bound, Condition, Sample, checked_order};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::jet::Taylor;
@@ -170,8 +170,8 @@ impl Chain {
 }
 
 impl Condition for Chain {
-    fn floor(&self, _anchor: &[f64], _deadline: f64, _elapsed: f64, e: &[f64]) -> f64 {
-        -self.run(e, &mut [0.0; MAX_RELATIVE_DEGREE])
+    fn bound(&self, at: &Sample) -> Bound {
+        Bound::floor(-self.run(at.e, &mut [0.0; MAX_RELATIVE_DEGREE]))
     }
 }
 
@@ -180,6 +180,10 @@ mod tests {
     use super::*;
     use crate::convergence::operator::Operator;
 
+    fn floor(chain: &Chain, e: &[f64]) -> f64 {
+        chain.bound(&Sample::new(e, 1.0, 0.0, e)).floor
+    }
+
     #[test]
     fn linear_functions_are_the_product_of_their_factors() {
         let gains = [0.5, 2.0, 1.25, 3.0, 0.75, 1.0, 4.0, 0.25];
@@ -187,7 +191,7 @@ mod tests {
         for n in 1..=MAX_RELATIVE_DEGREE {
             let chain = Chain::linear(&gains[..n]).expect("valid gains");
             let wanted = -Operator::new(&gains[..n]).expect("valid rates").lower_terms(&e[..n]);
-            let found = chain.floor(&[], 1.0, 0.0, &e[..n]);
+            let found = floor(&chain, &e[..n]);
             // A few dozen operations on numbers below 1000.
             assert!((found - wanted).abs() < 1e-11 * wanted.abs().max(1.0), "n = {n}: {found} for {wanted}");
         }
@@ -203,7 +207,7 @@ mod tests {
             let sign = |v: f64, q: f64| v.abs().powf(q) * v.signum();
             let psi = dh + p[0] * sign(h, q[0]);
             let wanted = -(p[0] * q[0] * f64::abs(h).powf(q[0] - 1.0) * dh + p[1] * sign(psi, q[1]));
-            let found = chain.floor(&[], 1.0, 0.0, &[h, dh]);
+            let found = floor(&chain, &[h, dh]);
             assert!((found - wanted).abs() < 1e-13 * (1.0 + wanted.abs()), "{found} for {wanted}");
             assert!((chain.psi(&[h, dh])[1] - psi).abs() < 1e-14 * (1.0 + psi.abs()));
         }
@@ -222,7 +226,7 @@ mod tests {
         for t in [0.0, 0.25, 0.9] {
             let s: f64 = 1.0 - t;
             let h = [-s.powi(4), 4.0 * s.powi(3), -12.0 * s * s];
-            let found = chain.floor(&[], 1.0, 0.0, &h);
+            let found = floor(&chain, &h);
             assert!((found - 24.0 * s).abs() < 1e-12, "{found} at {t}");
             // 1^{1/4}/(4 · 1/4) = 1 s from the start: it is exact for the first link alone.
             let first = Chain::new(&functions[..1]).expect("valid");
@@ -233,7 +237,7 @@ mod tests {
     #[test]
     fn at_zero_a_power_below_one_has_no_derivative() {
         let chain = Chain::finite_time(&[1.0, 1.0], &[0.5, 0.5]).expect("valid");
-        assert!(!chain.floor(&[], 1.0, 0.0, &[0.0, 1.0]).is_finite());
+        assert!(!floor(&chain, &[0.0, 1.0]).is_finite());
         assert!(chain.reach_time(&[1.0, 1.0]) == 0.0);
         assert!(Chain::linear(&[1.0]).expect("valid").reach_time(&[-1.0]).is_infinite());
     }

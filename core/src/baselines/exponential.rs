@@ -1,6 +1,6 @@
 //! The exponential control barrier function.
 
-use super::{Condition, checked_order};
+use super::{Bound, Condition, Sample, checked_order};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::convergence::operator::Operator;
 use crate::error::Error;
@@ -37,7 +37,7 @@ impl Exponential {
 }
 
 impl Condition for Exponential {
-    fn floor(&self, _anchor: &[f64], _deadline: f64, _elapsed: f64, e: &[f64]) -> f64 {
-        -self.0.lower_terms(e)
+    fn bound(&self, at: &Sample) -> Bound {
+        Bound::floor(-self.0.lower_terms(at.e))
     }
 }

@@ -1,7 +1,7 @@
 //! The first-order fixed-time control barrier function.
 
 use super::chain::{Chain, ClassK};
-use super::{Condition, checked_order};
+use super::{Bound, Condition, Sample, checked_order};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::convergence::first_order::Exponent;
 use crate::error::{Error, positive};
@@ -38,18 +38,18 @@ impl FirstOrderFixedTime {
 }
 
 impl Condition for FirstOrderFixedTime {
-    fn floor(&self, anchor: &[f64], deadline: f64, _elapsed: f64, e: &[f64]) -> f64 {
-        let p = self.exponent.get();
+    fn bound(&self, at: &Sample) -> Bound {
+        let (p, anchor) = (self.exponent.get(), at.anchor[0]);
         // On the boundary at the anchor nothing has to be reached, and any gain keeps it.
-        let size = anchor[0].abs();
-        let gain = if size > 0.0 { size.powf(1.0 - p) * self.exponent.rate(deadline) } else { self.rate };
+        let size = anchor.abs();
+        let gain = if size > 0.0 { size.powf(1.0 - p) * self.exponent.rate(at.deadline) } else { self.rate };
         let mut functions = [ClassK::Linear(self.rate); MAX_RELATIVE_DEGREE];
         functions[0] = ClassK::Power { gain, exponent: p };
-        Chain::of(self.n, functions).floor(anchor, deadline, 0.0, e)
-    }
-
-    fn lower_bound(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Option<f64> {
-        (self.n == 1 && anchor[0] < 0.0).then(|| self.exponent.lower_bound(anchor[0], deadline, elapsed))
+        let bound = Chain::of(self.n, functions).bound(at);
+        if self.n > 1 || anchor >= 0.0 {
+            return bound;
+        }
+        Bound { lower: self.exponent.lower_bound(anchor, at.deadline, at.elapsed), ..bound }
     }
 }
 
@@ -62,10 +62,11 @@ mod tests {
         let exponent = Exponent::new(0.5).expect("in range");
         let condition = FirstOrderFixedTime::new(1, exponent, 1.0).expect("valid");
         for e in [-40.0, -3.0, -1e-3] {
-            let (found, wanted) = (condition.floor(&[-40.0], 3.0, 0.0, &[e]), exponent.floor(-40.0, 3.0, e));
+            let found = condition.bound(&Sample::new(&[-40.0], 3.0, 0.0, &[e])).floor;
+            let wanted = exponent.floor(-40.0, 3.0, e);
             assert!((found - wanted).abs() < 1e-13 * wanted, "{found} for {wanted}");
         }
-        assert_eq!(condition.lower_bound(&[-40.0], 3.0, 3.0), Some(0.0));
+        assert_eq!(condition.bound(&Sample::new(&[-40.0], 3.0, 3.0, &[-1.0])).lower, 0.0);
     }
 
     /// h(t) = −(1 − t/T)² solves ψ_1 = 0 for p = 1/2: its second derivative is on the floor.
@@ -76,7 +77,7 @@ mod tests {
         for t in [0.0, 0.5, 1.9] {
             let s: f64 = 1.0 - t / deadline;
             let e = [-s * s, 2.0 * s / deadline];
-            let found = condition.floor(&[-1.0, 1.0], deadline, t, &e);
+            let found = condition.bound(&Sample::new(&[-1.0, 1.0], deadline, t, &e)).floor;
             assert!((found + 2.0 / (deadline * deadline)).abs() < 1e-12, "{found} at {t}");
         }
         assert!(FirstOrderFixedTime::new(2, Exponent::default(), 0.0).is_err());

@@ -17,7 +17,7 @@ mod exponential;
 mod first_order;
 mod tube;
 
-pub use crate::convergence::condition::Condition;
+pub use crate::convergence::condition::{Bound, Condition, Sample};
 pub use chain::{Chain, ClassK};
 pub use exponential::Exponential;
 pub use first_order::FirstOrderFixedTime;

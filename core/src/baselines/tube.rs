@@ -1,6 +1,6 @@
 //! A tube that constricts to the set by the deadline.
 
-use super::{Condition, checked_order};
+use super::{Bound, Condition, Sample, checked_order};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::convergence::comparison::{binomial, lower_terms};
 use crate::error::{Error, ErrorKind, positive};
@@ -70,17 +70,14 @@ impl Tube {
 }
 
 impl Condition for Tube {
-    fn floor(&self, anchor: &[f64], deadline: f64, elapsed: f64, e: &[f64]) -> f64 {
-        let (width, shape) = (self.width(anchor, deadline), self.shape(deadline, elapsed));
+    fn bound(&self, at: &Sample) -> Bound {
+        let (width, shape) = (self.width(at.anchor, at.deadline), self.shape(at.deadline, at.elapsed));
         let mut inside = [0.0; MAX_RELATIVE_DEGREE];
         for j in 0..self.n {
-            inside[j] = e[j] + width * shape[j];
+            inside[j] = at.e[j] + width * shape[j];
         }
-        -lower_terms(self.rate, &inside[..self.n]) - width * shape[self.n]
-    }
-
-    fn lower_bound(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Option<f64> {
-        Some(-self.width(anchor, deadline) * self.shape(deadline, elapsed)[0])
+        let floor = -lower_terms(self.rate, &inside[..self.n]) - width * shape[self.n];
+        Bound { lower: -width * shape[0], ..Bound::floor(floor) }
     }
 }
 
@@ -93,9 +90,9 @@ mod tests {
         let tube = Tube::new(1, 1, 2.0).expect("valid");
         // s = 4 (1 − τ/2), ṡ = −2: ḣ ≥ 2 − 2 (h + s).
         assert_eq!(tube.width(&[-4.0], 2.0), 4.0);
-        assert_eq!(tube.floor(&[-4.0], 2.0, 1.0, &[-1.5]), 2.0 - 2.0 * 0.5);
-        assert_eq!(tube.floor(&[-4.0], 2.0, 2.5, &[-1.5]), 3.0);
-        assert_eq!(tube.lower_bound(&[-4.0], 2.0, 1.0), Some(-2.0));
+        let at = |elapsed: f64| tube.bound(&Sample::new(&[-4.0], 2.0, elapsed, &[-1.5]));
+        assert_eq!(at(1.0), Bound { floor: 2.0 - 2.0 * 0.5, lower: -2.0, applies: false });
+        assert_eq!(at(2.5).floor, 3.0);
         assert_eq!(tube.width(&[1.0], 2.0), 0.0);
     }
 

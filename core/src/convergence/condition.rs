@@ -1,26 +1,231 @@
-//! The seam for constraints that are not this project's: any floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
+//! The seam of every constraint: a floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
 //!
-//! [`FixedTime::with_condition`](super::FixedTime::with_condition) puts one in the place of the method of the settings, so that
-//! everything else of a filter (derivatives, rows, program, report) stays as it is: what is compared
-//! then is the constraint alone. [`baselines`](crate::baselines) has those of the literature.
+//! One file per method implements [`Condition`]: [`reference_profile`](super::reference_profile),
+//! [`repeated_root`](super::repeated_root), [`first_order`](super::first_order) on the way to the set,
+//! [`stay`](super::stay) inside it. A user's own one takes the place of the first three
+//! ([`FixedTime::with_condition`](super::FixedTime::with_condition)); all else of a filter stays as it is.
+//!
+//! A new method is a file here that implements the trait, a variant of [`Method`](super::Method) and one of
+//! [`Approach`](super::approach::Approach), which makes the one from the other.
 
-/// A constraint h⁽ⁿ⁾ ≥ φ(e₀, τ, e) for a barrier of relative degree n = the length of `anchor`.
+use super::comparison::Stack;
+use super::fixed_time::Refusal;
+use super::operator::Operator;
+use super::profile::Derivatives;
+use crate::MAX_RELATIVE_DEGREE;
+
+/// Nothing is known to be off.
+const EXACT: Stack = [0.0; MAX_RELATIVE_DEGREE];
+
+/// A sample, as a condition sees it. With e = h − μ:
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Sample<'a> {
+    /// e⁽ʲ⁾ at the anchor, `[h]`/sʲ, j < n.
+    pub anchor: &'a [f64],
+    /// T in s, counted from the anchor: infinite where there is none, ≤ 0 where it had passed at the anchor.
+    pub deadline: f64,
+    /// τ ≥ 0, the time in s since the anchor.
+    pub elapsed: f64,
+    /// e⁽ʲ⁾ now, `[h]`/sʲ, j < n.
+    pub e: &'a [f64],
+    /// A bound ≥ 0 on what e⁽ʲ⁾ is off, j < n at least. Default: 0.
+    pub errors: &'a [f64],
+    /// μ in `[h]`. Default: 0.
+    pub margin: f64,
+    /// a in 1/s, as [`Condition::anchor`] chose it. Default: 0.
+    pub rate: f64,
+    /// What leads back to a larger margin, `[h]`/sⁿ. Of the stay constraint only. Default: 0.
+    pub pull: f64,
+    /// Whether [`Condition::anchor`] fell back on something else. Default: false.
+    pub fallback: bool,
+    /// Whether the theorem behind the condition applied at the sample before. Default: true.
+    pub guaranteed: bool,
+}
+
+impl<'a> Sample<'a> {
+    /// A sample `elapsed` s after the anchor; everything else has its default.
+    pub fn new(anchor: &'a [f64], deadline: f64, elapsed: f64, e: &'a [f64]) -> Self {
+        Self {
+            anchor,
+            deadline,
+            elapsed,
+            e,
+            errors: &EXACT,
+            margin: 0.0,
+            rate: 0.0,
+            pull: 0.0,
+            fallback: false,
+            guaranteed: true,
+        }
+    }
+
+    /// Whether the deadline lies after the anchor.
+    pub(super) fn has_time(&self) -> bool {
+        self.deadline > 0.0
+    }
+
+    /// The relative degree, n.
+    pub(super) fn degree(&self) -> usize {
+        self.anchor.len()
+    }
+
+    /// The time in s until the deadline, at least `period`.
+    pub(super) fn time_left(&self, period: f64) -> f64 {
+        (self.deadline - self.elapsed).max(period)
+    }
+}
+
+/// What a condition asks for at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ. What is not finite is reported as
+    /// [`Status::Singular`](crate::filter::Status::Singular).
+    pub floor: f64,
+    /// The lower bound on e that the condition promises now, `[h]`; −∞ where it promises none.
+    pub lower: f64,
+    /// Whether the theorem behind the condition applies from this sample on.
+    pub applies: bool,
+}
+
+impl Bound {
+    /// A floor that promises nothing.
+    pub fn floor(floor: f64) -> Self {
+        Self { floor, lower: f64::NEG_INFINITY, applies: false }
+    }
+}
+
+/// What is known where a promise is anchored.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Anchoring<'a> {
+    /// h⁽ʲ⁾, `[h]`/sʲ, j < n.
+    pub h: &'a [f64],
+    /// T in s from now; ≤ 0 where it has passed.
+    pub deadline: f64,
+    /// For how long inputs are held, in s; 0 where they are not, or where it is not known.
+    pub period: f64,
+    /// The margin of the settings, `[h]`.
+    pub margin: f64,
+    /// The default rate for this deadline and period, 1/s.
+    pub default_rate: f64,
+    /// The rate of the stay constraint, 1/s.
+    pub stay_rate: f64,
+    /// Whether the set is to be kept from now on, and not to be reached.
+    pub keeps: bool,
+}
+
+impl Anchoring<'_> {
+    /// Whether the deadline has passed already.
+    pub fn is_past(&self) -> bool {
+        self.deadline <= 0.0
+    }
+
+    /// h − `margin` and its derivatives.
+    pub(super) fn error(&self, margin: f64) -> Stack {
+        let mut e = [0.0; MAX_RELATIVE_DEGREE];
+        e[..self.h.len()].copy_from_slice(self.h);
+        e[0] -= margin;
+        e
+    }
+}
+
+/// What a condition chooses at an anchor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchored {
+    /// μ in `[h]`: the settings' margin and what held inputs cost.
+    pub margin: f64,
+    /// a in 1/s.
+    pub rate: f64,
+    /// Whether the method could not be used from here, and another took its place.
+    pub fallback: bool,
+    /// Whether its theorem applies.
+    pub applies: bool,
+}
+
+/// What else a promise may do with a condition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Abilities {
+    /// The stay constraint takes over inside the set. Without it the condition is enforced for ever, and the phases tell
+    /// only what is seen.
+    pub hands_over: bool,
+    /// Its margin covers what held inputs cost, and changes where samples turn out to be further apart.
+    pub covers_holds: bool,
+    /// It may start anew on the way at any time, and has its theorem again.
+    pub restarts: bool,
+}
+
+/// What of a promise changes with h at the sample that anchors it.
+#[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
+pub struct AnchorChange {
+    /// Of e⁽ʲ⁾ at the anchor.
+    pub anchor: Stack,
+    /// Of the margin.
+    pub margin: f64,
+    /// Of the rate.
+    pub rate: f64,
+}
+
+/// (D + a)ⁿ or Π (D + a_i), as a condition applies it to h − μ − r.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rates {
+    /// n times this rate in 1/s, of either sign.
+    Repeated(f64),
+    /// n positive rates.
+    Each(Operator),
+}
+
+/// A constraint h⁽ⁿ⁾ ≥ φ for a barrier of relative degree n.
 ///
-/// No state: whatever it depends on is in its arguments.
+/// It has no state: all that it depends on is in its arguments, and the same arguments give the same bits. Only
+/// [`bound`](Self::bound) is required. The defaults are those of a condition without a theorem, enforced at the
+/// samples only.
 pub trait Condition {
-    /// φ, `[h]`/sⁿ.
-    ///
-    /// - `anchor`: (h − μ)⁽ʲ⁾ at the anchor, j < n.
-    /// - `deadline`: T in s, counted from the anchor; a condition without one does not look at it.
-    /// - `elapsed`: τ ≥ 0 in s since then.
-    /// - `e`: (h − μ)⁽ʲ⁾ now, j < n.
-    ///
-    /// What is not finite is reported as [`Status::Singular`](crate::filter::Status::Singular).
-    fn floor(&self, anchor: &[f64], deadline: f64, elapsed: f64, e: &[f64]) -> f64;
+    /// φ and what it promises, at a sample.
+    fn bound(&self, at: &Sample) -> Bound;
 
-    /// A lower bound on h − μ that the condition promises at `elapsed`, where the source has one; `None`, the
-    /// default, where it has not.
-    fn lower_bound(&self, _anchor: &[f64], _deadline: f64, _elapsed: f64) -> Option<f64> {
+    /// What else a promise may do with it.
+    fn abilities(&self) -> Abilities {
+        Abilities::default()
+    }
+
+    /// Margin and rate from an anchor on.
+    fn anchor(&self, at: &Anchoring) -> Anchored {
+        Anchored { margin: at.margin, rate: at.stay_rate, fallback: false, applies: false }
+    }
+
+    /// Why it [fell back](Anchored::fallback) at the anchor of `at`.
+    fn refusal(&self, _at: &Sample) -> Option<Refusal> {
         None
+    }
+
+    /// The operator, where φ is linear: Π (D + a_i)(h − μ − r) ≥ pull. Such a condition has a form for inputs that are
+    /// held ([`sampled`](super::sampled)).
+    fn rates(&self, _at: &Sample) -> Option<Rates> {
+        None
+    }
+
+    /// r of [`rates`](Self::rates) and its derivatives, `elapsed` s after the anchor.
+    fn profile(&self, _at: &Sample, _elapsed: f64) -> Derivatives {
+        [0.0; MAX_RELATIVE_DEGREE + 1]
+    }
+
+    /// How what [`anchor`](Self::anchor) chose changes where h (`h[0]`) moves along `h[1]`; `None` where it is not known.
+    /// `period` is that of the anchor.
+    fn anchor_change(&self, _at: &Sample, _h: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
+        None
+    }
+
+    /// How the floor and the lower bound on e change where e moves along `de`, and the anchor by `change` if this is its
+    /// sample. `None` where it is not known.
+    fn bound_change(&self, _at: &Sample, _change: Option<&AnchorChange>, _de: &[f64]) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// How [`profile`](Self::profile) changes where the anchor changes by `change`; `None` where it is not known.
+    fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
+        Some([0.0; MAX_RELATIVE_DEGREE + 1])
     }
 }

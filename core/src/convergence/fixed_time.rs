@@ -4,24 +4,23 @@ use std::array::from_fn;
 use std::fmt;
 use std::sync::Arc;
 
-use super::comparison::{Stack, lower_bound, lower_terms};
-use super::condition::Condition;
-use super::hermite::HermiteProfile;
-use super::profile::{self, Derivatives, Hermite, LowPeak, Profile, ProfileError};
-use super::repeated_root::{self, NoAdmissibleRate};
-use super::sampled;
-use super::settings::{FixedTimeSettings, Method, ProfileKind};
-use super::state::{FixedTimeState, Phase};
-use super::stay::{self, Means};
+use super::approach::Approach;
+use super::comparison::Stack;
+use super::condition::{Anchored, Anchoring, Condition, Sample};
+use super::phase::{Phase, Seen};
+use super::profile::{Profile, ProfileError};
+use super::repeated_root::NoAdmissibleRate;
+use super::sampled::{self, PeriodBound};
+use super::settings::FixedTimeSettings;
+use super::state::FixedTimeState;
+use super::stay::{Means, Stay};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, positive};
 
-/// Round-off of h − μ − r, as a part of its terms.
-const MARGIN_TOLERANCE: f64 = 1e-12;
-
-/// What the constraint asks for at one sample.
+/// The least h⁽ⁿ⁾ that keeps a promise, at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Demand {
+#[non_exhaustive]
+pub struct DerivativeBound {
     /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: what the constraint asks for, and the disturbance on top.
     pub floor: f64,
     /// The lower bound on h that the constraint promises now, `[h]`.
@@ -32,6 +31,7 @@ pub struct Demand {
 
 /// Why the configured method cannot be used from an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate,
     /// which leads towards the set without a deadline; nothing is guaranteed until the stay constraint
@@ -58,30 +58,14 @@ impl std::error::Error for Refusal {}
 pub struct FixedTime {
     pub(super) n: usize,
     pub(super) settings: FixedTimeSettings,
-    /// A profile of one's own in place of [`Hermite`].
-    own: Option<Arc<dyn Profile + Send + Sync>>,
-    /// A constraint of one's own in place of the settings' method.
-    condition: Option<Arc<dyn Condition + Send + Sync>>,
-}
-
-/// h − μ and its derivatives.
-fn from_margin<const N: usize>(h: &[f64], margin: f64) -> [f64; N] {
-    let mut e = [0.0; N];
-    e.copy_from_slice(&h[..N]);
-    e[0] -= margin;
-    e
+    pub(super) approach: Approach,
 }
 
 impl fmt::Debug for FixedTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { n, settings, own, condition } = self;
-        let (own, condition) = (own.is_some(), condition.is_some());
         let mut text = f.debug_struct("FixedTime");
-        text.field("n", n)
-            .field("settings", settings)
-            .field("own", &own)
-            .field("condition", &condition)
-            .finish()
+        text.field("n", &self.n).field("settings", &self.settings);
+        text.field("own", &self.approach.is_own()).finish_non_exhaustive()
     }
 }
 
@@ -93,34 +77,36 @@ impl FixedTime {
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
     /// repeated root with n = 1, the first-order condition with n > 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
-        Ok(Self { n, settings: settings.validated(n)?, own: None, condition: None })
+        let settings = settings.validated(n)?;
+        Ok(Self { n, settings, approach: Approach::new(&settings) })
     }
 
-    /// The same promise along a profile of one's own. It is [checked](profile::check) at every anchor,
+    /// The same promise along a profile of one's own. It is [checked](super::profile::check) at every anchor,
     /// some 3000 evaluations; one that fails is [refused](Refusal::Profile).
     ///
     /// # Errors
     ///
-    /// A method other than [`Method::ReferenceProfile`].
+    /// A method other than [`Method::ReferenceProfile`](super::Method::ReferenceProfile).
     pub fn with_profile(self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
-        if self.settings.method != Method::ReferenceProfile {
+        let Approach::Profile(reference) = self.approach else {
             let message = "a profile of one's own belongs to the reference profile";
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
-        }
-        Ok(Self { own: Some(Arc::new(profile)), ..self })
+        };
+        Ok(Self { approach: Approach::Profile(reference.along(Arc::new(profile))), ..self })
     }
 
     /// A constraint of one's own in place of the settings' method: of these only deadline, margin and
-    /// disturbance count. Nothing is guaranteed, the phases tell what is seen ([`Phase::Stay`]: h ≥ 0,
-    /// [`Phase::Left`]: outside again), and it is enforced at the samples only, whatever
-    /// [`Sampling`](crate::filter::Sampling) says.
+    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed,
+    /// the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again), and it is enforced at the
+    /// samples only, whatever [`Sampling`](crate::filter::Sampling) says.
     ///
     /// # Errors
     ///
     /// A method other than the default, a profile of one's own, or a recovery time.
     pub fn with_condition(self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
         let settings = &self.settings;
-        let message = if settings.method != Method::default() || self.own.is_some() {
+        let is_plain = matches!(&self.approach, Approach::Profile(reference) if !reference.has_own_profile());
+        let message = if !is_plain {
             Some(("method", "a constraint of one's own takes the place of method and profile"))
         } else if settings.recovery.is_some() {
             Some(("recovery", "a constraint of one's own knows no recovery"))
@@ -130,12 +116,12 @@ impl FixedTime {
         if let Some((field, message)) = message {
             return Err(Error::new(ErrorKind::Unsupported, field, message));
         }
-        Ok(Self { condition: Some(Arc::new(condition)), ..self })
+        Ok(Self { approach: Approach::Own(Arc::new(condition)), ..self })
     }
 
     /// Whether a constraint of one's own is in force ([`Self::with_condition`]).
     pub fn has_condition(&self) -> bool {
-        self.condition.is_some()
+        self.approach.is_own()
     }
 
     /// The same promise with another deadline in s, for anchors to come.
@@ -170,13 +156,19 @@ impl FixedTime {
     /// The first call anchors, as [`Self::anchor`] with the configured deadline and no period does. Arrival is
     /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
     /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
-    pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> Demand {
+    pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> DerivativeBound {
         self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
     }
 
     /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0: what starts a theorem starts from the smallest
     /// derivatives there can be, and what ends one is h < 0 for certain. Arrival stays that of `h` as it is given.
-    pub fn advance_within(&self, state: &mut FixedTimeState, t: f64, h: &[f64], errors: &Stack) -> Demand {
+    pub fn advance_within(
+        &self,
+        state: &mut FixedTimeState,
+        t: f64,
+        h: &[f64],
+        errors: &Stack,
+    ) -> DerivativeBound {
         self.advance_by(state, t, h, errors, &Means { hold: state.period, ..Means::UNKNOWN })
     }
 
@@ -189,7 +181,7 @@ impl FixedTime {
         h: &[f64],
         errors: &Stack,
         means: &Means,
-    ) -> Demand {
+    ) -> DerivativeBound {
         // With n known to the compiler the short loops of the formulas unroll.
         match self.n {
             1 => self.advance_degree::<1>(state, t, h, errors, means),
@@ -203,7 +195,7 @@ impl FixedTime {
         }
     }
 
-    /// [`Self::advance_within`] for n = `N`.
+    /// [`Self::advance_by`] for n = `N`.
     fn advance_degree<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -211,160 +203,113 @@ impl FixedTime {
         h: &[f64],
         errors: &Stack,
         means: &Means,
-    ) -> Demand {
+    ) -> DerivativeBound {
+        let h: &[f64; N] = h.first_chunk().expect("n derivatives");
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
         if state.phase == Phase::Waiting {
             self.anchor(state, t, &lowest, self.deadline(), 0.0);
         }
-        if let Some(condition) = &self.condition {
-            return self.advance_condition(&**condition, state, t, h);
-        }
+        // What was promised is broken where the set is left; a new promise is for later samples to give.
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
             self.anchor(state, t, &lowest, recovery, state.period);
             state.recoveries = state.recoveries.saturating_add(1);
         }
-        let elapsed = (t - state.anchor_time).max(0.0);
+        let elapsed = state.elapsed(t);
+        let is_over = elapsed >= state.deadline;
         if h[0] >= 0.0 && state.arrival.is_none() {
             state.arrival = Some(t);
         }
-        self.change_phase(state, elapsed, &lowest, is_outside, means);
-        let (floor, profile) = match state.phase {
-            Phase::Stay => self.stay(state, h, &lowest, means),
-            Phase::Left => {
-                state.guaranteed = false;
-                (state.stay_rate, state.stay_margin, state.pull) =
-                    (self.base_rate(&lowest, means), state.margin, 0.0);
-                (-lower_terms(state.stay_rate, &from_margin::<N>(h, state.margin)), state.margin)
+        let seen = Seen { is_inside: lowest[0] >= 0.0, is_outside, is_over };
+        if self.hands_over() {
+            let (before, margin) = (state.phase, state.margin);
+            state.change_phase(seen, || Stay(&self.settings).can_keep(&lowest, margin, means));
+            if (before, state.phase) == (Phase::Approach, Phase::Stay) {
+                // How h can be influenced far outside says nothing of how it can be here.
+                state.gain *= means.weight;
             }
-            _ => {
-                let e = from_margin::<N>(h, state.margin);
-                let (floor, bound) = self.approach(state, elapsed, &e, errors);
-                (floor, bound + state.margin)
-            }
-        };
-        // What was promised is broken here; the new promise is for later samples to give.
+        } else {
+            state.observe(seen);
+        }
+        let (floor, profile) = self.enforce(state, elapsed, h, &lowest, errors, means);
         state.guaranteed &= !was_left;
         let floor = floor + self.settings.disturbance;
-        let time_left = if state.deadline.is_finite() { (state.deadline - elapsed).max(0.0) } else { 0.0 };
-        Demand { floor, profile, time_left }
+        let has_deadline = state.deadline.is_finite() || state.phase == Phase::Approach;
+        let time_left = if has_deadline { (state.deadline - elapsed).max(0.0) } else { 0.0 };
+        DerivativeBound { floor, profile, time_left }
     }
 
-    /// Which phase begins at this sample.
-    fn change_phase<const N: usize>(
+    /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force; whether its theorem applies, to `state`.
+    #[inline(always)]
+    fn enforce<const N: usize>(
         &self,
         state: &mut FixedTimeState,
         elapsed: f64,
+        h: &[f64; N],
         lowest: &[f64; N],
-        is_outside: bool,
-        means: &Means,
-    ) {
-        let (is_inside, is_over) = (lowest[0] >= 0.0, elapsed >= state.deadline);
-        let keeps = |margin: f64| {
-            let base = self.base_rate(lowest, means);
-            is_inside && stay::is_invariant(base, &from_margin::<N>(lowest, margin))
-        };
-        state.phase = match state.phase {
-            Phase::Stay | Phase::Left if is_outside => Phase::Left,
-            Phase::Stay => Phase::Stay,
-            Phase::Left if is_inside => Phase::Stay,
-            // Until then the approach goes on; from the deadline on it keeps h ≥ 0 too, with r = 0.
-            Phase::Approach if keeps(state.margin) => {
-                // How h can be influenced far outside says nothing of how it can be here.
-                state.gain *= means.weight;
-                Phase::Stay
-            }
-            Phase::Late if is_inside => Phase::Stay,
-            Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
-            other => other,
-        };
-        state.guaranteed &= !matches!(state.phase, Phase::Late | Phase::Left);
-    }
-
-    /// The floor under h⁽ⁿ⁾ and the bound on h while the set is kept.
-    fn stay<const N: usize>(
-        &self,
-        state: &mut FixedTimeState,
-        h: &[f64],
-        lowest: &[f64; N],
+        errors: &Stack,
         means: &Means,
     ) -> (f64, f64) {
-        let drift = means.drift - self.settings.disturbance;
-        let means = Means { drift, ..*means };
-        let keep_from = |h: &[f64; N]| stay::keep(h, state.margin, self.base_rate(h, &means), &means);
-        let is_exact = lowest[..] == h[..N];
-        let mut keep = keep_from(&from_fn(|k| h[k]));
-        let is_kept = |rate: f64| stay::affordable_margin(rate, lowest) >= 0.0;
-        if !is_exact && !is_kept(keep.rate) {
-            keep = keep_from(lowest);
+        let (stay, keeps) = (Stay(&self.settings), self.keeps(state));
+        match state.phase {
+            Phase::Stay if keeps => stay.choose(state, h, lowest, means),
+            Phase::Left if keeps => stay.pull_back(state, lowest, means),
+            _ => {}
         }
-        (state.stay_rate, state.stay_margin, state.pull) = (keep.rate, keep.margin, keep.pull);
-        // Errors are bounded to first order; what is left of the margin is for the rest.
-        let is_covered = || is_kept(keep.rate) && keep.margin >= stay::ENOUGH * state.margin;
-        state.guaranteed = keep.is_invariant && (is_exact || is_covered());
-        (keep.pull - lower_terms(keep.rate, &from_margin::<N>(h, keep.margin)), keep.margin)
-    }
-
-    /// Whether the rate and the margin with which the set is kept in `state` are constants, that do not depend on the sample.
-    pub(crate) fn keeps_evenly(&self, state: &FixedTimeState) -> bool {
-        let settings = &self.settings;
-        let rate = settings
-            .stay_rate
-            .or(settings.rate)
-            .or(settings.deadline.map(|deadline| FixedTimeSettings::default_rate(deadline, state.period)));
-        state.stay_margin == state.margin && rate == Some(state.stay_rate)
-    }
-
-    /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
-    fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
-        /// The part of what bounds allow that is used where there is time.
-        const COMFORTABLE: f64 = 0.5;
-        if let Some(rate) = self.settings.stay_rate.or(self.settings.rate) {
-            return rate;
+        let mut e = *h;
+        e[0] -= state.margin_in_force();
+        let sample = state.sample(elapsed, &e, errors);
+        if keeps {
+            let bound = stay.bound(&sample);
+            return (bound.floor, sample.margin);
         }
-        let by_time = match self.settings.deadline {
-            Some(deadline) => FixedTimeSettings::default_rate(deadline, means.hold),
-            None => f64::INFINITY,
-        };
-        let brakes = COMFORTABLE * (means.drift + means.reach);
-        let by_brakes = match N <= 2 && brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
-            true if N == 1 => brakes / h[0],
-            true => (brakes / h[0]).sqrt(),
-            false if by_time.is_finite() => by_time,
-            false => FixedTimeSettings::DEFAULT_KEEP_RATE,
-        };
-        let by_hold = stay::LARGEST_RATE_TIMES_HOLD / means.hold;
-        let rate = by_time.min(by_brakes);
-        if means.hold > 0.0 { rate.min(by_hold) } else { rate }
+        let bound = self.approach.bound(&sample);
+        let profile = bound.lower + sample.margin;
+        state.guaranteed = state.phase == Phase::Approach && bound.applies;
+        (bound.floor, profile)
     }
 
-    /// [`Self::advance`] under a constraint of one's own, after anchoring.
-    fn advance_condition(
+    /// Whether the stay constraint takes over inside.
+    #[inline(always)]
+    fn hands_over(&self) -> bool {
+        self.approach.abilities().hands_over
+    }
+
+    /// Whether the stay constraint is in force.
+    #[inline(always)]
+    fn keeps(&self, state: &FixedTimeState) -> bool {
+        state.phase.keeps() && self.hands_over()
+    }
+
+    /// Calls `f` with the condition in force and the sample at time `t` (s) that it sees, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
+    pub(super) fn in_force<R>(
         &self,
-        condition: &dyn Condition,
-        state: &mut FixedTimeState,
+        state: &FixedTimeState,
         t: f64,
         h: &[f64],
-    ) -> Demand {
-        let (n, deadline, margin) = (self.n, state.deadline, state.margin);
-        let elapsed = (t - state.anchor_time).max(0.0);
-        state.phase = match state.arrival {
-            _ if h[0] >= 0.0 => Phase::Stay,
-            Some(_) => Phase::Left,
-            None if elapsed >= deadline => Phase::Late,
-            None => Phase::Approach,
-        };
-        if h[0] >= 0.0 && state.arrival.is_none() {
-            state.arrival = Some(t);
-        }
+        f: impl FnOnce(&dyn Condition, &Sample) -> R,
+    ) -> R {
+        let stay = Stay(&self.settings);
+        let condition = if self.keeps(state) { &stay } else { self.approach.condition() };
         let mut e = [0.0; MAX_RELATIVE_DEGREE];
-        e[..n].copy_from_slice(&h[..n]);
-        e[0] -= margin;
-        let anchor = &state.anchor[..n];
-        let floor = condition.floor(anchor, deadline, elapsed, &e[..n]) + self.settings.disturbance;
-        let bound = condition.lower_bound(anchor, deadline, elapsed).unwrap_or(f64::NEG_INFINITY);
-        Demand { floor, profile: bound + margin, time_left: (deadline - elapsed).max(0.0) }
+        e[..self.n].copy_from_slice(&h[..self.n]);
+        e[0] -= state.margin_in_force();
+        f(condition, &state.sample(state.elapsed(t), &e[..self.n], &[]))
+    }
+
+    /// (S) of [`sampled`] from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and
+    /// where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e: on the
+    /// approach of the first-order condition, and under most of a user's own.
+    pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> Option<PeriodBound> {
+        self.in_force(state, t, h, |condition, at| {
+            sampled::over_period(condition, at, h, period, self.settings.disturbance)
+        })
+    }
+
+    /// Whether the rate and the margin with which the set is kept in `state` are constants that do not depend on the sample.
+    pub(crate) fn keeps_evenly(&self, state: &FixedTimeState) -> bool {
+        Stay(&self.settings).is_even(state)
     }
 
     /// Why the configured method is not the one in force since the anchor in `state`, if it is not:
@@ -373,16 +318,7 @@ impl FixedTime {
         if !state.fallback || state.phase == Phase::Waiting {
             return None;
         }
-        let (anchor, deadline) = (&state.anchor[..self.n], state.deadline);
-        match (&self.settings.method, &self.own) {
-            (Method::RepeatedRoot, _) => {
-                repeated_root::rate(anchor, deadline).err().map(Refusal::NoAdmissibleRate)
-            }
-            (Method::ReferenceProfile, Some(own)) => {
-                profile::check(&**own, anchor, deadline).err().map(Refusal::Profile)
-            }
-            _ => None,
-        }
+        self.approach.condition().refusal(&state.at_anchor(self.n))
     }
 
     /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
@@ -393,44 +329,16 @@ impl FixedTime {
     /// [`Phase::Late`] where h < 0, and the target is h = μ at once, approached with the rate.
     pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64, period: f64) {
         let settings = &self.settings;
-        let (n, past) = (self.n, deadline <= 0.0);
-        let allowed = if past { self.deadline() } else { deadline };
+        let allowed = if deadline <= 0.0 { self.deadline() } else { deadline };
         let default_rate = FixedTimeSettings::default_rate(allowed, period);
         let stay_rate = settings.stay_rate.or(settings.rate).unwrap_or(match allowed.is_finite() {
             true => default_rate,
             false => FixedTimeSettings::DEFAULT_KEEP_RATE,
         });
-        let keeps = self.condition.is_none() && (h[0] >= 0.0 || deadline == f64::INFINITY);
-        let mut anchor = [0.0; MAX_RELATIVE_DEGREE];
-        anchor[..n].copy_from_slice(&h[..n]);
-        let mut margin = settings.margin;
-        let (mut rate, mut fallback) = (stay_rate, false);
-        let mut guaranteed = !past && self.condition.is_none();
-        match settings.method {
-            _ if self.condition.is_some() => {}
-            Method::ReferenceProfile => {
-                rate = settings.rate.unwrap_or(if keeps { stay_rate } else { default_rate });
-                if keeps {
-                    margin += if period > 0.0 { sampled::ROUND_OFF * h[0].abs() } else { 0.0 };
-                } else if !past && period > 0.0 {
-                    let attenuation = self.attenuation(rate, deadline);
-                    margin += sampled::margin(self.built_in(), &anchor[..n], deadline, attenuation, period);
-                }
-            }
-            Method::FirstOrder(exponent) if !past => rate = exponent.rate(deadline),
-            Method::RepeatedRoot | Method::FirstOrder(_) => {}
-        }
-        anchor[0] -= margin;
-        if !past && !keeps {
-            if settings.method == Method::RepeatedRoot {
-                match repeated_root::rate(&anchor[..n], deadline) {
-                    Ok(root) => rate = root,
-                    Err(_) => (fallback, guaranteed) = (true, false),
-                }
-            } else if let Some(own) = &self.own {
-                fallback = profile::check(&**own, &anchor[..n], deadline).is_err();
-            }
-        }
+        let keeps = self.hands_over() && (h[0] >= 0.0 || deadline == f64::INFINITY);
+        let (h, margin) = (&h[..self.n], settings.margin);
+        let at = Anchoring { h, deadline, period, margin, default_rate, stay_rate, keeps };
+        let Anchored { margin, rate, fallback, applies } = self.approach.condition().anchor(&at);
         *state = FixedTimeState {
             phase: if keeps { Phase::Stay } else { Phase::Approach },
             start_time: state.start_time,
@@ -438,7 +346,7 @@ impl FixedTime {
             deadline,
             recoveries: state.recoveries,
             postponed: state.postponed,
-            anchor,
+            anchor: at.error(margin),
             rate,
             stay_rate,
             stay_margin: margin,
@@ -448,7 +356,7 @@ impl FixedTime {
             period,
             fallback,
             arrival: None,
-            guaranteed,
+            guaranteed: applies,
             unmet: state.unmet,
         };
     }
@@ -458,7 +366,7 @@ impl FixedTime {
     /// h − μ − r changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin; other methods
     /// take none.
     pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
-        if self.settings.method != Method::ReferenceProfile || self.condition.is_some() {
+        if !self.approach.abilities().covers_holds {
             return;
         }
         let FixedTimeState { arrival, guaranteed, phase, gain, .. } = *state;
@@ -468,7 +376,7 @@ impl FixedTime {
         (state.arrival, state.guaranteed, state.phase, state.gain) = (arrival, guaranteed, phase, gain);
     }
 
-    /// Starts the profile anew from the sample at time `t` (s) that `state` has been moved to, where `h` holds the smallest
+    /// Starts the condition anew from the sample at time `t` (s) that `state` has been moved to, where `h` holds the smallest
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there, if the theorem has been lost on the way to it: with the time that is left until the same
     /// deadline. The error is zero again, so the theorem applies again. Returns whether it did.
     ///
@@ -480,92 +388,17 @@ impl FixedTime {
         const PART: f64 = 0.05;
         let left = state.deadline - (t - state.anchor_time);
         let lost = state.phase == Phase::Approach && !state.guaranteed && h[0] < 0.0 && t > state.anchor_time;
-        let can = self.settings.method == Method::ReferenceProfile
-            && self.own.is_none()
-            && self.condition.is_none();
         // Without a period inputs are not held, or not known to be: there is no theorem to win back.
-        if !lost || !can || period <= 0.0 || left < (SAMPLES * period).max(PART * self.deadline()) {
+        if !lost
+            || period <= 0.0
+            || !self.approach.abilities().restarts
+            || left < (SAMPLES * period).max(PART * self.deadline())
+        {
             return false;
         }
         let FixedTimeState { arrival, gain, .. } = *state;
         self.anchor(state, t, h, left, period);
         (state.arrival, state.gain) = (arrival, gain);
         true
-    }
-
-    /// The profile of the settings.
-    pub(super) fn built_in(&self) -> &'static dyn Profile {
-        match self.settings.profile {
-            ProfileKind::Hermite => &Hermite,
-            ProfileKind::LowPeak => &LowPeak,
-        }
-    }
-
-    /// The profile in force.
-    pub(super) fn in_force(&self, state: &FixedTimeState) -> &dyn Profile {
-        match &self.own {
-            Some(own) if !state.fallback => &**own,
-            _ => self.built_in(),
-        }
-    }
-
-    /// The profile in force and its derivatives, without the margin.
-    pub(super) fn profile(&self, state: &FixedTimeState, elapsed: f64) -> Derivatives {
-        if state.deadline <= 0.0 {
-            return [0.0; MAX_RELATIVE_DEGREE + 1];
-        }
-        self.in_force(state).evaluate(&state.anchor[..self.n], state.deadline, elapsed)
-    }
-
-    /// The floor under h⁽ⁿ⁾ and the bound on h − μ during the approach.
-    #[inline]
-    fn approach<const N: usize>(
-        &self,
-        state: &mut FixedTimeState,
-        elapsed: f64,
-        e: &[f64; N],
-        errors: &Stack,
-    ) -> (f64, f64) {
-        let anchor = &state.anchor[..N];
-        match self.settings.method {
-            Method::RepeatedRoot => {
-                // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
-                let ahead = lower_bound(state.rate, e, (state.deadline - elapsed).max(0.0));
-                let scale = MARGIN_TOLERANCE * (anchor[0].abs() + state.margin);
-                state.guaranteed &= ahead >= -state.margin - scale;
-                (-lower_terms(state.rate, e), lower_bound(state.rate, anchor, elapsed))
-            }
-            Method::FirstOrder(exponent) => {
-                let deadline = state.deadline;
-                let bound = exponent.lower_bound(anchor[0], deadline, elapsed);
-                // The comparison can start at any sample that is not below the bound.
-                state.guaranteed = state.phase == Phase::Approach && elapsed < deadline && e[0] >= bound;
-                (exponent.floor(anchor[0], deadline, e[0]), bound)
-            }
-            Method::ReferenceProfile => {
-                let r = match (&self.own, self.settings.profile) {
-                    // As below, with n known to the compiler.
-                    (None, ProfileKind::Hermite) => {
-                        HermiteProfile::new(anchor, state.deadline).evaluate(elapsed)
-                    }
-                    _ => self.profile(state, elapsed),
-                };
-                let error: [f64; N] = from_fn(|k| e[k] - r[k]);
-                let terms = match &self.settings.rates {
-                    Some(rates) => rates.lower_terms(&error),
-                    None => lower_terms(state.rate, &error),
-                };
-                // The lemma with what is left of the margin: from this sample on h ≥ r, if the constraint holds.
-                let lowest: [f64; N] = from_fn(|k| error[k] - errors[k]);
-                let left = state.margin
-                    + match &self.settings.rates {
-                        Some(rates) => rates.affordable_margin(&lowest),
-                        None => stay::affordable_margin(state.rate, &lowest),
-                    };
-                let scale = MARGIN_TOLERANCE * (e[0].abs() + r[0].abs() + state.margin);
-                state.guaranteed = state.phase == Phase::Approach && state.deadline > 0.0 && left >= -scale;
-                (r[N] - terms, r[0])
-            }
-        }
     }
 }

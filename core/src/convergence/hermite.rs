@@ -15,50 +15,36 @@
 //! ever: e(T) ≥ 0 and e ≥ 0 after it, for every n, every T > 0 and all initial data, with no root to find.
 //! The factored form keeps its relative accuracy near s = 1, where the monomial form cancels.
 
-use super::comparison::Stack;
+use super::profile::{Derivatives, Profile};
 use crate::MAX_RELATIVE_DEGREE;
 
-/// The profile (H) for one anchor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HermiteProfile {
-    n: usize,
-    deadline: f64,
-    q: Stack,
-}
+/// The profile (H), the default.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hermite;
 
-impl HermiteProfile {
-    /// The profile from the derivatives `e` (length n, 1 to [`MAX_RELATIVE_DEGREE`], `[e]`/s^j) to zero
-    /// at `deadline` > 0 seconds.
+impl Profile for Hermite {
+    /// Entries above n are 0.
     #[inline(always)]
-    pub fn new(e: &[f64], deadline: f64) -> Self {
-        let n = e.len();
-        let mut q = [0.0; MAX_RELATIVE_DEGREE];
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
+        let n = anchor.len();
+        let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
+        if elapsed >= deadline {
+            return r;
+        }
         let mut scale = 1.0;
         for j in 0..n {
-            q[j] = e[j] * scale;
+            r[j] = anchor[j] * scale;
             scale *= deadline / (j + 1) as f64;
         }
         // The binomial coefficients in (H) are those of (1 − s)⁻ⁿ: n sums over all terms before.
         for _ in 0..n {
             for k in 1..n {
-                q[k] += q[k - 1];
+                r[k] += r[k - 1];
             }
         }
-        Self { n, deadline, q }
-    }
-
-    /// r and its first n derivatives at `elapsed` = τ ≥ 0, `[e]`/s^k; entries above n are 0.
-    #[inline(always)]
-    pub fn evaluate(&self, elapsed: f64) -> [f64; MAX_RELATIVE_DEGREE + 1] {
-        let n = self.n;
-        let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
-        if elapsed >= self.deadline {
-            return r;
-        }
-        let per_deadline = 1.0 / self.deadline;
-        let (s, left) = (elapsed * per_deadline, (self.deadline - elapsed) * per_deadline);
+        let per_deadline = 1.0 / deadline;
+        let (s, left) = (elapsed * per_deadline, (deadline - elapsed) * per_deadline);
         // Coefficients of powers of σ: q(s + σ) by repeated division, then n factors (1 − s) − σ.
-        r[..n].copy_from_slice(&self.q[..n]);
         for k in 1..n {
             for i in (k - 1..n - 1).rev() {
                 r[i] += s * r[i + 1];
@@ -77,6 +63,11 @@ impl HermiteProfile {
         }
         r
     }
+
+    /// Linear in the anchor.
+    fn along(&self, [_, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
+        Some(self.evaluate(direction, deadline, elapsed))
+    }
 }
 
 #[cfg(test)]
@@ -87,7 +78,6 @@ mod tests {
     fn degree_two_is_the_known_cubic() {
         // r = h₀ (1 − 3s² + 2s³) + h₁ T (s − 2s² + s³) for h₀ = −5, h₁ = 3, T = 2.
         let (h0, h1, t) = (-5.0, 3.0, 2.0);
-        let profile = HermiteProfile::new(&[h0, h1], t);
         for tau in [0.0, 0.3, 1.1, 1.9999] {
             let s: f64 = tau / t;
             let exact = [
@@ -95,7 +85,7 @@ mod tests {
                 (h0 * (-6.0 * s + 6.0 * s.powi(2)) + h1 * t * (1.0 - 4.0 * s + 3.0 * s.powi(2))) / t,
                 (h0 * (-6.0 + 12.0 * s) + h1 * t * (-4.0 + 6.0 * s)) / (t * t),
             ];
-            let found = profile.evaluate(tau);
+            let found = Hermite.evaluate(&[h0, h1], t, tau);
             for k in 0..3 {
                 // A dozen operations on numbers of order 10.
                 assert!(
@@ -113,17 +103,17 @@ mod tests {
         let data = [-7.0, 2.0, -1.5, 0.4, 3.0, -2.0, 0.1, 5.0];
         for n in 1..=MAX_RELATIVE_DEGREE {
             let t = 1.7;
-            let profile = HermiteProfile::new(&data[..n], t);
-            let start = profile.evaluate(0.0);
+            let at = |elapsed: f64| Hermite.evaluate(&data[..n], t, elapsed);
+            let start = at(0.0);
             // Near the end the derivative of order k is O((1 − s)^{n−k}) of the largest one.
-            let end = profile.evaluate(t * (1.0 - 1e-9));
+            let end = at(t * (1.0 - 1e-9));
             // Every derivative is a sum of terms up to the size of the largest one.
             let size = start.iter().fold(1.0, |m: f64, r| m.max(r.abs()));
             for k in 0..n {
                 assert!((start[k] - data[k]).abs() < 1e-14 * size, "n {n} k {k}: {start:?}");
                 assert!(end[k].abs() < 1e-7 * size, "n {n} k {k}: {end:?}");
             }
-            assert_eq!(profile.evaluate(t), [0.0; MAX_RELATIVE_DEGREE + 1]);
+            assert_eq!(at(t), [0.0; MAX_RELATIVE_DEGREE + 1]);
         }
     }
 }

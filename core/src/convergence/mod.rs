@@ -18,14 +18,17 @@
 //! breaks the constraint by up to its change over one period, which the margin μ has to absorb;
 //! [`sampled`] is the form of the constraint for such an input, which loses far less.
 
+mod approach;
 pub mod comparison;
 pub mod condition;
 pub mod first_order;
 mod fixed_time;
 pub mod hermite;
 pub mod operator;
+mod phase;
 pub mod polynomial;
 pub mod profile;
+mod reference_profile;
 pub mod repeated_root;
 pub mod sampled;
 mod sensitivity;
@@ -33,7 +36,8 @@ mod settings;
 mod state;
 pub mod stay;
 
-pub use fixed_time::{Demand, FixedTime, Refusal};
-pub use sensitivity::DemandDerivative;
+pub use fixed_time::{DerivativeBound, FixedTime, Refusal};
+pub use phase::Phase;
+pub use sensitivity::BoundDerivative;
 pub use settings::{FixedTimeSettings, Infeasible, Method, ProfileKind};
-pub use state::{FixedTimeState, Phase, Unmet};
+pub use state::{FixedTimeState, Unmet};

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! starts from a zero error, so e ≥ r for ever ([`super::operator`]): e(T) ≥ 0 and e ≥ 0 after it.
-//! [`HermiteProfile`] is one such r; another may leave faster, arrive inside, or wait.
+//! [`Hermite`] is one such r; another may leave faster, arrive inside, or wait.
 //!
 //! **The check.** Whether a function is the derivative of another is decided by the fundamental
 //! theorem, independently of how either was written: r⁽ᵏ⁻¹⁾(b) − r⁽ᵏ⁻¹⁾(a) against ∫ r⁽ᵏ⁾ by Gauss' rule
@@ -23,7 +23,7 @@
 
 use std::fmt;
 
-use super::hermite::HermiteProfile;
+pub use super::hermite::Hermite;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// r and its derivatives, `[e]`/s^k; entries above the order in use are ignored.
@@ -47,21 +47,6 @@ pub trait Profile {
 impl<F: Fn(&[f64], f64, f64) -> Derivatives> Profile for F {
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
         self(anchor, deadline, elapsed)
-    }
-}
-
-/// [`HermiteProfile`]s, the default.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Hermite;
-
-impl Profile for Hermite {
-    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
-        HermiteProfile::new(anchor, deadline).evaluate(elapsed)
-    }
-
-    /// Linear in the anchor.
-    fn along(&self, [_, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
-        Some(self.evaluate(direction, deadline, elapsed))
     }
 }
 

@@ -63,8 +63,11 @@
 
 use std::fmt;
 
-use super::comparison::{Stack, coefficients, factorial};
+use super::comparison::{Stack, coefficients, factorial, lower_bound, lower_terms};
+use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Rates, Sample};
+use super::fixed_time::Refusal;
 use super::polynomial::{self, Roots};
+use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// Why a repeated root has no admissible rate.
@@ -239,7 +242,7 @@ pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
 
 /// The derivative in 1/s of a simple root `rate` of (R) where the anchor `e` moves along `direction`; not
 /// finite at a double root.
-pub(super) fn rate_along(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
+fn rate_change(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
     let (n, s) = (e.len(), rate * deadline);
     let power = |k: usize| s.powi(k as i32) / factorial(k);
     let y = |e: &[f64], j: usize| e[j] * deadline.powi(j as i32) / factorial(j);
@@ -248,6 +251,68 @@ pub(super) fn rate_along(rate: f64, e: &[f64], direction: &[f64], deadline: f64)
     let slope: f64 = (0..n).map(|j| y(e, j) * power(n - 1 - j)).sum();
     // dR/ds = Σ y_j E_{n−2−j} is that sum with the sign changed.
     change / (slope * deadline)
+}
+
+/// The condition of [`Method::RepeatedRoot`](super::Method::RepeatedRoot): (D + a)ⁿ (h − μ) ≥ 0.
+#[derive(Clone, Copy, Debug)]
+pub struct RepeatedRoot;
+
+/// Round-off of the bound ahead, as a part of its terms.
+const MARGIN_TOLERANCE: f64 = 1e-12;
+
+impl Condition for RepeatedRoot {
+    #[inline]
+    fn bound(&self, at: &Sample) -> Bound {
+        // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
+        let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));
+        let scale = MARGIN_TOLERANCE * (at.anchor[0].abs() + at.margin);
+        Bound {
+            floor: -lower_terms(at.rate, at.e),
+            lower: lower_bound(at.rate, at.anchor, at.elapsed),
+            applies: at.guaranteed && ahead >= -at.margin - scale,
+        }
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities { hands_over: true, ..Abilities::default() }
+    }
+
+    fn anchor(&self, at: &Anchoring) -> Anchored {
+        let kept =
+            Anchored { margin: at.margin, rate: at.stay_rate, fallback: false, applies: !at.is_past() };
+        if at.is_past() || at.keeps {
+            return kept;
+        }
+        match rate(&at.error(at.margin)[..at.h.len()], at.deadline) {
+            Ok(rate) => Anchored { rate, ..kept },
+            Err(_) => Anchored { fallback: true, applies: false, ..kept },
+        }
+    }
+
+    fn refusal(&self, at: &Sample) -> Option<Refusal> {
+        rate(at.anchor, at.deadline).err().map(Refusal::NoAdmissibleRate)
+    }
+
+    fn rates(&self, at: &Sample) -> Option<Rates> {
+        Some(Rates::Repeated(at.rate))
+    }
+
+    fn anchor_change(&self, at: &Sample, [_, dh]: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
+        let mut change = AnchorChange::default();
+        change.anchor[..dh.len()].copy_from_slice(dh);
+        if at.has_time() && !at.fallback {
+            change.rate = rate_change(at.rate, at.anchor, dh, at.deadline);
+        }
+        Some(change)
+    }
+
+    fn bound_change(&self, at: &Sample, change: Option<&AnchorChange>, de: &[f64]) -> Option<[f64; 2]> {
+        let n = at.degree();
+        let [anchor, rate] = change.map_or([0.0; 2], |change| [change.anchor[0], change.rate]);
+        let by_rate: f64 = (0..n).map(|j| sampled::power_change(at.rate, n, j) * at.e[j]).sum();
+        // The bound starts at the anchor itself.
+        Some([-lower_terms(at.rate, de) - by_rate * rate, anchor])
+    }
 }
 
 /// y_j = e⁽ʲ⁾ Tʲ/j!, divided by the largest of them; `None` if that is 0 or not finite.

@@ -18,28 +18,27 @@
 //! \psi \ge -\frac{c_-\,\delta}{4}, \qquad e \ge -\frac{c_-\,\delta}{4\,a^{n-1}} \qquad \text{for } a > 0,\ n > 1, \tag{5}
 //! ```
 //!
-//! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`SampledDemand::loss`] is (5): an
+//! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`PeriodBound::loss`] is (5): an
 //! estimate to leading order, not a bound, since the slope is only seen through its mean.
 //!
 //! **The margin.** Along the profile c₋ is known beforehand: a held input keeps e⁽ⁿ⁾ constant, so M is
 //! the slope of r⁽ⁿ⁾ and c₋ = Mδ/2. [`margin`] is twice (5) for the steepest part of the profile, and a
 //! part of its size for round-off: what a promise needs on top of the margin it is given. What the plant
-//! adds (its own drift, turning gradients) is only seen on the way, as [`SampledDemand::loss`].
+//! adds (its own drift, turning gradients) is only seen on the way, as [`PeriodBound::loss`].
 //!
 //! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its
 //! samples' average. It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across
 //! the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
-use super::fixed_time::FixedTime;
+use super::condition::{AnchorChange, Condition, Rates, Sample};
+use super::operator::Split;
 use super::profile::Profile;
-use super::settings::Method;
-use super::state::{FixedTimeState, Phase};
 use crate::MAX_RELATIVE_DEGREE;
 
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledDemand {
+pub struct PeriodBound {
     /// The coefficients of (D + a)ⁿ⁻¹, in 1/s^(n−1−k); zeros from n on.
     pub weights: Stack,
     /// The least value at the end of the period, `[h]`/sⁿ⁻¹.
@@ -51,7 +50,7 @@ pub struct SampledDemand {
     pub decay: f64,
 }
 
-impl SampledDemand {
+impl PeriodBound {
     /// Asks for nothing.
     pub const ZERO: Self =
         Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0, decay: 0.0 };
@@ -70,7 +69,7 @@ impl SampledDemand {
 
 /// The margin in the unit of e that inputs held for `period` > 0 seconds are expected to need along
 /// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
-/// `attenuation` as in [`SampledDemand`].
+/// `attenuation` as in [`PeriodBound`].
 pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
     // A profile of a few samples is followed on average only: its own size bounds what that can cost.
     let (size, _) = size(anchor, deadline);
@@ -123,7 +122,7 @@ fn size(anchor: &[f64], deadline: f64) -> (f64, usize) {
 
 /// The derivative of [`margin`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); `None`
 /// where the profile does not know its own.
-pub(super) fn margin_along(
+pub(super) fn margin_change(
     profile: &dyn Profile,
     [anchor, direction]: [&[f64]; 2],
     deadline: f64,
@@ -133,13 +132,13 @@ pub(super) fn margin_along(
     let n = anchor.len();
     let Steepest { panel, slope } = steepest(profile, anchor, deadline);
     let at = |i: usize| Some(profile.along([anchor, direction], deadline, panel_start(deadline, i))?[n]);
-    let slope_along = (at(panel + 1)? - at(panel)?) * slope.signum() / panel_start(deadline, 1);
+    let slope_change = (at(panel + 1)? - at(panel)?) * slope.signum() / panel_start(deadline, 1);
     let (size, k) = size(anchor, deadline);
-    let size_along = anchor[k].signum() * direction[k] * deadline.powi(k as i32);
+    let size_change = anchor[k].signum() * direction[k] * deadline.powi(k as i32);
     let per_slope = 2.0 * (period / 2.0 * period / 4.0 / attenuation);
     let capped = slope.abs() * per_slope >= LARGEST_MARGIN * size;
-    let held = if capped { LARGEST_MARGIN * size_along } else { slope_along * per_slope };
-    Some(held + ROUND_OFF * size_along)
+    let held = if capped { LARGEST_MARGIN * size_change } else { slope_change * per_slope };
+    Some(held + ROUND_OFF * size_change)
 }
 
 /// The largest margin that is taken for held inputs, as a part of the anchor's size.
@@ -148,7 +147,8 @@ const LARGEST_MARGIN: f64 = 0.01;
 /// The tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
 pub(super) const ROUND_OFF: f64 = 1e-8;
 
-fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
+/// As in [`PeriodBound`], of (D + a)ⁿ.
+pub(super) fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     if rate > 0.0 {
         rate.powi(order)
@@ -158,7 +158,7 @@ fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
 }
 
 /// The derivative of [`attenuation`] by the rate.
-pub(super) fn attenuation_along(rate: f64, n: usize, time_left: f64) -> f64 {
+fn attenuation_change(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     match n {
         1 if rate > 0.0 => 0.0,
@@ -167,94 +167,133 @@ pub(super) fn attenuation_along(rate: f64, n: usize, time_left: f64) -> f64 {
     }
 }
 
-impl FixedTime {
-    /// (S) from the sample at `t` (s), which `state` has been moved to with
-    /// [`advance`](Self::advance) and where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds.
-    /// `None` on the approach of the first-order condition, which is not linear in e, and under a
-    /// [condition](super::condition) of one's own.
-    pub fn over_period(
-        &self,
-        state: &FixedTimeState,
-        t: f64,
-        h: &[f64],
-        period: f64,
-    ) -> Option<SampledDemand> {
-        if self.has_condition() {
-            return None;
-        }
-        let n = self.n;
-        let (rate, rates, follows) = match state.phase {
-            Phase::Stay | Phase::Left => (state.stay_rate, None, false),
-            _ => match self.settings.method {
-                Method::FirstOrder(_) => return None,
-                Method::RepeatedRoot => (state.rate, None, false),
-                Method::ReferenceProfile => (state.rate, self.settings.rates, true),
-            },
-        };
-        let mut weights = [0.0; MAX_RELATIVE_DEGREE];
-        let elapsed = (t - state.anchor_time).max(0.0);
-        let time_left = (state.deadline - elapsed).max(period);
-        let (mut last, mut attenuation) = (rate, attenuation(rate, n, time_left));
-        if let Some(rates) = rates {
-            let split = rates.without_last();
-            (weights, last, attenuation) = (split.weights, split.last, split.weights[0]);
-        } else {
-            for (k, weight) in weights[..n].iter_mut().enumerate() {
-                *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
+/// The operator of (S).
+struct Cascade {
+    weights: Stack,
+    /// The rate of the last factor, 1/s.
+    last: f64,
+    attenuation: f64,
+}
+
+impl Cascade {
+    fn of(rates: &Rates, n: usize, time_left: f64) -> Self {
+        match *rates {
+            Rates::Each(rates) => {
+                let Split { weights, last } = rates.without_last();
+                Self { weights, last, attenuation: weights[0] }
+            }
+            Rates::Repeated(rate) => {
+                let mut weights = [0.0; MAX_RELATIVE_DEGREE];
+                for (k, weight) in weights[..n].iter_mut().enumerate() {
+                    *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
+                }
+                Self { weights, last: rate, attenuation: attenuation(rate, n, time_left) }
             }
         }
-        let stays = matches!(state.phase, Phase::Stay | Phase::Left);
-        let (margin, pull) = if stays { (state.stay_margin, state.pull) } else { (state.margin, 0.0) };
-        // What h is compared with: μ + r and its derivatives.
-        let target = |elapsed: f64| {
-            let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
-            if follows {
-                r = self.profile(state, elapsed);
-            }
-            r[0] += margin;
-            r
-        };
-        let (now, then) = (target(elapsed), target(elapsed + period));
-        let decay = (-last * period).exp();
-        let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
-        let floor = undisturbed + pull * period + self.disturbed(&weights, period);
-        Some(SampledDemand { weights, floor, attenuation, decay })
     }
 
-    /// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period may fall below its prediction under disturbances of
-    /// h⁽ⁿ⁾ up to W: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
-    fn disturbed(&self, weights: &Stack, period: f64) -> f64 {
-        let bound = self.settings.disturbance;
-        let mut grown = bound;
-        let mut sum = 0.0;
-        for k in (0..self.n).rev() {
-            grown *= period / (self.n - k) as f64;
-            sum += weights[k].abs() * grown;
+    fn decay(&self, period: f64) -> f64 {
+        (-self.last * period).exp()
+    }
+}
+
+/// (S) of a linear `condition` over `period` > 0 seconds from the sample `at`, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and h⁽ⁿ⁾ is
+/// disturbed by up to `disturbance`; `None` where the condition is not linear.
+pub(super) fn over_period(
+    condition: &dyn Condition,
+    at: &Sample,
+    h: &[f64],
+    period: f64,
+    disturbance: f64,
+) -> Option<PeriodBound> {
+    let n = at.degree();
+    let cascade = Cascade::of(&condition.rates(at)?, n, at.time_left(period));
+    // What h is compared with: μ + r and its derivatives.
+    let target = |elapsed: f64| {
+        let mut r = condition.profile(at, elapsed);
+        r[0] += at.margin;
+        r
+    };
+    let (now, then) = (target(at.elapsed), target(at.elapsed + period));
+    let (decay, weights) = (cascade.decay(period), cascade.weights);
+    let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
+    let floor = undisturbed + at.pull * period + disturbed(&weights[..n], disturbance, period);
+    Some(PeriodBound { weights, floor, attenuation: cascade.attenuation, decay })
+}
+
+/// The derivative of [`over_period`] where h (`h[0]`) moves along `h[1]`, and the anchor by `change` if this is its sample.
+/// All zero where the condition is not linear. `None` where it is not known.
+pub(super) fn over_period_change(
+    condition: &dyn Condition,
+    at: &Sample,
+    change: Option<&AnchorChange>,
+    [h, dh]: [&[f64]; 2],
+    period: f64,
+    disturbance: f64,
+) -> Option<PeriodBound> {
+    let n = at.degree();
+    let mut out = PeriodBound { attenuation: 0.0, ..PeriodBound::ZERO };
+    let Some(rates) = condition.rates(at) else { return Some(out) };
+    let Cascade { weights, last, .. } = Cascade::of(&rates, n, at.time_left(period));
+    let decay = (-last * period).exp();
+    let target = |elapsed: f64| match change {
+        Some(change) => {
+            let mut r = condition.profile_change(at, change, elapsed)?;
+            r[0] += change.margin;
+            Some(r)
         }
-        sum
-    }
-
-    /// The derivative of what [`Self::disturbed`] adds, where `weights` change by `change`.
-    pub(super) fn disturbed_along(&self, weights: &Stack, change: &Stack, period: f64) -> f64 {
-        let signed: Stack = std::array::from_fn(|k| change[k] * weights[k].signum());
-        let positive = self.disturbed(&signed.map(|w| w.max(0.0)), period);
-        positive - self.disturbed(&signed.map(|w| w.min(0.0)), period)
-    }
-
-    /// As in [`SampledDemand`], for errors against the profile at `rate` or the rates of the settings.
-    pub(super) fn attenuation(&self, rate: f64, time_left: f64) -> f64 {
-        match &self.settings.rates {
-            Some(rates) => rates.without_last().weights[0],
-            None => attenuation(rate, self.n, time_left),
+        None => Some([0.0; MAX_RELATIVE_DEGREE + 1]),
+    };
+    let (now, then) = (target(at.elapsed)?, target(at.elapsed + period)?);
+    out.floor = (0..n).map(|k| weights[k] * (then[k] + decay * (dh[k] - now[k]))).sum();
+    let by_rate = change.map_or(0.0, |change| change.rate);
+    if by_rate != 0.0 {
+        // Of the repeated root only, whose target is the margin alone.
+        let rate = last;
+        for k in 0..n {
+            out.weights[k] = power_change(rate, n - 1, k) * by_rate;
+            let target = if k == 0 { at.margin } else { 0.0 };
+            let (error, slope) = (h[k] - target, -period * by_rate * decay);
+            out.floor += out.weights[k] * (target + decay * error) + weights[k] * slope * error;
         }
+        out.floor += disturbed_change(&weights[..n], &out.weights, disturbance, period);
+        out.attenuation = attenuation_change(rate, n, at.time_left(period)) * by_rate;
     }
+    Some(out)
+}
+
+/// The derivative by a of C(n, j) a^{n−j}, the coefficient of e⁽ʲ⁾ in (D + a)ⁿ e.
+pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
+    let power = n - j;
+    if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * rate.powi(power as i32 - 1) }
+}
+
+/// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, may fall below its prediction under disturbances of
+/// h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
+fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
+    let (n, mut grown, mut sum) = (weights.len(), bound, 0.0);
+    for k in (0..n).rev() {
+        grown *= period / (n - k) as f64;
+        sum += weights[k].abs() * grown;
+    }
+    sum
+}
+
+/// The derivative of [`disturbed`], where `weights` change by `change`.
+fn disturbed_change(weights: &[f64], change: &Stack, bound: f64, period: f64) -> f64 {
+    let n = weights.len();
+    let signed: Stack = std::array::from_fn(|k| if k < n { change[k] * weights[k].signum() } else { 0.0 });
+    let part = |keep: fn(f64) -> f64| disturbed(&signed.map(keep)[..n], bound, period);
+    part(|w| w.max(0.0)) - part(|w| w.min(0.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::comparison::lower_terms;
-    use super::super::profile::Hermite;
+    use super::super::fixed_time::FixedTime;
+    use super::super::hermite::Hermite;
     use super::super::settings::FixedTimeSettings;
+    use super::super::state::FixedTimeState;
     use super::*;
 
     /// (S) is the integral of the pointwise constraint: for δ → 0 its difference quotient tends to it.
@@ -282,11 +321,11 @@ mod tests {
     #[test]
     fn the_loss_is_that_of_an_even_slope() {
         // (D + 2)² e = −c + 2cτ/δ over a period: ψ dips by cδ/4, e by no more than cδ/8.
-        let demand = SampledDemand { attenuation: 2.0, ..SampledDemand::ZERO };
+        let demand = PeriodBound { attenuation: 2.0, ..PeriodBound::ZERO };
         assert_eq!(demand.loss(-8.0, 0.1), 8.0 * 0.1 / 4.0 / 2.0);
         assert_eq!(demand.loss(3.0, 0.1), 0.0);
         // n = 2: ψ = −c for a time τ at the rate −a makes e = −c (e^{aτ} − 1)/a, less than c τ e^{aτ}.
-        let growing = SampledDemand { attenuation: attenuation(-0.2, 2, 3.0), ..demand }.loss(-8.0, 0.1);
+        let growing = PeriodBound { attenuation: attenuation(-0.2, 2, 3.0), ..demand }.loss(-8.0, 0.1);
         let exact = 0.2 * ((0.6_f64).exp() - 1.0) / 0.2;
         assert!(growing > exact && growing < 2.0 * exact, "{growing} for {exact}");
     }

@@ -12,7 +12,7 @@ pub enum Method {
     /// Relative degree 2 and above; for odd ones many anchors have no such rate
     /// ([`FixedTime::refusal`](super::FixedTime::refusal)).
     RepeatedRoot,
-    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`HermiteProfile`](super::hermite::HermiteProfile) r, or one of
+    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`Hermite`](super::hermite::Hermite) profile r, or one of
     /// one's own ([`FixedTime::with_profile`](super::FixedTime::with_profile)).
     #[default]
     ReferenceProfile,
@@ -23,7 +23,7 @@ pub enum Method {
 /// The profile that [`Method::ReferenceProfile`] follows, where it is not one of one's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ProfileKind {
-    /// [`Hermite`](super::profile::Hermite): the polynomial of least ∫ (r⁽ⁿ⁾)².
+    /// [`Hermite`](super::hermite::Hermite): the polynomial of least ∫ (r⁽ⁿ⁾)².
     #[default]
     Hermite,
     /// [`LowPeak`](super::profile::LowPeak): for n = 1 and 2 the profile of least peak |r⁽ⁿ⁾|.

@@ -1,26 +1,8 @@
 //! What a promise remembers between samples.
 
 use super::comparison::Stack;
-
-/// Where a barrier stands with its promise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Phase {
-    /// Not anchored yet: no valid sample has been seen.
-    #[default]
-    Waiting = 0,
-    /// On the way, before the deadline.
-    Approach = 1,
-    /// The deadline passed outside the safe set; the approach goes on.
-    Late = 2,
-    /// To be kept: inside, from the start or since it has been reached, under the stay constraint.
-    Stay = 3,
-    /// Outside again after having been inside, with no recovery time set, or outside from the start without a
-    /// deadline; the stay constraint pulls back, without a deadline.
-    Left = 4,
-    /// Released: nothing is asked any more ([`End`](crate::filter::End)).
-    Released = 5,
-}
+use super::condition::Sample;
+use super::phase::Phase;
 
 /// What is remembered between samples: plain data, all that a snapshot needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,6 +76,43 @@ impl Unmet {
 }
 
 impl FixedTimeState {
+    /// τ ≥ 0, the time in s from the anchor to `t`.
+    pub(super) fn elapsed(&self, t: f64) -> f64 {
+        (t - self.anchor_time).max(0.0)
+    }
+
+    /// μ of the condition in force: the margin that h is compared with.
+    #[inline(always)]
+    pub(super) fn margin_in_force(&self) -> f64 {
+        if self.phase.keeps() { self.stay_margin } else { self.margin }
+    }
+
+    /// What the condition in force sees, with `e` = h − μ and its derivatives.
+    #[inline(always)]
+    pub(super) fn sample<'a>(&'a self, elapsed: f64, e: &'a [f64], errors: &'a [f64]) -> Sample<'a> {
+        let (rate, pull) = if self.phase.keeps() { (self.stay_rate, self.pull) } else { (self.rate, 0.0) };
+        Sample {
+            margin: self.margin_in_force(),
+            rate,
+            pull,
+            fallback: self.fallback,
+            guaranteed: self.guaranteed,
+            errors,
+            ..Sample::new(&self.anchor[..e.len()], self.deadline, elapsed, e)
+        }
+    }
+
+    /// What the method of the approach sees at the anchor.
+    pub(super) fn at_anchor(&self, n: usize) -> Sample<'_> {
+        let anchor = &self.anchor[..n];
+        Sample {
+            margin: self.margin,
+            rate: self.rate,
+            fallback: self.fallback,
+            ..Sample::new(anchor, self.deadline, 0.0, anchor)
+        }
+    }
+
     /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.
     pub fn was_inside(&self) -> bool {
         self.phase != Phase::Waiting && self.anchor[0] + self.margin >= 0.0

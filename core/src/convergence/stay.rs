@@ -28,8 +28,13 @@
 //! **Any margin will do.** With e = h − μ all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n: the least of them,
 //! [`affordable_margin`], is the largest margin with which the lemma holds.
 
+use std::array::from_fn;
+
 use super::comparison::{Stack, lower_terms, scaled_coefficient};
+use super::condition::{AnchorChange, Bound, Condition, Rates, Sample};
 use super::polynomial::first;
+use super::settings::FixedTimeSettings;
+use super::state::FixedTimeState;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
 /// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
@@ -116,7 +121,7 @@ pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 const OVER_SMALLEST: f64 = 1.5;
 
 /// The part of the margin that is enough to keep the gentle rate.
-pub(super) const ENOUGH: f64 = 0.5;
+const ENOUGH: f64 = 0.5;
 
 /// Where no period limits the rate: this many times what is asked for.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
@@ -174,6 +179,102 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
     let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
+}
+
+/// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen anew at every sample
+/// ([`Self::choose`]) and are those of the [`Sample`] then.
+#[derive(Clone, Copy, Debug)]
+pub struct Stay<'a>(pub &'a FixedTimeSettings);
+
+impl Stay<'_> {
+    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes it to `state`.
+    pub(super) fn choose<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        h: &[f64; N],
+        lowest: &[f64; N],
+        means: &Means,
+    ) {
+        let means = Means { drift: means.drift - self.0.disturbance, ..*means };
+        let keep_from = |h: &[f64; N]| keep(h, state.margin, self.base_rate(h, &means), &means);
+        let is_exact = lowest == h;
+        let mut chosen = keep_from(h);
+        let is_kept = |rate: f64| affordable_margin(rate, lowest) >= 0.0;
+        if !is_exact && !is_kept(chosen.rate) {
+            chosen = keep_from(lowest);
+        }
+        (state.stay_rate, state.stay_margin, state.pull) = (chosen.rate, chosen.margin, chosen.pull);
+        // Errors are bounded to first order; what is left of the margin is for the rest.
+        let is_covered = || is_kept(chosen.rate) && chosen.margin >= ENOUGH * state.margin;
+        state.guaranteed = chosen.is_invariant && (is_exact || is_covered());
+    }
+
+    /// Pulls back from outside: with the gentle rate and all of the margin. Nothing is promised.
+    pub(super) fn pull_back<const N: usize>(
+        &self,
+        state: &mut FixedTimeState,
+        lowest: &[f64; N],
+        means: &Means,
+    ) {
+        state.guaranteed = false;
+        (state.stay_rate, state.stay_margin, state.pull) = (self.base_rate(lowest, means), state.margin, 0.0);
+    }
+
+    /// Whether the gentle rate keeps h ≥ `margin` from the derivatives `h`.
+    pub(super) fn can_keep<const N: usize>(&self, h: &[f64; N], margin: f64, means: &Means) -> bool {
+        let base = self.base_rate(h, means);
+        let e: [f64; N] = from_fn(|k| if k == 0 { h[0] - margin } else { h[k] });
+        h[0] >= 0.0 && is_invariant(base, &e)
+    }
+
+    /// Whether rate and margin in `state` are constants that do not depend on the sample.
+    pub(super) fn is_even(&self, state: &FixedTimeState) -> bool {
+        let settings = self.0;
+        let rate = settings
+            .stay_rate
+            .or(settings.rate)
+            .or(settings.deadline.map(|deadline| FixedTimeSettings::default_rate(deadline, state.period)));
+        state.stay_margin == state.margin && rate == Some(state.stay_rate)
+    }
+
+    /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
+    fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
+        /// The part of what bounds allow that is used where there is time.
+        const COMFORTABLE: f64 = 0.5;
+        let settings = self.0;
+        if let Some(rate) = settings.stay_rate.or(settings.rate) {
+            return rate;
+        }
+        let by_time = match settings.deadline {
+            Some(deadline) => FixedTimeSettings::default_rate(deadline, means.hold),
+            None => f64::INFINITY,
+        };
+        let brakes = COMFORTABLE * (means.drift + means.reach);
+        let by_brakes = match N <= 2 && brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
+            true if N == 1 => brakes / h[0],
+            true => (brakes / h[0]).sqrt(),
+            false if by_time.is_finite() => by_time,
+            false => FixedTimeSettings::DEFAULT_KEEP_RATE,
+        };
+        let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
+        let rate = by_time.min(by_brakes);
+        if means.hold > 0.0 { rate.min(by_hold) } else { rate }
+    }
+}
+
+impl Condition for Stay<'_> {
+    #[inline(always)]
+    fn bound(&self, at: &Sample) -> Bound {
+        Bound { floor: at.pull - lower_terms(at.rate, at.e), lower: 0.0, applies: at.guaranteed }
+    }
+
+    fn rates(&self, at: &Sample) -> Option<Rates> {
+        Some(Rates::Repeated(at.rate))
+    }
+
+    fn bound_change(&self, at: &Sample, _change: Option<&AnchorChange>, de: &[f64]) -> Option<[f64; 2]> {
+        Some([-lower_terms(at.rate, de), 0.0])
+    }
 }
 
 /// For n = 2 how much of e is being lost: 0 where ė ≥ a e, 1 where ė ≤ 0.

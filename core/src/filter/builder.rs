@@ -10,7 +10,7 @@ use super::{
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::sampled::PeriodBound;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
@@ -427,7 +427,7 @@ impl FilterBuilder {
             derivatives: Derivatives::ZERO,
             rows: vec![Row::ZERO; MAX_ROWS],
             enforcement: vec![Enforcement::Hard { priority: 0 }; MAX_ROWS],
-            demands: vec![SampledDemand::ZERO; channels.len()],
+            demands: vec![PeriodBound::ZERO; channels.len()],
             conditions: Vec::with_capacity(MAX_ROWS),
             next: state.clone(),
             predicted: vec![0.0; state_dim * channels.len()],

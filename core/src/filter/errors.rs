@@ -5,7 +5,7 @@
 //! linearised with the rest of the row.
 
 use super::{Channel, Method, Sampling};
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::sampled::PeriodBound;
 use crate::error::{Error, ErrorKind};
 use crate::lie::{Ahead, DerivativeSource};
 use crate::scalar::all_finite;
@@ -77,7 +77,7 @@ impl MeasurementErrors {
         &self,
         source: &dyn DerivativeSource,
         (t, x, u, period): (f64, &[f64], &[f64], f64),
-        (demand, divisor): (&SampledDemand, f64),
+        (demand, divisor): (&PeriodBound, f64),
         slopes: &[Slopes],
     ) -> Option<Uncertainty> {
         let zeros = [0.0; MAX_INPUTS];

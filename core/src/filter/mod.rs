@@ -30,7 +30,7 @@ pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::sampled::PeriodBound;
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{DerivativeSource, Derivatives};
@@ -83,7 +83,7 @@ struct Workspace {
     derivatives: Derivatives,
     rows: Vec<Row>,
     enforcement: Vec<Enforcement>,
-    demands: Vec<SampledDemand>,
+    demands: Vec<PeriodBound>,
     /// What the input held over the period has to meet.
     conditions: Vec<Condition>,
     next: FilterState,
@@ -237,9 +237,9 @@ impl SafetyFilter {
                 from = own;
             }
             if !channel.in_force(promises, i, t, h) {
-                (rows[i], demands[i], outlooks[i]) = (Row::ZERO, SampledDemand::ZERO, Outlook::NONE);
+                (rows[i], demands[i], outlooks[i]) = (Row::ZERO, PeriodBound::ZERO, Outlook::NONE);
                 if let Some(duration) = period {
-                    conditions.push(Condition { channel: i, demand: SampledDemand::ZERO, duration });
+                    conditions.push(Condition { channel: i, demand: PeriodBound::ZERO, duration });
                 }
                 reports[i] = BarrierReport { h, ..BarrierReport::BLANK };
                 reports[i].remember(&promises[i]);
@@ -317,6 +317,9 @@ impl SafetyFilter {
             // The next sample may come then, or at the end of the longest step.
             for i in 0..count.min(MAX_ROWS - count) {
                 let Outlook { n, drift, .. } = &outlooks[i];
+                if *n == 0 {
+                    continue;
+                }
                 let demand =
                     self.channels[i].promise.over_period(&promises[i], begin, &drift[..*n], self.period_max);
                 if let Some(demand) = demand.filter(|_| *n > 0 && period > 0.0) {

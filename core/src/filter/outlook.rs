@@ -4,7 +4,7 @@
 use super::hold::{Hold, Lowest};
 use super::search::Condition;
 use super::{FixedTimeState, Phase, SAME_PERIOD, Status};
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::sampled::PeriodBound;
 use crate::convergence::stay::Means;
 use crate::lie::Derivatives;
 use crate::qp::{self, Bounds, Row};
@@ -143,11 +143,7 @@ impl Outlook {
             Phase::Stay => 0.5 * promise.margin.min(self.drift[0]).max(0.0),
             _ => promise.margin,
         };
-        Some(Condition {
-            channel,
-            demand: SampledDemand { weights, floor, ..SampledDemand::ZERO },
-            duration: at,
-        })
+        Some(Condition { channel, demand: PeriodBound { weights, floor, ..PeriodBound::ZERO }, duration: at })
     }
 }
 

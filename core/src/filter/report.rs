@@ -1,6 +1,6 @@
 //! What a step says about itself.
 
-use crate::convergence::{Demand, FixedTimeState, Phase};
+use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
 use crate::qp::{Active, Constraint, Row, Solver, dot};
 
 /// Part of the deadline without progress in [`BarrierReport::deadlocked`].
@@ -131,7 +131,7 @@ impl BarrierReport {
 
     /// Before the program is solved.
     #[inline]
-    pub(super) fn of(promise: &FixedTimeState, h: f64, demand: Demand, row: Row) -> Self {
+    pub(super) fn of(promise: &FixedTimeState, h: f64, demand: DerivativeBound, row: Row) -> Self {
         Self {
             h,
             phase: promise.phase,

@@ -32,7 +32,7 @@ mod wide;
 
 use super::errors::{Slopes, Uncertainty};
 use super::{Channel, MeasurementErrors};
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::sampled::PeriodBound;
 use crate::lie::Ahead;
 use crate::qp::{Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
 use crate::{MAX_INPUTS, MAX_ROWS};
@@ -63,7 +63,7 @@ pub(super) struct Condition {
     /// The number of the barrier.
     pub(super) channel: usize,
     /// Of its derivatives at that instant.
-    pub(super) demand: SampledDemand,
+    pub(super) demand: PeriodBound,
     /// How far ahead that is, in s, finite, > 0.
     pub(super) duration: f64,
 }

@@ -22,8 +22,8 @@
 use std::fmt;
 
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
-use crate::convergence::DemandDerivative;
-use crate::convergence::sampled::SampledDemand;
+use crate::convergence::BoundDerivative;
+use crate::convergence::sampled::PeriodBound;
 use crate::error::{Error, finite, length};
 use crate::lie::{Ahead, Derivatives};
 use crate::qp::sensitivity::Equations;
@@ -354,7 +354,7 @@ impl SafetyFilter {
         let period = workspace.report.predicted.then_some(workspace.report.period);
         let anchors = is_anchored(before, promise, begin);
         let stack = [&now.drift[..n], &change.value[..n]];
-        let DemandDerivative { floor, profile, margin, sampled } = channel
+        let BoundDerivative { floor, profile, margin, sampled } = channel
             .promise
             .differentiate(promise, anchors, begin, stack, period)
             .ok_or(if channel.promise.has_condition() {
@@ -464,7 +464,7 @@ fn pull_saturated(
 }
 
 /// The sampled row's value and normal, from derivatives at the end of the period.
-fn weighted(demand: &SampledDemand, ahead: &Ahead, n: usize, period: f64) -> (f64, [f64; MAX_INPUTS]) {
+fn weighted(demand: &PeriodBound, ahead: &Ahead, n: usize, period: f64) -> (f64, [f64; MAX_INPUTS]) {
     let (mut value, mut normal) = (0.0, [0.0; MAX_INPUTS]);
     for k in 0..n {
         let weight = demand.weights[k] / period;

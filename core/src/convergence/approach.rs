@@ -1,0 +1,71 @@
+//! The condition in force until the set is reached: one of the methods, or a user's own.
+
+use std::sync::Arc;
+
+use super::condition::{Abilities, Bound, Condition, Sample};
+use super::first_order::FirstOrder;
+use super::reference_profile::ReferenceProfile;
+use super::repeated_root::RepeatedRoot;
+use super::settings::{FixedTimeSettings, Method};
+
+/// A condition by its type, so that a step calls it directly.
+#[derive(Clone)]
+pub(super) enum Approach {
+    /// [`Method::ReferenceProfile`].
+    Profile(ReferenceProfile),
+    /// [`Method::RepeatedRoot`].
+    Root(RepeatedRoot),
+    /// [`Method::FirstOrder`].
+    First(FirstOrder),
+    /// A user's own.
+    Own(Arc<dyn Condition + Send + Sync>),
+}
+
+impl Approach {
+    /// The method of the settings.
+    pub(super) fn new(settings: &FixedTimeSettings) -> Self {
+        match settings.method {
+            Method::ReferenceProfile => Self::Profile(ReferenceProfile::new(settings)),
+            Method::RepeatedRoot => Self::Root(RepeatedRoot),
+            Method::FirstOrder(exponent) => Self::First(FirstOrder(exponent)),
+        }
+    }
+
+    /// The condition itself.
+    #[inline(always)]
+    pub(super) fn condition(&self) -> &dyn Condition {
+        match self {
+            Self::Profile(condition) => condition,
+            Self::Root(condition) => condition,
+            Self::First(condition) => condition,
+            Self::Own(condition) => &**condition,
+        }
+    }
+
+    /// [`Condition::bound`].
+    #[inline(always)]
+    pub(super) fn bound(&self, at: &Sample) -> Bound {
+        match self {
+            Self::Profile(condition) => condition.bound(at),
+            Self::Root(condition) => condition.bound(at),
+            Self::First(condition) => condition.bound(at),
+            Self::Own(condition) => condition.bound(at),
+        }
+    }
+
+    /// [`Condition::abilities`].
+    #[inline(always)]
+    pub(super) fn abilities(&self) -> Abilities {
+        match self {
+            Self::Profile(condition) => condition.abilities(),
+            Self::Root(condition) => condition.abilities(),
+            Self::First(condition) => condition.abilities(),
+            Self::Own(condition) => condition.abilities(),
+        }
+    }
+
+    /// Whether it is a user's own.
+    pub(super) fn is_own(&self) -> bool {
+        matches!(self, Self::Own(_))
+    }
+}

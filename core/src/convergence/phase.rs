@@ -1,0 +1,79 @@
+//! Where a barrier stands with its promise, and what moves it on: docs/theory.md section 5. Knows no method.
+
+use super::state::FixedTimeState;
+
+/// Where a barrier stands with its promise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+#[repr(u8)]
+pub enum Phase {
+    /// Not anchored yet: no valid sample has been seen.
+    #[default]
+    Waiting = 0,
+    /// On the way, before the deadline.
+    Approach = 1,
+    /// The deadline passed outside the safe set; the approach goes on.
+    Late = 2,
+    /// To be kept: inside, from the start or since it has been reached, under the stay constraint.
+    Stay = 3,
+    /// Outside again after having been inside, with no recovery time set, or outside from the start without a
+    /// deadline; the stay constraint pulls back, without a deadline.
+    Left = 4,
+    /// Released: nothing is asked any more ([`End`](crate::filter::End)).
+    Released = 5,
+}
+
+impl Phase {
+    /// Whether the set is to be kept now, so that the stay constraint is in force.
+    pub fn keeps(self) -> bool {
+        matches!(self, Self::Stay | Self::Left)
+    }
+
+    /// Whether the set is still to be reached.
+    pub fn approaches(self) -> bool {
+        matches!(self, Self::Approach | Self::Late)
+    }
+
+    /// Whether a constraint is in force.
+    pub fn is_in_force(self) -> bool {
+        !matches!(self, Self::Waiting | Self::Released)
+    }
+}
+
+/// What a sample shows of h, where h is known to an error.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    /// h ≥ 0 for certain.
+    pub(super) is_inside: bool,
+    /// h < 0 for certain.
+    pub(super) is_outside: bool,
+    /// The deadline has come.
+    pub(super) is_over: bool,
+}
+
+impl FixedTimeState {
+    /// Moves on to the phase that begins at this sample. `can_keep`: whether the stay constraint can take over.
+    pub(super) fn change_phase(&mut self, seen: Seen, can_keep: impl FnOnce() -> bool) {
+        let Seen { is_inside, is_outside, is_over } = seen;
+        self.phase = match self.phase {
+            Phase::Stay | Phase::Left if is_outside => Phase::Left,
+            Phase::Left if is_inside => Phase::Stay,
+            // Until then the approach goes on; from the deadline on it keeps h ≥ 0 too, with r = 0.
+            Phase::Approach if can_keep() => Phase::Stay,
+            Phase::Late if is_inside => Phase::Stay,
+            Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
+            other => other,
+        };
+        self.guaranteed &= !matches!(self.phase, Phase::Late | Phase::Left);
+    }
+
+    /// The same under a condition that is enforced for ever: what h has done so far.
+    pub(super) fn observe(&mut self, seen: Seen) {
+        self.phase = match self.arrival {
+            _ if seen.is_inside => Phase::Stay,
+            Some(_) => Phase::Left,
+            None if seen.is_over => Phase::Late,
+            None => Phase::Approach,
+        };
+    }
+}
