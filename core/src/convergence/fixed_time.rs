@@ -29,6 +29,11 @@ pub struct DerivativeBound {
     pub time_left: f64,
 }
 
+impl DerivativeBound {
+    /// Asks for nothing.
+    pub const NONE: Self = Self { floor: f64::NEG_INFINITY, profile: 0.0, time_left: 0.0 };
+}
+
 /// Why the configured method cannot be used from an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

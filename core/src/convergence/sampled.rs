@@ -34,7 +34,7 @@ use super::comparison::{Stack, binomial, factorial};
 use super::condition::{AnchorChange, Condition, Rates, Sample};
 use super::operator::Split;
 use super::profile::Profile;
-use crate::MAX_RELATIVE_DEGREE;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +50,17 @@ pub struct PeriodBound {
     pub decay: f64,
 }
 
+/// A [`PeriodBound`] with the derivatives at the end of the period put in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighted {
+    /// By how much it is met, in the unit of h⁽ⁿ⁾.
+    pub value: f64,
+    /// The size of the terms whose sum that is.
+    pub terms: f64,
+    /// Its gradient by the input.
+    pub normal: [f64; MAX_INPUTS],
+}
+
 impl PeriodBound {
     /// Asks for nothing.
     pub const ZERO: Self =
@@ -58,6 +69,28 @@ impl PeriodBound {
     /// Whether it is [`Self::ZERO`].
     pub fn is_zero(&self) -> bool {
         self.weights == [0.0; MAX_RELATIVE_DEGREE]
+    }
+
+    /// The row on h⁽ⁿ⁾ that this is at the end of the period, over `divisor`: from h⁽ᵏ⁾ there, k < n, and their gradients by
+    /// so many `inputs`.
+    #[inline]
+    pub fn weighted(
+        &self,
+        value: &[f64],
+        gradient: &[[f64; MAX_INPUTS]],
+        inputs: usize,
+        divisor: f64,
+    ) -> Weighted {
+        let (mut sum, mut terms, mut normal) = (-self.floor, self.floor.abs(), [0.0; MAX_INPUTS]);
+        for (k, value) in value.iter().enumerate() {
+            let weight = self.weights[k];
+            sum += weight * value;
+            terms += (weight * value).abs();
+            for (a, d) in normal[..inputs].iter_mut().zip(&gradient[k]) {
+                *a += weight * d / divisor;
+            }
+        }
+        Weighted { value: sum / divisor, terms: terms / divisor, normal }
     }
 
     /// (5): how far e may fall below 0 within the `period` (s), `[h]`, where the pointwise constraint

@@ -4,17 +4,16 @@ use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};
 use super::{
-    BarrierSettings, Begin, Channel, End, FilterState, Outlook, Report, SafetyFilter, Sampling, Strictness,
+    BarrierSettings, BarrierSlot, Begin, End, FilterState, Report, SafetyFilter, Sampling, Strictness,
     Workspace,
 };
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
-use crate::convergence::sampled::PeriodBound;
 use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
-use crate::lie::{self, DerivativeSource, Derivatives};
+use crate::lie::{self, DerivativeSource};
 use crate::qp::{self, Backend, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
@@ -22,7 +21,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 pub struct FilterBuilder {
     state_dim: usize,
     input_dim: usize,
-    channels: Vec<Channel>,
+    slots: Vec<BarrierSlot>,
     bounds: Bounds,
     correction_limit: f64,
     sampling: Sampling,
@@ -40,7 +39,7 @@ impl FilterBuilder {
         Self {
             state_dim,
             input_dim,
-            channels: Vec::new(),
+            slots: Vec::new(),
             bounds: Bounds::NONE,
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
@@ -132,7 +131,7 @@ impl FilterBuilder {
         length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
         length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
         let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
-        self.channels.push(Channel::new(name, source, promise));
+        self.slots.push(BarrierSlot::new(name, source, promise));
         Ok(self)
     }
 
@@ -155,11 +154,11 @@ impl FilterBuilder {
     /// # Ok::<(), punctual_core::Error>(())
     /// ```
     pub fn profile(mut self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
-        let Some(channel) = self.channels.last_mut() else {
+        let Some(slot) = self.slots.last_mut() else {
             return Err(Error::new(ErrorKind::Dimension, "profile", "there is no barrier yet to follow it"));
         };
-        let named = |e: Error| e.within(&channel.name);
-        channel.promise = channel.promise.clone().with_profile(profile).map_err(named)?;
+        let named = |e: Error| e.within(&slot.name);
+        slot.promise = slot.promise.clone().with_profile(profile).map_err(named)?;
         Ok(self)
     }
 
@@ -181,11 +180,11 @@ impl FilterBuilder {
     /// # Ok::<(), punctual_core::Error>(())
     /// ```
     pub fn condition(mut self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
-        let Some(channel) = self.channels.last_mut() else {
+        let Some(slot) = self.slots.last_mut() else {
             return Err(Error::new(ErrorKind::Dimension, "condition", "there is no barrier yet to have it"));
         };
-        let named = |e: Error| e.within(&channel.name);
-        channel.promise = channel.promise.clone().with_condition(condition).map_err(named)?;
+        let named = |e: Error| e.within(&slot.name);
+        slot.promise = slot.promise.clone().with_condition(condition).map_err(named)?;
         Ok(self)
     }
 
@@ -208,18 +207,18 @@ impl FilterBuilder {
     ///
     /// No barrier yet; a time out of range; a barrier to wait for that was not added before.
     pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
-        let Some(index) = self.channels.len().checked_sub(1) else {
+        let Some(index) = self.slots.len().checked_sub(1) else {
             return Err(Error::new(ErrorKind::Dimension, "window", "there is no barrier yet to have one"));
         };
-        let channel = &mut self.channels[index];
-        let named = |e: Error| e.within(&channel.name);
+        let slot = &mut self.slots[index];
+        let named = |e: Error| e.within(&slot.name);
         let range = |field: &str, message: String| Err(named(Error::new(ErrorKind::Range, field, message)));
         let mut opens = 0.0;
         match begin {
             Begin::AtOnce => {}
             Begin::At(seconds) => {
                 opens = non_negative("begin", seconds).map_err(named)?;
-                let deadline = channel.promise.deadline();
+                let deadline = slot.promise.deadline();
                 if opens >= deadline {
                     return range("begin", format!("is {opens}, must be < deadline = {deadline}"));
                 }
@@ -234,7 +233,7 @@ impl FilterBuilder {
         {
             return range("end", format!("is {seconds}, must be > begin = {opens}"));
         }
-        (channel.begin, channel.end) = (begin, end);
+        (slot.begin, slot.end) = (begin, end);
         Ok(self)
     }
 
@@ -244,7 +243,7 @@ impl FilterBuilder {
     ///
     /// No barrier yet; a penalty that is not finite or ≤ 0.
     pub fn strictness(mut self, strictness: Strictness) -> Result<Self, Error> {
-        let Some(channel) = self.channels.last_mut() else {
+        let Some(slot) = self.slots.last_mut() else {
             return Err(Error::new(
                 ErrorKind::Dimension,
                 "strictness",
@@ -252,9 +251,9 @@ impl FilterBuilder {
             ));
         };
         if let Strictness::Soft(penalty) = strictness {
-            positive("penalty", penalty).map_err(|e| e.within(&channel.name))?;
+            positive("penalty", penalty).map_err(|e| e.within(&slot.name))?;
         }
-        channel.strictness = strictness;
+        slot.strictness = strictness;
         Ok(self)
     }
 
@@ -376,7 +375,7 @@ impl FilterBuilder {
         let Self {
             state_dim,
             input_dim,
-            mut channels,
+            mut slots,
             bounds,
             correction_limit,
             sampling,
@@ -386,13 +385,13 @@ impl FilterBuilder {
             backend,
         } = self;
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
-        if channels.is_empty() {
+        if slots.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
         }
-        if channels.len() > MAX_ROWS {
+        if slots.len() > MAX_ROWS {
             return dimension(
                 "barriers",
-                format!("has {} entries, must have at most {MAX_ROWS}", channels.len()),
+                format!("has {} entries, must have at most {MAX_ROWS}", slots.len()),
             );
         }
         if state_dim == 0 {
@@ -409,40 +408,36 @@ impl FilterBuilder {
         }
         let mut predicted = vec![0.0; state_dim];
         let held = vec![0.0; input_dim];
-        for channel in channels.iter().filter(|_| delay > 0.0) {
-            if !channel.source.predict(&mut predicted, &held, delay) {
+        for slot in slots.iter().filter(|_| delay > 0.0) {
+            if !slot.source.predict(&mut predicted, &held, delay) {
                 let message = "the barrier's source of derivatives cannot predict the state";
-                return Err(
-                    Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&channel.name)
-                );
+                return Err(Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&slot.name));
             }
         }
         let errors = MeasurementErrors::new(&errors);
         if !errors.is_exact() {
-            errors::check_all(&mut channels, sampling, delay, input_dim)?;
+            errors::check_all(&mut slots, sampling, delay, input_dim)?;
         }
-        let barriers = vec![FixedTimeState::default(); channels.len()];
+        for slot in &mut slots {
+            slot.now.slopes = vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count()];
+        }
+        let barriers = vec![FixedTimeState::default(); slots.len()];
         let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {
-            derivatives: Derivatives::ZERO,
             rows: vec![Row::ZERO; MAX_ROWS],
             enforcement: vec![Enforcement::Hard { priority: 0 }; MAX_ROWS],
-            demands: vec![PeriodBound::ZERO; channels.len()],
-            conditions: Vec::with_capacity(MAX_ROWS),
+            requirements: Vec::with_capacity(MAX_ROWS),
             next: state.clone(),
-            predicted: vec![0.0; state_dim * channels.len()],
-            slopes: vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count() * channels.len()],
-            outlooks: vec![Outlook::NONE; channels.len()],
             scratch: vec![0.0; state_dim],
-            report: Report::new(channels.len()),
+            report: Report::new(slots.len()),
             qp: qp::Workspace::new(backend),
         };
-        let deadlines = channels.iter().map(|c| c.promise.deadline());
+        let deadlines = slots.iter().map(|slot| slot.promise.deadline());
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
         Ok(SafetyFilter {
             state_dim,
             input_dim,
-            channels,
+            slots,
             bounded: bounds != Bounds::NONE,
             bounds,
             correction_limit,

@@ -4,7 +4,8 @@
 //! derivatives at the measured state. For a sampled row these depend on u, so that it is no longer affine: it is
 //! linearised with the rest of the row.
 
-use super::{Channel, Method, Sampling};
+use super::slot::BarrierSlot;
+use super::{Method, Sampling};
 use crate::convergence::sampled::PeriodBound;
 use crate::error::{Error, ErrorKind};
 use crate::lie::{Ahead, DerivativeSource};
@@ -12,7 +13,7 @@ use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// The derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along one error.
-pub(super) type Slopes = [f64; MAX_RELATIVE_DEGREE];
+pub(super) type ErrorSlopes = [f64; MAX_RELATIVE_DEGREE];
 
 /// The largest errors as directions of the state.
 pub(super) struct MeasurementErrors {
@@ -55,8 +56,8 @@ impl MeasurementErrors {
         t: f64,
         x: &[f64],
         inputs: usize,
-        slopes: &mut [Slopes],
-    ) -> Slopes {
+        slopes: &mut [ErrorSlopes],
+    ) -> ErrorSlopes {
         let zeros = [0.0; MAX_INPUTS];
         let zeros = &zeros[..inputs];
         let (mut change, mut sum) = (Ahead::ZERO, [0.0; MAX_RELATIVE_DEGREE]);
@@ -78,7 +79,7 @@ impl MeasurementErrors {
         source: &dyn DerivativeSource,
         (t, x, u, period): (f64, &[f64], &[f64], f64),
         (demand, divisor): (&PeriodBound, f64),
-        slopes: &[Slopes],
+        slopes: &[ErrorSlopes],
     ) -> Option<Uncertainty> {
         let zeros = [0.0; MAX_INPUTS];
         let mut change = Ahead::ZERO;
@@ -118,7 +119,7 @@ pub(super) fn check(source: &dyn DerivativeSource, inputs: usize) -> Result<(), 
 
 /// Whether a filter with these barriers can allow for errors, and tells the barriers.
 pub(super) fn check_all(
-    channels: &mut [Channel],
+    slots: &mut [BarrierSlot],
     sampling: Sampling,
     delay: f64,
     inputs: usize,
@@ -130,13 +131,13 @@ pub(super) fn check_all(
     if delay > 0.0 {
         return refuse(format!("needs an actuation_delay of 0, it is {delay}"));
     }
-    for channel in channels {
-        let named = |e: Error| e.within(&channel.name);
-        if channel.promise.settings().method != Method::ReferenceProfile || channel.promise.has_condition() {
+    for slot in slots {
+        let named = |e: Error| e.within(&slot.name);
+        if slot.promise.settings().method != Method::ReferenceProfile || slot.promise.has_condition() {
             return refuse("needs the reference profile".into()).map_err(named);
         }
-        check(&*channel.source, inputs).map_err(named)?;
-        channel.exact = false;
+        check(&*slot.source, inputs).map_err(named)?;
+        slot.exact = false;
     }
     Ok(())
 }

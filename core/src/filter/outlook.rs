@@ -1,55 +1,22 @@
-//! What a sample says of a barrier until the next one: what plant and inputs can do about it, and whether the input that is
-//! held keeps its promise at every instant.
+//! What a sample says of h until the next one: whether the input that is held keeps the promise at every instant
+//! (docs/theory.md, section 7).
 
 use super::hold::{Hold, Lowest};
-use super::search::Condition;
-use super::{FixedTimeState, Phase, SAME_PERIOD, Status};
+use super::search::Requirement;
+use super::{FixedTimeState, Phase, SAME_PERIOD};
 use crate::convergence::sampled::PeriodBound;
-use crate::convergence::stay::Means;
-use crate::lie::Derivatives;
-use crate::qp::{self, Bounds, Row};
+use crate::qp::{self, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
-/// What plant and inputs can do about a barrier at a sample; notes how well it can be influenced.
-pub(super) fn means(
-    derivatives: &Derivatives,
-    n: usize,
-    bounds: &Bounds,
-    promise: &mut FixedTimeState,
-    hold: f64,
-    inputs: usize,
-) -> Means {
-    let (mut square, mut reach) = (0.0, 0.0);
-    for i in 0..inputs {
-        let a = derivatives.row[i];
-        square += a * a;
-        if a != 0.0 {
-            reach += f64::max(a * bounds.min[i], a * bounds.max[i]);
-        }
-    }
-    let size = square.sqrt();
-    promise.gain = promise.gain.max(size);
-    let weight = if promise.gain > 0.0 { size / promise.gain } else { 1.0 };
-    Means { drift: derivatives.drift[n], reach, weight, hold }
-}
-
-/// What is foreseen of h until the next sample.
+/// What the derivatives at a sample say of h until the next one.
 #[derive(Clone, Copy)]
-pub(super) struct Outlook {
+pub(super) struct Outlook<'a> {
     pub(super) n: usize,
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, then L_fⁿh.
-    pub(super) drift: [f64; MAX_RELATIVE_DEGREE + 1],
-    /// Where the input held breaks the promise, if it does.
-    pub(super) lowest: Option<Lowest>,
+    pub(super) drift: &'a [f64; MAX_RELATIVE_DEGREE + 1],
 }
 
-impl Outlook {
-    pub(super) const NONE: Self = Self { n: 0, drift: [0.0; MAX_RELATIVE_DEGREE + 1], lowest: None };
-
-    pub(super) fn new(derivatives: &Derivatives, n: usize) -> Self {
-        Self { n, drift: derivatives.drift, lowest: None }
-    }
-
+impl Outlook<'_> {
     /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order n of h, with h⁽ⁿ⁾ = `highest`.
     fn foreseen(&self, j: usize, highest: f64, s: f64) -> f64 {
         // Horner's scheme.
@@ -66,33 +33,32 @@ impl Outlook {
         sum
     }
 
-    /// The row that `condition`, on h alone, is to the order n; `normal` is that of h⁽ⁿ⁾.
-    pub(super) fn row_at(&self, condition: &Condition, normal: &[f64; MAX_INPUTS]) -> Row {
-        let s = condition.duration;
+    /// The row that `requirement`, on h alone, is to the order n; `normal` is that of h⁽ⁿ⁾.
+    pub(super) fn row_at(&self, requirement: &Requirement, normal: &[f64; MAX_INPUTS]) -> Row {
+        let s = requirement.ahead;
         let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
-        let floor = (condition.demand.floor - self.foreseen(0, self.drift[self.n], s)) / power;
+        let floor = (requirement.bound.floor - self.foreseen(0, self.drift[self.n], s)) / power;
         Row { normal: *normal, floor }
     }
 
-    /// Finds out whether the promise holds at every instant of the `hold` (s) that begins, along the model; in a set that
-    /// is kept, of one that may last as `long`.
+    /// Where the promise is broken in the `hold` (s) that begins, along the model, if it is; in a set that is kept, in one
+    /// that may last as `long`.
     pub(super) fn look(
-        &mut self,
+        &self,
         promise: &FixedTimeState,
         held: &Hold,
         normal: &[f64; MAX_INPUTS],
         [hold, long]: [f64; 2],
         scratch: &mut [f64],
-    ) {
+    ) -> Option<Lowest> {
         /// Round-off, as a part of the size of h.
         const ROUND_OFF: f64 = 1e-12;
         /// The part of h that must be left for the model not to be asked.
         const CLEAR: f64 = 0.5;
-        self.lowest = None;
         let (from, hold) = match promise.phase {
             Phase::Stay => (0.0, long),
             Phase::Approach => ((promise.anchor_time + promise.deadline - held.t).max(0.0), hold),
-            _ => return,
+            _ => return None,
         };
         let h = self.drift[0];
         let highest = self.drift[self.n] + qp::dot(normal, held.u);
@@ -114,7 +80,7 @@ impl Outlook {
         // The deadline at the very end of the hold is within it.
         let begins = from <= hold * (1.0 + SAME_PERIOD);
         if !begins || is_clear() {
-            return;
+            return None;
         }
         let from = from.min(hold);
         let lowest = held
@@ -122,7 +88,7 @@ impl Outlook {
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
         let size = promise.anchor[0].abs() + promise.margin + h.abs();
         // What is not a number is no promise.
-        self.lowest = (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest);
+        (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
     }
 
     /// The same without a model, to the order n.
@@ -134,34 +100,20 @@ impl Outlook {
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
-    /// What would keep the promise at the instant at which it is broken.
-    pub(super) fn condition(&self, channel: usize, promise: &FixedTimeState) -> Option<Condition> {
-        let at = self.lowest.map(|lowest| lowest.at).filter(|at| *at > 0.0)?;
+    /// What would keep the promise of `barrier` at the instant at which it is broken; nothing does at the sample itself.
+    pub(super) fn requirement(
+        &self,
+        barrier: usize,
+        promise: &FixedTimeState,
+        lowest: Option<Lowest>,
+    ) -> Option<Requirement> {
+        let ahead = lowest.map(|lowest| lowest.at).filter(|at| *at > 0.0)?;
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
         weights[0] = 1.0;
         let floor = match promise.phase {
             Phase::Stay => 0.5 * promise.margin.min(self.drift[0]).max(0.0),
             _ => promise.margin,
         };
-        Some(Condition { channel, demand: PeriodBound { weights, floor, ..PeriodBound::ZERO }, duration: at })
+        Some(Requirement { barrier, bound: PeriodBound { weights, floor, ..PeriodBound::ZERO }, ahead })
     }
-}
-
-/// Why derivatives cannot carry a constraint, if they cannot.
-#[inline]
-pub(super) fn defect(derivatives: &Derivatives) -> Option<Status> {
-    /// An input that enters below the declared degree by more than this part of the row is real.
-    const OF_ROW: f64 = 1e-9;
-    /// So is one by more than this part of the derivatives themselves; round-off of cancelling terms stays below.
-    const OF_DERIVATIVES: f64 = 1e-13;
-    if !derivatives.is_finite() {
-        return Some(Status::Singular);
-    }
-    if derivatives.lower_sensitivity <= 0.0 {
-        return None;
-    }
-    let size = derivatives.row.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
-    let terms = derivatives.drift.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
-    let is_real = derivatives.lower_sensitivity > (OF_ROW * size).max(OF_DERIVATIVES * terms);
-    is_real.then_some(Status::WrongRelativeDegree)
 }

@@ -2,6 +2,7 @@
 
 use super::SafetyFilter;
 use crate::error::{Error, length, non_negative, positive};
+use crate::lie::Derivatives;
 use crate::reach;
 
 impl SafetyFilter {
@@ -15,8 +16,8 @@ impl SafetyFilter {
     pub fn soonest(&self, index: usize, t: f64, x: &[f64], horizon: f64) -> Result<Option<f64>, Error> {
         length("x", x.len(), self.state_dim)?;
         let horizon = positive("horizon", horizon)?;
-        let channel = self.channels.get(index).filter(|c| c.is_undisturbed());
-        Ok(channel.and_then(|c| reach::soonest(&*c.source, (t, x), &self.bounds, horizon)))
+        let slot = self.slots.get(index).filter(|c| c.is_undisturbed());
+        Ok(slot.and_then(|c| reach::soonest(&*c.source, (t, x), &self.bounds, horizon)))
     }
 
     /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
@@ -28,8 +29,8 @@ impl SafetyFilter {
     pub fn is_ruled_out(&self, index: usize, t: f64, x: &[f64], after: f64) -> Result<bool, Error> {
         length("x", x.len(), self.state_dim)?;
         let after = non_negative("after", after)?;
-        let channel = self.channels.get(index).filter(|c| c.is_undisturbed());
-        Ok(channel.is_some_and(|c| reach::ruled_out(&*c.source, (t, x), &self.bounds, after, 1.0)))
+        let slot = self.slots.get(index).filter(|c| c.is_undisturbed());
+        Ok(slot.is_some_and(|c| reach::ruled_out(&*c.source, (t, x), &self.bounds, after, 1.0)))
     }
 
     /// h of each barrier at time `t` (s) and the state `x`, written to `h` in the order of the report: for instants
@@ -40,10 +41,10 @@ impl SafetyFilter {
     /// A slice of the wrong length.
     pub fn barrier_values(&mut self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), Error> {
         length("x", x.len(), self.state_dim)?;
-        length("h", h.len(), self.channels.len())?;
-        let derivatives = &mut self.workspace.derivatives;
-        for (channel, h) in self.channels.iter().zip(h) {
-            channel.source.evaluate(t, x, derivatives);
+        length("h", h.len(), self.slots.len())?;
+        let mut derivatives = Derivatives::ZERO;
+        for (slot, h) in self.slots.iter().zip(h) {
+            slot.source.evaluate(t, x, &mut derivatives);
             *h = derivatives.drift[0];
         }
         Ok(())

@@ -30,11 +30,13 @@
 
 mod wide;
 
-use super::errors::{Slopes, Uncertainty};
-use super::{Channel, MeasurementErrors};
-use crate::convergence::sampled::PeriodBound;
+use super::errors::{MeasurementErrors, Uncertainty};
+use super::slot::BarrierSlot;
+use crate::convergence::sampled::{PeriodBound, Weighted};
 use crate::lie::Ahead;
-use crate::qp::{Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solution, Solver, Workspace};
+use crate::qp::{
+    Bounds, Constraint, Enforcement, Outcome, Problem, Row, RowSet, Solution, Solver, Workspace,
+};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// Violations up to this part of a row's terms count as met: what Newton's method leaves.
@@ -59,41 +61,37 @@ const CONTRACTION: f64 = 0.1;
 
 /// What is asked of one barrier at one instant ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Condition {
+pub(super) struct Requirement {
     /// The number of the barrier.
-    pub(super) channel: usize,
+    pub(super) barrier: usize,
     /// Of its derivatives at that instant.
-    pub(super) demand: PeriodBound,
+    pub(super) bound: PeriodBound,
     /// How far ahead that is, in s, finite, > 0.
-    pub(super) duration: f64,
+    pub(super) ahead: f64,
 }
 
-impl Condition {
+impl Requirement {
     /// What h⁽ʲ⁾ at the end is divided by, to be comparable with a row on h⁽ⁿ⁾, where j is the highest order that
-    /// the demand weighs: h⁽ⁿ⁾ held for the duration δ changes it by δⁿ⁻ʲ/(n − j)! of itself. That is the
+    /// the bound weighs: h⁽ⁿ⁾ held for the duration δ changes it by δⁿ⁻ʲ/(n − j)! of itself. That is the
     /// duration for j = n − 1.
     fn divisor(&self, n: usize) -> f64 {
-        let order = self.demand.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
-        (1..=n - order).fold(1.0, |product, i| product * (self.duration / i as f64))
+        let order = self.bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
+        (1..=n - order).fold(1.0, |product, i| product * (self.ahead / i as f64))
     }
 }
 
 /// One sampled problem: where it starts and what it asks for.
-pub(super) struct Held<'a> {
-    pub(super) channels: &'a [Channel],
+pub(super) struct PeriodProblem<'a> {
+    pub(super) slots: &'a [BarrierSlot],
     /// At most [`MAX_ROWS`]; each has a row.
-    pub(super) conditions: &'a [Condition],
+    pub(super) requirements: &'a [Requirement],
     pub(super) t: f64,
-    /// The state of each barrier, one after the other.
-    pub(super) x: &'a [f64],
     pub(super) bounds: &'a Bounds,
     pub(super) u_ref: &'a [f64],
-    /// Of each condition.
+    /// Of each requirement.
     pub(super) enforcement: &'a [Enforcement],
     pub(super) correction_limit: f64,
     pub(super) errors: &'a MeasurementErrors,
-    /// How the derivatives of h at `t` change with each error, one barrier after the other.
-    pub(super) slopes: &'a [Slopes],
     /// Whether to look far around for an input where the pointwise rows cannot be met either.
     pub(super) widens: bool,
 }
@@ -105,9 +103,9 @@ struct Linearised<'a> {
 }
 
 impl Linearised<'_> {
-    /// The largest violation among the rows that are not in `given_up`, 0 if all are met.
-    fn worst(&self, given_up: u64) -> f64 {
-        let kept = |i: &usize| given_up >> i & 1 == 0;
+    /// The largest violation among the rows that are not in `relaxed`, 0 if all are met.
+    fn worst(&self, relaxed: RowSet) -> f64 {
+        let kept = |i: &usize| !relaxed.contains(*i);
         (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
     }
 
@@ -118,24 +116,23 @@ impl Linearised<'_> {
         (self.violations[worst] > 0.0).then_some(worst)
     }
 
-    /// The rows that are violated, one bit each.
-    fn violated(&self) -> u64 {
-        (0..self.rows.len()).fold(0, |bits, i| bits | u64::from(self.violations[i] > 0.0) << i)
+    fn violated(&self) -> RowSet {
+        RowSet::with(self.rows.len(), |i| self.violations[i] > 0.0)
     }
 }
 
-/// The rows that are active in the last answer of `qp`, one bit each.
-fn active(qp: &Workspace) -> u64 {
-    qp.active().iter().fold(0, |bits, active| match active.constraint {
-        Constraint::Row(i) => bits | 1 << i,
-        Constraint::Lower(_) | Constraint::Upper(_) => bits,
-    })
+/// The rows that are active in the last answer of `qp`.
+fn active(qp: &Workspace) -> RowSet {
+    let mut rows = RowSet::EMPTY;
+    for active in qp.active() {
+        if let Constraint::Row(i) = active.constraint {
+            rows.insert(i);
+        }
+    }
+    rows
 }
 
-/// Every row.
-const ALL: u64 = u64::MAX;
-
-impl Held<'_> {
+impl PeriodProblem<'_> {
     /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
     /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
     /// them, where a source cannot predict or its prediction is not finite.
@@ -157,9 +154,9 @@ impl Held<'_> {
         // Nothing to do where u_ref meets the sampled rows, those first of which it is doubtful.
         let doubtful = active(qp);
         self.linearise(u, doubtful, &mut at)?;
-        if at.violated() & doubtful == 0 {
-            self.linearise(u, ALL, &mut at)?;
-            if at.worst(0) <= 0.0 {
+        if (at.violated() & doubtful).is_empty() {
+            self.linearise(u, RowSet::ALL, &mut at)?;
+            if at.worst(RowSet::EMPTY) <= 0.0 {
                 return Some(Solution {
                     outcome: Outcome::Optimal,
                     solver: Solver::Unchanged,
@@ -169,7 +166,7 @@ impl Held<'_> {
         }
         let watched = doubtful | at.violated();
         let against = at.most_violated();
-        let mut best: Option<Guess> = None;
+        let mut best: Option<Candidate> = None;
         let mut guess = [0.0; MAX_INPUTS];
         // Whether the rows are linearised at the best guess.
         let mut at_best = false;
@@ -236,92 +233,77 @@ impl Held<'_> {
         Problem { enforcement: self.enforcement, ..plain }
     }
 
-    /// The soft rows, one bit each.
-    fn soft(&self) -> u64 {
-        let soft = |e: &Enforcement| matches!(e, Enforcement::Soft { .. });
-        self.enforcement.iter().enumerate().filter(|(_, e)| soft(e)).fold(0, |bits, (i, _)| bits | 1 << i)
+    fn soft(&self) -> RowSet {
+        RowSet::with(self.enforcement.len(), |i| matches!(self.enforcement[i], Enforcement::Soft { .. }))
     }
 
     fn distance(&self, u: &[f64]) -> f64 {
         u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r))
     }
 
-    /// Linearises the sampled rows of the bits `anew` at `u`, and evaluates the models of the others there.
+    /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
     /// `None` where there is no finite prediction.
-    fn linearise(&self, u: &[f64], anew: u64, at: &mut Linearised) -> Option<()> {
-        let mut ahead = Ahead::ZERO;
-        let states = self.x.len() / self.channels.len();
+    fn linearise(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
         let rows = at.rows.iter_mut().zip(&mut at.violations);
-        for (i, (condition, (row, violation))) in self.conditions.iter().zip(rows).enumerate() {
-            let Condition { channel: number, demand, duration } = condition;
-            let (channel, x) = (&self.channels[*number], &self.x[number * states..][..states]);
+        for (i, (requirement, (row, violation))) in self.requirements.iter().zip(rows).enumerate() {
             *violation = 0.0;
-            if demand.is_zero() {
+            if requirement.bound.is_zero() {
                 *row = Row::ZERO;
-                continue;
-            }
-            if anew >> i & 1 == 0 {
+            } else if anew.contains(i) {
+                (*row, *violation) = self.linearised(requirement, u)?;
+            } else {
                 let (slack, terms) = (row.slack(u), row.size(u));
                 if slack < -MET * terms {
                     *violation = -slack / terms;
                 }
-                continue;
-            }
-            let known = channel.source.ahead(self.t, x, u, *duration, &mut ahead);
-            if !known || !ahead.is_finite() {
-                return None;
-            }
-            let n = channel.source.relative_degree();
-            let divisor = condition.divisor(n);
-            let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
-            let mut normal = [0.0; MAX_INPUTS];
-            for k in 0..n {
-                let weight = demand.weights[k];
-                value += weight * ahead.value[k];
-                terms += (weight * ahead.value[k]).abs();
-                for (a, d) in normal[..u.len()].iter_mut().zip(&ahead.gradient[k]) {
-                    *a += weight * d / divisor;
-                }
-            }
-            // The row is one on h⁽ⁿ⁾ as the pointwise one.
-            value /= divisor;
-            terms /= divisor;
-            if !self.errors.is_exact() {
-                let slopes = &self.slopes[number * self.errors.count()..][..self.errors.count()];
-                let held = (self.t, x, u, *duration);
-                let Uncertainty { size, gradient } =
-                    self.errors.of_row(&*channel.source, held, (demand, divisor), slopes)?;
-                value -= size;
-                terms += size;
-                for (a, d) in normal.iter_mut().zip(&gradient) {
-                    *a -= d;
-                }
-            }
-            let (mut at_u, mut moved) = (0.0, 0.0);
-            for (a, v) in normal.iter().zip(u) {
-                at_u += a * v;
-                moved += (a * v).abs();
-            }
-            *row = Row { normal, floor: at_u - value };
-            if !row.floor.is_finite() {
-                return None;
-            }
-            // Near a floor of 0 the ends are small differences of what the input moves.
-            let terms = terms + moved;
-            if value < -MET * terms {
-                *violation = -value / terms;
             }
         }
         Some(())
     }
 
+    /// The row that a requirement is at `u`, and how far it is from being met there in units of its terms.
+    fn linearised(&self, requirement: &Requirement, u: &[f64]) -> Option<(Row, f64)> {
+        let (slot, mut ahead) = (&self.slots[requirement.barrier], Ahead::ZERO);
+        let x = &slot.now.from[..];
+        let known = slot.source.ahead(self.t, x, u, requirement.ahead, &mut ahead);
+        if !known || !ahead.is_finite() {
+            return None;
+        }
+        // On h⁽ⁿ⁾, as the pointwise one.
+        let n = slot.degree();
+        let divisor = requirement.divisor(n);
+        let Weighted { mut value, mut terms, mut normal } =
+            requirement.bound.weighted(&ahead.value[..n], &ahead.gradient, u.len(), divisor);
+        if !self.errors.is_exact() {
+            let held = (self.t, x, u, requirement.ahead);
+            let bound = (&requirement.bound, divisor);
+            let Uncertainty { size, gradient } =
+                self.errors.of_row(&*slot.source, held, bound, &slot.now.slopes)?;
+            value -= size;
+            terms += size;
+            for (a, d) in normal.iter_mut().zip(&gradient) {
+                *a -= d;
+            }
+        }
+        let (mut at_u, mut moved) = (0.0, 0.0);
+        for (a, v) in normal.iter().zip(u) {
+            at_u += a * v;
+            moved += (a * v).abs();
+        }
+        let row = Row { normal, floor: at_u - value };
+        // Near a floor of 0 the ends are small differences of what the input moves.
+        let terms = terms + moved;
+        let violation = if value < -MET * terms { -value / terms } else { 0.0 };
+        row.floor.is_finite().then_some((row, violation))
+    }
+
     /// As [`Self::linearise`] of all rows, where violations that are round-off count as met.
     fn judge(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
-        self.linearise(u, ALL, at)?;
+        self.linearise(u, RowSet::ALL, at)?;
         for i in 0..at.rows.len() {
             if at.violations[i] > 0.0 && at.violations[i].is_finite() {
-                let (condition, row) = (&self.conditions[i], &at.rows[i]);
-                if -row.slack(u) <= ROUND_OFF * self.size(condition, u) {
+                let (requirement, row) = (&self.requirements[i], &at.rows[i]);
+                if -row.slack(u) <= ROUND_OFF * self.size(requirement, u) {
                     at.violations[i] = 0.0;
                 }
             }
@@ -329,17 +311,17 @@ impl Held<'_> {
         Some(())
     }
 
-    /// The size of the terms whose sum the row of a condition is.
+    /// The size of the terms whose sum the row of a requirement is.
     ///
     /// A sum that cancels says nothing about it: 10 − p on the boundary. But a change of every state and of the
     /// time by a small part of itself shows it, as the terms no longer cancel: each part is another one, of
     /// either sign, so that sums of states do not cancel again.
-    fn size(&self, condition: &Condition, u: &[f64]) -> f64 {
+    fn size(&self, requirement: &Requirement, u: &[f64]) -> f64 {
         const STATES: usize = 64;
         const PART: f64 = 1e-6;
-        let channel = &self.channels[condition.channel];
-        let states = self.x.len() / self.channels.len();
-        let x = &self.x[condition.channel * states..][..states];
+        let slot = &self.slots[requirement.barrier];
+        let x = &slot.now.from;
+        let states = x.len();
         if states > STATES {
             return 0.0;
         }
@@ -350,17 +332,12 @@ impl Held<'_> {
         }
         let mut ahead = [Ahead::ZERO; 2];
         let [here, there] = &mut ahead;
-        let known = channel.source.ahead(self.t, x, u, condition.duration, here)
-            && channel.source.ahead(
-                self.t * (1.0 + 0.7 * PART),
-                &moved[..states],
-                u,
-                condition.duration,
-                there,
-            );
-        let n = channel.source.relative_degree();
-        let change = |k: usize| (condition.demand.weights[k] * (there.value[k] - here.value[k])).abs() / PART;
-        let size = (0..n).map(change).sum::<f64>() / condition.divisor(n);
+        let (later, duration) = (self.t * (1.0 + 0.7 * PART), requirement.ahead);
+        let known = slot.source.ahead(self.t, x, u, duration, here)
+            && slot.source.ahead(later, &moved[..states], u, duration, there);
+        let (n, weights) = (slot.degree(), &requirement.bound.weights);
+        let change = |k: usize| (weights[k] * (there.value[k] - here.value[k])).abs() / PART;
+        let size = (0..n).map(change).sum::<f64>() / requirement.divisor(n);
         if known && size.is_finite() { size } else { 0.0 }
     }
 
@@ -387,7 +364,7 @@ impl Held<'_> {
                 *v = self.bounds.clamp(j, u[j] + sign * ASIDE * far * *v / size);
             }
             let aside = &aside[..m];
-            if self.linearise(aside, 1 << i, at).is_some() {
+            if self.linearise(aside, RowSet::of(i), at).is_some() {
                 let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| s.hypot(*a));
                 found |= at.rows[i].slack(aside) > (self.distance(aside) - far) * normal;
             }
@@ -396,20 +373,20 @@ impl Held<'_> {
         found
     }
 
-    /// Newton's method from `u`, on the rows that the linearised program does not give up; those of the bits
+    /// Newton's method from `u`, on the rows that the linearised program does not give up; those of
     /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
     fn newton(
         &self,
         u: &mut [f64],
-        mut watched: u64,
+        mut watched: RowSet,
         at: &mut Linearised,
         qp: &mut Workspace,
-    ) -> Option<Guess> {
+    ) -> Option<Candidate> {
         let m = u.len();
         self.linearise(u, watched, at)?;
         let soft = self.soft();
-        let mut found = Guess {
-            given_up: 0,
+        let mut found = Candidate {
+            relaxed: RowSet::EMPTY,
             violation: at.worst(soft),
             distance: 0.0,
             outcome: Outcome::Optimal,
@@ -424,24 +401,23 @@ impl Held<'_> {
         for _ in 0..ITERATIONS {
             let target = &mut target[..m];
             let solution = qp.solve(&self.problem(at.rows), target);
-            let lost = |i: usize| qp.is_relaxed(i) || qp.is_ill_conditioned(i);
-            found.given_up = (0..at.rows.len()).filter(|i| lost(*i)).fold(soft, |bits, i| bits | 1 << i);
+            found.relaxed = soft | qp.relaxed() | qp.ill_conditioned();
             found.outcome = solution.outcome;
             found.solver = solution.solver;
             found.iterations += solution.iterations;
-            let violation = at.worst(found.given_up);
+            let violation = at.worst(found.relaxed);
             let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
             let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
             found.violation = violation;
             if violation <= 0.0 && way <= MET * size {
-                if watched == ALL {
+                if watched == RowSet::ALL {
                     ended = true;
                     break;
                 }
-                self.linearise(u, ALL, at)?;
-                watched = ALL;
-                found.violation = at.worst(found.given_up);
+                self.linearise(u, RowSet::ALL, at)?;
+                watched = RowSet::ALL;
+                found.violation = at.worst(found.relaxed);
                 if found.violation <= 0.0 {
                     ended = true;
                     break;
@@ -459,7 +435,7 @@ impl Held<'_> {
                     u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
                 }
                 if self.linearise(u, watched, at).is_some() {
-                    let there = at.worst(found.given_up);
+                    let there = at.worst(found.relaxed);
                     if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
                         found.violation = there;
                         moved = true;
@@ -476,19 +452,19 @@ impl Held<'_> {
         }
         if !ended {
             self.judge(u, at)?;
-            found.violation = at.worst(found.given_up);
+            found.violation = at.worst(found.relaxed);
         }
         found.ended = ended;
-        found.sure &= ended && found.given_up == soft;
+        found.sure &= ended && found.relaxed == soft;
         found.distance = self.distance(u);
         Some(found)
     }
 }
 
 /// What a search came to.
-struct Guess {
-    /// The rows that are not among those counted in `violation`, one bit each.
-    given_up: u64,
+struct Candidate {
+    /// The rows that are not among those counted in `violation`.
+    relaxed: RowSet,
     violation: f64,
     distance: f64,
     outcome: Outcome,
@@ -500,14 +476,14 @@ struct Guess {
     sure: bool,
 }
 
-impl Guess {
+impl Candidate {
     /// Whether it meets all rows but the `soft` ones.
-    fn is_met(&self, soft: u64) -> bool {
-        self.given_up == soft && self.violation <= 0.0
+    fn is_met(&self, soft: RowSet) -> bool {
+        self.relaxed == soft && self.violation <= 0.0
     }
 
     fn better_than(&self, other: &Self) -> bool {
-        let key = |g: &Self| (g.given_up.count_ones(), g.violation);
+        let key = |g: &Self| (g.relaxed.len(), g.violation);
         key(self) < key(other) || key(self) == key(other) && self.distance < (1.0 - MET) * other.distance
     }
 }

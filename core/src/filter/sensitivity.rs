@@ -23,7 +23,7 @@ use std::fmt;
 
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
 use crate::convergence::BoundDerivative;
-use crate::convergence::sampled::PeriodBound;
+use crate::convergence::sampled::{PeriodBound, Weighted};
 use crate::error::{Error, finite, length};
 use crate::lie::{Ahead, Derivatives};
 use crate::qp::sensitivity::Equations;
@@ -105,7 +105,7 @@ impl std::error::Error for NoDerivative {}
 
 /// How one row moves.
 #[derive(Clone, Copy)]
-struct Motion {
+struct RowDerivative {
     /// The slack at a fixed u.
     slack: f64,
     /// The normal.
@@ -117,7 +117,7 @@ struct Motion {
     attenuation: f64,
 }
 
-impl Motion {
+impl RowDerivative {
     const NONE: Self = Self {
         slack: 0.0,
         normal: [0.0; MAX_INPUTS],
@@ -196,7 +196,7 @@ impl SafetyFilter {
         self.peek(t, x, u_ref, u)?;
         out.u = [0.0; MAX_INPUTS];
         out.barriers.clear();
-        out.barriers.resize(self.channels.len(), BarrierDerivative::default());
+        out.barriers.resize(self.slots.len(), BarrierDerivative::default());
         let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
         if constant.contains(&self.report().status) {
             return Ok(None);
@@ -219,16 +219,16 @@ impl SafetyFilter {
         let du = &mut du[..u.len()];
         scratch[2].clear();
         scratch[2].resize(self.state_dim, 0.0);
-        if self.workspace.conditions.len() > self.channels.len() {
+        if self.workspace.requirements.len() > self.slots.len() {
             return Err(NoDerivative::Instants);
         }
-        let mut motions = [Motion::NONE; MAX_ROWS];
-        for (i, motion) in motions[..self.channels.len()].iter_mut().enumerate() {
-            (*motion, barriers[i]) = self.motion(i, t, state, u, scratch)?;
+        let mut row_derivatives = [RowDerivative::NONE; MAX_ROWS];
+        for (i, row_derivative) in row_derivatives[..self.slots.len()].iter_mut().enumerate() {
+            (*row_derivative, barriers[i]) = self.row_derivative(i, t, state, u, scratch)?;
         }
 
         // The active rows of the sample, whichever method found it.
-        let (workspace, count) = (&self.workspace, self.channels.len());
+        let (workspace, count) = (&self.workspace, self.slots.len());
         let (rows, enforcement) = (&workspace.rows[..count], &workspace.enforcement[..count]);
         let report = &workspace.report;
         let limit = self.correction_limit;
@@ -258,21 +258,21 @@ impl SafetyFilter {
                         equations.hold(&normal, 0.0)
                     }
                     Constraint::Row(k) => {
-                        let motion = &motions[k];
+                        let row_derivative = &row_derivatives[k];
                         let curvature = self.curvature(k, t, state[0], u, scratch)?;
                         let row = &rows[k].normal;
                         match enforcement[k] {
                             Enforcement::Soft { penalty }
                                 if is_saturated(row, active.multiplier, penalty) =>
                             {
-                                pull_saturated(&mut equations, row, penalty, motion, &curvature);
+                                pull_saturated(&mut equations, row, penalty, row_derivative, &curvature);
                                 true
                             }
                             _ => {
                                 let by = active.multiplier;
                                 let curvature = curvature.map(|row| row.map(|c| by * c));
-                                equations.pull(&motion.normal.map(|a| by * a), &curvature);
-                                equations.hold(row, -motion.slack)
+                                equations.pull(&row_derivative.normal.map(|a| by * a), &curvature);
+                                equations.hold(row, -row_derivative.slack)
                             }
                         }
                     }
@@ -290,14 +290,14 @@ impl SafetyFilter {
             }
         }
 
-        for (i, (b, motion)) in barriers.iter_mut().zip(&motions).enumerate() {
-            b.slack = motion.slack + dot(&rows[i].normal, du);
+        for (i, (b, row_derivative)) in barriers.iter_mut().zip(&row_derivatives).enumerate() {
+            b.slack = row_derivative.slack + dot(&rows[i].normal, du);
             let loss = report.barriers[i].sampling_loss;
             if loss > 0.0 {
-                let demand = &workspace.demands[i];
-                let pointwise = motion.pointwise + dot(&motion.pointwise_normal, du);
-                b.sampling_loss = -pointwise * report.period / 4.0 / demand.attenuation
-                    - loss * motion.attenuation / demand.attenuation;
+                let bound = &self.slots[i].now.period_bound;
+                let pointwise = row_derivative.pointwise + dot(&row_derivative.pointwise_normal, du);
+                b.sampling_loss = -pointwise * report.period / 4.0 / bound.attenuation
+                    - loss * row_derivative.attenuation / bound.attenuation;
             }
         }
         Ok(())
@@ -312,31 +312,31 @@ impl SafetyFilter {
         along.extend_from_slice(dx);
         let acting = self.acting();
         let known = self.delay <= 0.0
-            || self.channels[i].source.predict_along(from, along, &acting[..self.input_dim], self.delay);
+            || self.slots[i].source.predict_along(from, along, &acting[..self.input_dim], self.delay);
         if known { Ok(()) } else { Err(NoDerivative::Source(i)) }
     }
 
     /// How row `i` and what is reported of its barrier move at the fixed input `u`.
-    fn motion(
+    fn row_derivative(
         &self,
         i: usize,
         t: f64,
         state: [&[f64]; 2],
         u: &[f64],
         scratch: &mut [Vec<f64>; 3],
-    ) -> Result<(Motion, BarrierDerivative), NoDerivative> {
-        let (channel, workspace) = (&self.channels[i], &self.workspace);
+    ) -> Result<(RowDerivative, BarrierDerivative), NoDerivative> {
+        let (slot, workspace) = (&self.slots[i], &self.workspace);
         let held = [u, &[0.0; MAX_INPUTS][..u.len()]];
         let mut change = Ahead::ZERO;
-        if !channel.source.ahead_along(t, state, held, 0.0, &mut change) {
+        if !slot.source.ahead_along(t, state, held, 0.0, &mut change) {
             return Err(NoDerivative::Source(i));
         }
         let mut derivative = BarrierDerivative { h: change.value[0], ..BarrierDerivative::default() };
         let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
         if matches!(promise.phase, Phase::Waiting | Phase::Released) {
-            return Ok((Motion::NONE, derivative));
+            return Ok((RowDerivative::NONE, derivative));
         }
-        if promise.phase == Phase::Stay && !channel.promise.keeps_evenly(promise) {
+        if promise.phase == Phase::Stay && !slot.promise.keeps_evenly(promise) {
             return Err(NoDerivative::Kept(i));
         }
         if promise.postponed != before.postponed {
@@ -345,26 +345,26 @@ impl SafetyFilter {
         let begin = t + self.delay;
         self.begin(i, state, scratch)?;
         let [from, along, _] = &*scratch;
-        if self.delay > 0.0 && !channel.source.ahead_along(begin, [from, along], held, 0.0, &mut change) {
+        if self.delay > 0.0 && !slot.source.ahead_along(begin, [from, along], held, 0.0, &mut change) {
             return Err(NoDerivative::Source(i));
         }
-        let n = channel.source.relative_degree();
+        let n = slot.source.relative_degree();
         let mut now = Derivatives::ZERO;
-        channel.source.evaluate(begin, from, &mut now);
+        slot.source.evaluate(begin, from, &mut now);
         let period = workspace.report.predicted.then_some(workspace.report.period);
         let anchors = is_anchored(before, promise, begin);
         let stack = [&now.drift[..n], &change.value[..n]];
-        let BoundDerivative { floor, profile, margin, sampled } = channel
+        let BoundDerivative { floor, profile, margin, sampled } = slot
             .promise
             .differentiate(promise, anchors, begin, stack, period)
-            .ok_or(if channel.promise.has_condition() {
+            .ok_or(if slot.promise.has_condition() {
                 NoDerivative::Condition(i)
             } else {
                 NoDerivative::Profile(i)
             })?;
         (derivative.profile, derivative.margin) = (profile, margin);
         let pointwise = change.value[n] - floor;
-        let mut motion = Motion {
+        let mut row_derivative = RowDerivative {
             slack: pointwise,
             normal: change.gradient[n],
             pointwise,
@@ -373,20 +373,18 @@ impl SafetyFilter {
         };
         if let Some(period) = period {
             let mut ahead = Ahead::ZERO;
-            let known = channel.source.ahead(begin, from, u, period, &mut ahead)
-                && channel.source.ahead_along(begin, [from, along], held, period, &mut change);
+            let known = slot.source.ahead(begin, from, u, period, &mut ahead)
+                && slot.source.ahead_along(begin, [from, along], held, period, &mut change);
             if !known {
                 return Err(NoDerivative::Source(i));
             }
-            let demand = &workspace.demands[i];
-            let (value, normal) = weighted(demand, &change, n, period);
-            let (by_weights, normal_by_weights) = weighted(&sampled, &ahead, n, period);
-            motion.slack = value + by_weights - sampled.floor / period;
-            for (slot, (a, b)) in motion.normal.iter_mut().zip(normal.iter().zip(&normal_by_weights)) {
-                *slot = a + b;
-            }
+            let bound = &self.slots[i].now.period_bound;
+            let moved = weighted(bound, &change, n, u.len(), period);
+            let by_weights = sampled.weighted(&ahead.value[..n], &ahead.gradient, u.len(), period);
+            row_derivative.slack = moved.value + by_weights.value;
+            row_derivative.normal = std::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
         }
-        Ok((motion, derivative))
+        Ok((row_derivative, derivative))
     }
 
     /// The derivative of row `k`'s normal by u: `[i][j]` of its component i by u_j.
@@ -403,7 +401,7 @@ impl SafetyFilter {
         if !report.predicted {
             return Ok(curvature);
         }
-        let (source, demand) = (&self.channels[k].source, &self.workspace.demands[k]);
+        let (source, bound) = (&self.slots[k].source, &self.slots[k].now.period_bound);
         let [from, _, zeros] = scratch;
         from.clear();
         from.extend_from_slice(x);
@@ -418,9 +416,9 @@ impl SafetyFilter {
             if !source.ahead_along(t + self.delay, [from, zeros], held, report.period, &mut change) {
                 return Err(NoDerivative::Source(k));
             }
-            let (_, normal) = weighted(demand, &change, source.relative_degree(), report.period);
+            let moved = weighted(bound, &change, source.relative_degree(), u.len(), report.period);
             for i in 0..u.len() {
-                curvature[i][j] = normal[i];
+                curvature[i][j] = moved.normal[i];
             }
         }
         Ok(curvature)
@@ -443,7 +441,7 @@ fn pull_saturated(
     equations: &mut Equations,
     row: &[f64; MAX_INPUTS],
     penalty: f64,
-    motion: &Motion,
+    row_derivative: &RowDerivative,
     curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS],
 ) {
     let square = dot(row, row);
@@ -459,19 +457,12 @@ fn pull_saturated(
             pull[i][j] = column[i];
         }
     }
-    let change: [f64; MAX_INPUTS] = turned(&motion.normal);
+    let change: [f64; MAX_INPUTS] = turned(&row_derivative.normal);
     equations.pull(&change, &pull);
 }
 
-/// The sampled row's value and normal, from derivatives at the end of the period.
-fn weighted(demand: &PeriodBound, ahead: &Ahead, n: usize, period: f64) -> (f64, [f64; MAX_INPUTS]) {
-    let (mut value, mut normal) = (0.0, [0.0; MAX_INPUTS]);
-    for k in 0..n {
-        let weight = demand.weights[k] / period;
-        value += weight * ahead.value[k];
-        for (a, d) in normal.iter_mut().zip(&ahead.gradient[k]) {
-            *a += weight * d;
-        }
-    }
-    (value, normal)
+/// How the row of `bound` moves where the derivatives at the end of the period move by `change`.
+fn weighted(bound: &PeriodBound, change: &Ahead, n: usize, inputs: usize, period: f64) -> Weighted {
+    let homogeneous = PeriodBound { floor: 0.0, ..*bound };
+    homogeneous.weighted(&change.value[..n], &change.gradient, inputs, period)
 }

@@ -16,7 +16,7 @@
 //! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible:
 //! each in the order of priority (then of the list) as little as those before it allow, and among the inputs
 //! that do so the one nearest to u_ref is returned. Soft rows ([`Enforcement::Soft`]) yield to every hard
-//! one. The outcome says which it was, [`Workspace::is_relaxed`] which rows.
+//! one. The outcome says which it was, [`Workspace::relaxed`] which rows.
 //!
 //! A row whose normal vanishes, or that would move u by more than the correction limit, is ill-conditioned:
 //! where there are several rows it is left out and the others are met.
@@ -30,6 +30,7 @@ mod factors;
 mod interior_point;
 mod kkt;
 mod one_active;
+mod row_set;
 pub(crate) mod sensitivity;
 mod single_row;
 
@@ -38,6 +39,7 @@ pub use kkt::Residuals;
 use crate::{MAX_INPUTS, MAX_ROWS};
 use dual_active_set::DualActiveSet;
 use one_active::Answer;
+pub use row_set::RowSet;
 
 /// A slack up to this part of its terms is round-off.
 const ROUND_OFF: f64 = 1e-12;
@@ -254,8 +256,8 @@ pub struct Workspace {
     any: DualActiveSet<MAX_INPUTS>,
     active: [Active; MAX_ROWS + MAX_INPUTS],
     active_len: usize,
-    relaxed: u64,
-    lost: u64,
+    relaxed: RowSet,
+    ill_conditioned: RowSet,
 }
 
 impl Default for Workspace {
@@ -274,8 +276,8 @@ impl Workspace {
             any: DualActiveSet::EMPTY,
             active: [Active { constraint: Constraint::Row(0), multiplier: 0.0 }; MAX_ROWS + MAX_INPUTS],
             active_len: 0,
-            relaxed: 0,
-            lost: 0,
+            relaxed: RowSet::EMPTY,
+            ill_conditioned: RowSet::EMPTY,
         }
     }
 
@@ -287,8 +289,8 @@ impl Workspace {
     pub fn solve(&mut self, p: &Problem, u: &mut [f64]) -> Solution {
         assert!(p.rows.len() <= MAX_ROWS, "{} rows, must be at most {MAX_ROWS}", p.rows.len());
         // What the last answer was made of; nothing of one in which something yielded.
-        let guess = if self.relaxed | self.lost == 0 { self.active_len } else { 0 };
-        (self.active_len, self.relaxed, self.lost) = (0, 0, 0);
+        let guess = if (self.relaxed | self.ill_conditioned).is_empty() { self.active_len } else { 0 };
+        (self.active_len, self.relaxed, self.ill_conditioned) = (0, RowSet::EMPTY, RowSet::EMPTY);
         if let Some(answer) = one_active::solve(p, u)
             && (self.backend == Backend::DualActiveSet || matches!(answer, Answer::Reference))
         {
@@ -314,15 +316,15 @@ impl Workspace {
             let (outcome, multiplier) = single_row::solve(row, p.bounds, p.u_ref, p.correction_limit, u);
             match outcome {
                 Outcome::Optimal => self.take_over(p, u, multiplier),
-                Outcome::Infeasible => self.relaxed = 1,
-                Outcome::IllConditioned | Outcome::Failed => self.lost = 1,
+                Outcome::Infeasible => self.relaxed = RowSet::of(0),
+                Outcome::IllConditioned | Outcome::Failed => self.ill_conditioned = RowSet::of(0),
             }
             return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
         }
         if self.backend == Backend::InteriorPoint {
             return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
         }
-        let Self { two, four, any, active, active_len, relaxed, lost, .. } = self;
+        let Self { two, four, any, active, active_len, relaxed, ill_conditioned, .. } = self;
         let (outcome, iterations);
         macro_rules! solve_with {
             ($method:ident, $n:expr) => {{
@@ -331,7 +333,7 @@ impl Workspace {
                     (outcome, iterations) = (Outcome::Optimal, 0);
                 } else {
                     (outcome, iterations) = $method.solve(p, u);
-                    (*relaxed, *lost) = ($method.relaxed, $method.lost);
+                    (*relaxed, *ill_conditioned) = ($method.relaxed, $method.ill_conditioned);
                     for (to, found) in active.iter_mut().zip($method.active(p)) {
                         *to = found;
                         *active_len += 1;
@@ -379,16 +381,16 @@ impl Workspace {
         &self.active[..self.active_len]
     }
 
-    /// Whether row `i` of the last solve was given up because it cannot be met ([`Outcome::Infeasible`]).
+    /// The rows of the last solve that were relaxed because they cannot be met ([`Outcome::Infeasible`]).
     /// Unknown to the interior-point method.
-    pub fn is_relaxed(&self, i: usize) -> bool {
-        i < MAX_ROWS && self.relaxed >> i & 1 == 1
+    pub fn relaxed(&self) -> RowSet {
+        self.relaxed
     }
 
-    /// Whether row `i` of the last solve was ill-conditioned ([`Outcome::IllConditioned`]). Unknown to the
+    /// The rows of the last solve that were ill-conditioned ([`Outcome::IllConditioned`]). Unknown to the
     /// interior-point method.
-    pub fn is_ill_conditioned(&self, i: usize) -> bool {
-        i < MAX_ROWS && self.lost >> i & 1 == 1
+    pub fn ill_conditioned(&self) -> RowSet {
+        self.ill_conditioned
     }
 
     /// How far `u` is from satisfying the conditions of optimality, with the active rows of the last solve,

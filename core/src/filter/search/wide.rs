@@ -22,9 +22,9 @@
 //!
 //! All numbers of steps are fixed: the cost is bounded, and the same input gives the same bits.
 
-use super::{Guess, Held, Linearised, MET};
+use super::{Candidate, Linearised, MET, PeriodProblem};
 use crate::MAX_INPUTS;
-use crate::qp::{Outcome, Problem, Solver, Workspace};
+use crate::qp::{Outcome, Problem, RowSet, Solver, Workspace};
 
 /// Parts of the grid of one scan.
 const GRID: usize = 16;
@@ -99,21 +99,21 @@ impl Starts {
     }
 }
 
-impl Held<'_> {
-    /// Looks for a better answer than `best`, which is `u`, that meets all rows but those of the bits `given_up`.
+impl PeriodProblem<'_> {
+    /// Looks for a better answer than `best`, which is `u`, that meets all rows but those of `relaxed`.
     /// Where one is found it is written to `u`.
     pub(super) fn widen(
         &self,
         u: &mut [f64],
         guesses: &[Option<&[f64]>],
-        best: &Guess,
+        best: &Candidate,
         at: &mut Linearised,
         qp: &mut Workspace,
-    ) -> Option<Guess> {
+    ) -> Option<Candidate> {
         let m = u.len();
-        let given_up = self.soft();
+        let relaxed = self.soft();
         let mut nearest = Start::NONE;
-        if best.is_met(given_up) {
+        if best.is_met(relaxed) {
             nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
@@ -124,20 +124,20 @@ impl Held<'_> {
             for i in 0..m {
                 start.u[i] = self.bounds.clamp(i, guess[i]);
             }
-            self.measure(&mut start, m, given_up, at);
+            self.measure(&mut start, m, relaxed, at);
             starts.insert(start);
         }
         let iterations = best.iterations;
         let mut found = false;
         if !known {
-            found |= self.finish(&mut starts, &mut nearest, given_up, at, qp);
+            found |= self.finish(&mut starts, &mut nearest, relaxed, at, qp);
         }
         // Once more from the first answer: inputs near u_ref that all but meet the rows come after all that do.
         for _ in 0..2 {
             let limit = nearest.distance;
             let mut starts = Starts::within(NEAR * limit);
-            self.scan_all(limit, given_up, at, &mut starts);
-            found |= self.finish(&mut starts, &mut nearest, given_up, at, qp);
+            self.scan_all(limit, relaxed, at, &mut starts);
+            found |= self.finish(&mut starts, &mut nearest, relaxed, at, qp);
             if limit.is_finite() || nearest.distance.is_infinite() {
                 break;
             }
@@ -151,18 +151,18 @@ impl Held<'_> {
             nearest.distance = best.distance;
         }
         let mut exact = nearest.u;
-        if let Some(guess) = self.newton(&mut exact[..m], super::ALL, at, qp)
-            && guess.is_met(given_up)
+        if let Some(guess) = self.newton(&mut exact[..m], RowSet::ALL, at, qp)
+            && guess.is_met(relaxed)
             && guess.ended
             && guess.distance <= (1.0 + NEARER) * nearest.distance
         {
             u.copy_from_slice(&exact[..m]);
-            return Some(Guess { iterations: iterations + guess.iterations, ..guess });
+            return Some(Candidate { iterations: iterations + guess.iterations, ..guess });
         }
-        self.sharpen(&mut nearest, given_up, at, qp);
+        self.sharpen(&mut nearest, relaxed, at, qp);
         u.copy_from_slice(&nearest.u[..m]);
-        Some(Guess {
-            given_up,
+        Some(Candidate {
+            relaxed,
             violation: 0.0,
             distance: nearest.distance,
             outcome: Outcome::Optimal,
@@ -179,7 +179,7 @@ impl Held<'_> {
         &self,
         starts: &mut Starts,
         nearest: &mut Start,
-        given_up: u64,
+        relaxed: RowSet,
         at: &mut Linearised,
         qp: &mut Workspace,
     ) -> bool {
@@ -190,10 +190,10 @@ impl Held<'_> {
             if !start.distance.is_finite() || !near(start) {
                 continue;
             }
-            self.restore(start, RESTORING[0], given_up, at, qp);
+            self.restore(start, RESTORING[0], relaxed, at, qp);
             if start.violation <= 0.0 && near(start) {
                 let wanted = (1.0 - NEARER) * nearest.distance;
-                self.polish(start, wanted, given_up, at, qp);
+                self.polish(start, wanted, relaxed, at, qp);
                 if start.distance < wanted || nearest.distance.is_infinite() {
                     (*nearest, found) = (*start, true);
                 }
@@ -203,9 +203,9 @@ impl Held<'_> {
     }
 
     /// Linearises all rows at the start, and writes its violation and distance.
-    fn measure(&self, start: &mut Start, m: usize, given_up: u64, at: &mut Linearised) {
+    fn measure(&self, start: &mut Start, m: usize, relaxed: RowSet, at: &mut Linearised) {
         start.violation = match self.judge(&start.u[..m], at) {
-            Some(()) => at.worst(given_up),
+            Some(()) => at.worst(relaxed),
             None => f64::INFINITY,
         };
         start.distance = self.distance(&start.u[..m]);
@@ -215,7 +215,7 @@ impl Held<'_> {
     }
 
     /// Scans every component, with wider and wider grids.
-    fn scan_all(&self, limit: f64, given_up: u64, at: &mut Linearised, starts: &mut Starts) {
+    fn scan_all(&self, limit: f64, relaxed: RowSet, at: &mut Linearised, starts: &mut Starts) {
         let m = self.u_ref.len();
         for vary in 0..m {
             let centre = self.bounds.clamp(vary, self.u_ref[vary]);
@@ -223,7 +223,7 @@ impl Held<'_> {
             for _ in 0..WIDTHS {
                 let low = (centre - width).max(self.bounds.min[vary]);
                 let high = (centre + width).min(self.bounds.max[vary]);
-                self.scan((vary, (vary + 1) % m), [low, high], given_up, at, starts);
+                self.scan((vary, (vary + 1) % m), [low, high], relaxed, at, starts);
                 let whole = low <= self.bounds.min[vary] && high >= self.bounds.max[vary];
                 if whole || width >= limit.min(starts.nearest()) {
                     break;
@@ -239,7 +239,7 @@ impl Held<'_> {
         &self,
         (vary, solve): (usize, usize),
         [low, high]: [f64; 2],
-        given_up: u64,
+        relaxed: RowSet,
         at: &mut Linearised,
         starts: &mut Starts,
     ) {
@@ -251,7 +251,7 @@ impl Held<'_> {
                 next.u[i] = self.bounds.clamp(i, self.u_ref[i]);
             }
             next.u[vary] = self.bounds.clamp(vary, low + (high - low) * (k as f64 / GRID as f64));
-            self.along(&mut next, solve, given_up, at, vary != solve);
+            self.along(&mut next, solve, relaxed, at, vary != solve);
             if before[1].better_than(&before[0]) && !next.better_than(&before[1]) {
                 starts.insert(before[1]);
             }
@@ -263,15 +263,15 @@ impl Held<'_> {
     }
 
     /// Moves the component `axis` to where the rows hold, as near to its reference as they allow.
-    fn along(&self, start: &mut Start, axis: usize, given_up: u64, at: &mut Linearised, solve: bool) {
+    fn along(&self, start: &mut Start, axis: usize, relaxed: RowSet, at: &mut Linearised, solve: bool) {
         let m = self.u_ref.len();
         let mut best = Start::NONE;
         for _ in 0..=ALONG {
-            self.measure(start, m, given_up, at);
+            self.measure(start, m, relaxed, at);
             if start.better_than(&best) {
                 best = *start;
             }
-            let target = self.on_axis(start, axis, given_up, at);
+            let target = self.on_axis(start, axis, relaxed, at);
             let moved = (target - start.u[axis]).abs();
             if !solve || best.violation <= 0.0 || moved.is_nan() || moved <= MET * target.abs() {
                 break;
@@ -283,12 +283,12 @@ impl Held<'_> {
 
     /// The value of the component `axis` nearest to its reference for which the linearised rows hold; between what
     /// they ask for where they contradict.
-    fn on_axis(&self, start: &Start, axis: usize, given_up: u64, at: &Linearised) -> f64 {
+    fn on_axis(&self, start: &Start, axis: usize, relaxed: RowSet, at: &Linearised) -> f64 {
         let m = self.u_ref.len();
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for (i, row) in at.rows.iter().enumerate() {
             let slope = row.normal[axis];
-            if given_up >> i & 1 == 1 || slope == 0.0 {
+            if relaxed.contains(i) || slope == 0.0 {
                 continue;
             }
             let on_row = start.u[axis] - row.slack(&start.u[..m]) / slope;
@@ -307,12 +307,12 @@ impl Held<'_> {
         &self,
         start: &mut Start,
         steps: usize,
-        given_up: u64,
+        relaxed: RowSet,
         at: &mut Linearised,
         qp: &mut Workspace,
     ) {
         let m = self.u_ref.len();
-        self.measure(start, m, given_up, at);
+        self.measure(start, m, relaxed, at);
         for _ in 0..steps {
             if start.violation <= 0.0 || !start.violation.is_finite() {
                 return;
@@ -327,7 +327,7 @@ impl Held<'_> {
             let (mut part, mut moved) = (1.0, false);
             for _ in 0..TRIALS {
                 let mut trial = self.between(start, &target, part);
-                self.measure(&mut trial, m, given_up, at);
+                self.measure(&mut trial, m, relaxed, at);
                 if trial.violation <= (1.0 - SUFFICIENT * part) * start.violation {
                     (*start, moved) = (trial, true);
                     break;
@@ -335,7 +335,7 @@ impl Held<'_> {
                 part /= 3.0;
             }
             if !moved {
-                self.measure(start, m, given_up, at);
+                self.measure(start, m, relaxed, at);
                 return;
             }
         }
@@ -343,10 +343,17 @@ impl Held<'_> {
 
     /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that
     /// promises to be nearer than `known`.
-    fn polish(&self, start: &mut Start, known: f64, given_up: u64, at: &mut Linearised, qp: &mut Workspace) {
+    fn polish(
+        &self,
+        start: &mut Start,
+        known: f64,
+        relaxed: RowSet,
+        at: &mut Linearised,
+        qp: &mut Workspace,
+    ) {
         let m = self.u_ref.len();
         for step in 0..POLISHING {
-            self.measure(start, m, given_up, at);
+            self.measure(start, m, relaxed, at);
             let mut target = [0.0; MAX_INPUTS];
             qp.solve(&self.problem(at.rows), &mut target[..m]);
             let there = self.distance(&target[..m]);
@@ -358,7 +365,7 @@ impl Held<'_> {
             let (mut part, mut moved) = (1.0, false);
             for _ in 0..TRIALS {
                 let mut trial = self.between(start, &target, part);
-                self.restore(&mut trial, RESTORING[1], given_up, at, qp);
+                self.restore(&mut trial, RESTORING[1], relaxed, at, qp);
                 if trial.violation <= 0.0 && trial.distance <= start.distance - SUFFICIENT * part * promised {
                     (*start, moved) = (trial, true);
                     break;
@@ -377,12 +384,12 @@ impl Held<'_> {
     /// Where the rows curve, full steps towards the program's answer overshoot. With two of them, Δu and the
     /// change ΔR of what is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the
     /// row.
-    fn sharpen(&self, start: &mut Start, given_up: u64, at: &mut Linearised, qp: &mut Workspace) {
+    fn sharpen(&self, start: &mut Start, relaxed: RowSet, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         let (mut point, mut least) = (*start, f64::INFINITY);
         let mut before: Option<(Input, Input)> = None;
         for _ in 0..SHARPENING {
-            self.measure(&mut point, m, given_up, at);
+            self.measure(&mut point, m, relaxed, at);
             if point.violation > 0.0 {
                 return;
             }
@@ -410,7 +417,7 @@ impl Held<'_> {
             }
             before = Some((point.u, left));
             point = self.between(&point, &target, part);
-            self.restore(&mut point, RESTORING[1], given_up, at, qp);
+            self.restore(&mut point, RESTORING[1], relaxed, at, qp);
         }
     }
 

@@ -33,9 +33,9 @@
 
 mod rows;
 
+use super::RowSet;
 use super::factors::{Factors, Projection, dot};
 use super::{Active, Constraint, Enforcement, Outcome, Problem, power_of_two};
-use crate::MAX_ROWS;
 
 /// A violation up to this part of the terms of its slack is round-off.
 const ROUND_OFF: f64 = 1e-14;
@@ -102,10 +102,10 @@ pub(super) struct DualActiveSet<const N: usize> {
     /// u_ref, moved by the soft rows at their largest multiplier.
     origin: [f64; N],
     u: [f64; N],
-    /// Sets of rows, a bit each: at their largest multiplier; active; taken part in.
-    saturated: u64,
-    active: u64,
-    enabled: u64,
+    /// Sets of rows: at their largest multiplier; active; taken part in.
+    saturated: RowSet,
+    active: RowSet,
+    enabled: RowSet,
     /// Sets of bounds that are active: bits 2i for the lower, 2i + 1 for the upper.
     bounds: u32,
     rounds: u32,
@@ -113,8 +113,8 @@ pub(super) struct DualActiveSet<const N: usize> {
     /// Whether a row has left since δ was computed from the active rows.
     stale: bool,
     /// Rows given up, because of the others or because of their size.
-    pub(super) relaxed: u64,
-    pub(super) lost: u64,
+    pub(super) relaxed: RowSet,
+    pub(super) ill_conditioned: RowSet,
 }
 
 impl<const N: usize> DualActiveSet<N> {
@@ -128,25 +128,25 @@ impl<const N: usize> DualActiveSet<N> {
         u_ref: [0.0; N],
         origin: [0.0; N],
         u: [0.0; N],
-        saturated: 0,
-        active: 0,
-        enabled: 0,
+        saturated: RowSet::EMPTY,
+        active: RowSet::EMPTY,
+        enabled: RowSet::EMPTY,
         bounds: 0,
         rounds: 0,
         limit: 0,
         stale: false,
-        relaxed: 0,
-        lost: 0,
+        relaxed: RowSet::EMPTY,
+        ill_conditioned: RowSet::EMPTY,
     };
 
     /// Solves into `u`, which is `u_ref` within its bounds; called where some row does not hold there.
     /// Returns the rounds too.
     pub(super) fn solve(&mut self, p: &Problem, u: &mut [f64]) -> (Outcome, u32) {
         self.start(p, u);
-        self.enabled = all(p.rows.len());
+        self.enabled = RowSet::first(p.rows.len());
         let outcome = match self.all_at_once(p) {
             End::Met if self.within_limit(p) => {
-                if self.lost == 0 {
+                if self.ill_conditioned.is_empty() {
                     Outcome::Optimal
                 } else {
                     Outcome::IllConditioned
@@ -173,8 +173,8 @@ impl<const N: usize> DualActiveSet<N> {
     #[inline(always)]
     fn clear(&mut self, dim: usize) {
         (self.dim, self.len) = (dim, 0);
-        (self.saturated, self.active, self.bounds) = (0, 0, 0);
-        (self.relaxed, self.lost, self.rounds) = (0, 0, 0);
+        (self.saturated, self.active, self.bounds) = (RowSet::EMPTY, RowSet::EMPTY, 0);
+        (self.relaxed, self.ill_conditioned, self.rounds) = (RowSet::EMPTY, RowSet::EMPTY, 0);
         self.stale = false;
         self.factors.clear(dim);
     }
@@ -237,14 +237,13 @@ impl<const N: usize> DualActiveSet<N> {
     fn one_by_one(&mut self, p: &Problem) -> Outcome {
         self.limit = self.rounds + 1000 + 20 * (p.rows.len() * p.rows.len()) as u32;
         let mut stuck = false;
-        let mut done = 0_u64;
-        let mut kept = 0_u64;
+        let (mut done, mut kept) = (RowSet::EMPTY, RowSet::EMPTY);
         while let Some(k) = next_hard(p, done) {
-            done |= 1 << k;
+            done.insert(k);
             let Some(entering) = self.row_entering(p, k, 0.0) else {
                 // It holds, or says nothing about u.
-                if self.lost >> k & 1 == 0 {
-                    kept |= 1 << k;
+                if !self.ill_conditioned.contains(k) {
+                    kept.insert(k);
                 }
                 continue;
             };
@@ -254,25 +253,26 @@ impl<const N: usize> DualActiveSet<N> {
                 stuck |= matches!(end, End::Stuck) && self.within_limit(p);
                 let rounds = self.rounds;
                 *self = before;
-                (self.rounds, self.lost) = (rounds, self.lost | 1 << k);
+                (self.rounds, self.ill_conditioned) = (rounds, self.ill_conditioned | RowSet::of(k));
             } else if let End::Capped(false) = end {
-                self.relaxed |= 1 << k;
+                self.relaxed.insert(k);
             } else if let End::Met = end {
-                kept |= 1 << k;
+                kept.insert(k);
             }
         }
         let before = *self;
-        self.enabled = kept | (all(p.rows.len()) & !done);
-        if self.enabled & !done != 0 && (!matches!(self.all_at_once(p), End::Met) || !self.within_limit(p)) {
+        let soft = RowSet::first(p.rows.len()) - done;
+        self.enabled = kept | soft;
+        if !soft.is_empty() && (!matches!(self.all_at_once(p), End::Met) || !self.within_limit(p)) {
             let rounds = self.rounds;
             *self = before;
-            (self.rounds, self.lost) = (rounds, self.lost | (all(p.rows.len()) & !done));
+            (self.rounds, self.ill_conditioned) = (rounds, self.ill_conditioned | soft);
         }
         if stuck && self.rounds > self.limit {
             Outcome::Failed
-        } else if self.lost != 0 {
+        } else if !self.ill_conditioned.is_empty() {
             Outcome::IllConditioned
-        } else if self.relaxed != 0 {
+        } else if !self.relaxed.is_empty() {
             Outcome::Infeasible
         } else {
             Outcome::Optimal
@@ -281,7 +281,7 @@ impl<const N: usize> DualActiveSet<N> {
 
     /// Raises the multiplier of `e` until it holds. Rows `kept` and bounds are not violated on the
     /// way; with `None` they may be.
-    fn enter(&mut self, p: &Problem, mut e: Entering<N>, kept: Option<u64>) -> End {
+    fn enter(&mut self, p: &Problem, mut e: Entering<N>, kept: Option<RowSet>) -> End {
         let parametric = kept.is_some();
         // Of its own multiplier: how far it has come, and how far it may.
         let mut moved = 0.0;
@@ -404,7 +404,7 @@ impl<const N: usize> DualActiveSet<N> {
             if (0.0..f64::INFINITY).contains(&slack) {
                 continue;
             }
-            if (self.enabled & !self.active & !self.saturated) >> k & 1 == 1
+            if (self.enabled - self.active - self.saturated).contains(k)
                 && let Some(e) = self.row_entering(p, k, tolerance)
                 && e.violation * norm > violation * e.norm
             {
@@ -424,7 +424,7 @@ impl<const N: usize> DualActiveSet<N> {
                 worst = Some(e);
             }
         }
-        for k in ones(self.saturated & self.enabled) {
+        for k in (self.saturated & self.enabled).iter() {
             let (slot, normal, length) = self.constraint(p, Constraint::Row(k));
             let room = self.slack(p, &slot);
             if room > tolerance * self.terms(p, &slot) && room * norm > violation * length {
@@ -436,23 +436,25 @@ impl<const N: usize> DualActiveSet<N> {
         worst
     }
 
-    /// Row `k` where it is violated by more than `tolerance`; one that vanishes is marked as lost.
+    /// Row `k` where it is violated by more than `tolerance`; one that vanishes is marked as ill-conditioned.
     #[inline(always)]
     fn row_entering(&mut self, p: &Problem, k: usize, tolerance: f64) -> Option<Entering<N>> {
         if p.rows[k].slack(&self.u) >= 0.0 {
             return None;
         }
         if power_of_two(&p.rows[k].normal[..N]).is_none() {
-            self.lost |= u64::from(p.rows[k].floor > 0.0) << k;
-            self.enabled &= !(1 << k);
+            if p.rows[k].floor > 0.0 {
+                self.ill_conditioned.insert(k);
+            }
+            self.enabled.remove(k);
             return None;
         }
         let (slot, normal, norm) = self.constraint(p, Constraint::Row(k));
         let violation = -self.slack(p, &slot);
         if !violation.is_finite() {
             // It asks for more than a number can say.
-            self.lost |= 1 << k;
-            self.enabled &= !(1 << k);
+            self.ill_conditioned.insert(k);
+            self.enabled.remove(k);
             return None;
         }
         let violated = violation > tolerance * self.terms(p, &slot);
@@ -469,13 +471,13 @@ impl<const N: usize> DualActiveSet<N> {
         &self,
         p: &Problem,
         projection: &Projection<N>,
-        kept: u64,
+        kept: RowSet,
         step: f64,
     ) -> Option<(f64, Constraint)> {
         let z = &projection.outside;
         let length = projection.square.sqrt();
         let (mut step, mut first) = (step, None);
-        for k in ones(kept & !self.active) {
+        for k in (kept - self.active).iter() {
             let Some(_) = power_of_two(&p.rows[k].normal[..N]) else { continue };
             let (slot, normal, norm) = self.constraint(p, Constraint::Row(k));
             let slope = -dot(&normal, z);
@@ -521,7 +523,7 @@ impl<const N: usize> DualActiveSet<N> {
             };
             Active { constraint: slot.constraint, multiplier: slot.multiplier * unit }
         });
-        let saturated = ones(self.saturated).map(|k| {
+        let saturated = self.saturated.iter().map(|k| {
             let (slot, _, _) = self.constraint(p, Constraint::Row(k));
             Active { constraint: slot.constraint, multiplier: slot.cap * slot.scale }
         });
@@ -536,30 +538,13 @@ enum Event {
     Reaches(Constraint),
 }
 
-/// The first `rows` bits.
-fn all(rows: usize) -> u64 {
-    const { assert!(MAX_ROWS == 64) }
-    u64::MAX.checked_shr((MAX_ROWS - rows) as u32).unwrap_or(0)
-}
-
-/// The positions of the bits of `set`.
-fn ones(mut set: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let k = set.trailing_zeros() as usize;
-        (set != 0).then(|| {
-            set &= set - 1;
-            k
-        })
-    })
-}
-
 /// The hard row of highest priority that is not in `done`, the first of equals.
-fn next_hard(p: &Problem, done: u64) -> Option<usize> {
+fn next_hard(p: &Problem, done: RowSet) -> Option<usize> {
     let priority = |k: usize| match p.enforcement.get(k) {
         None => Some(0),
         Some(Enforcement::Hard { priority }) => Some(*priority),
         Some(Enforcement::Soft { .. }) => None,
     };
-    let open = (0..p.rows.len()).filter(|k| done >> k & 1 == 0);
+    let open = (0..p.rows.len()).filter(|k| !done.contains(*k));
     open.filter_map(|k| Some((priority(k)?, k))).min().map(|(_, k)| k)
 }

@@ -2,7 +2,7 @@
 
 use super::super::factors::{Projection, dot};
 use super::super::{Constraint, Enforcement, Problem, Row, power_of_two};
-use super::{DualActiveSet, Slot, ones};
+use super::{DualActiveSet, Slot};
 
 impl<const N: usize> DualActiveSet<N> {
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
@@ -90,8 +90,8 @@ impl<const N: usize> DualActiveSet<N> {
     pub(super) fn mark(&mut self, constraint: Constraint, active: bool) {
         let toggle = |set: u32, bit: usize| if active { set | 1 << bit } else { set & !(1 << bit) };
         match constraint {
-            Constraint::Row(k) if active => self.active |= 1 << k,
-            Constraint::Row(k) => self.active &= !(1 << k),
+            Constraint::Row(k) if active => self.active.insert(k),
+            Constraint::Row(k) => self.active.remove(k),
             Constraint::Lower(i) => self.bounds = toggle(self.bounds, 2 * i),
             Constraint::Upper(i) => self.bounds = toggle(self.bounds, 2 * i + 1),
         }
@@ -99,7 +99,7 @@ impl<const N: usize> DualActiveSet<N> {
 
     pub(super) fn disable(&mut self, constraint: Constraint) {
         match constraint {
-            Constraint::Row(k) => self.enabled &= !(1 << k),
+            Constraint::Row(k) => self.enabled.remove(k),
             // Met by the final clamp.
             bound => self.mark(bound, true),
         }
@@ -108,10 +108,10 @@ impl<const N: usize> DualActiveSet<N> {
     /// Puts the row of `slot` at its largest multiplier, or takes it from there, and moves the origin.
     pub(super) fn saturate(&mut self, p: &Problem, slot: Slot, there: bool) {
         if let Constraint::Row(k) = slot.constraint {
-            self.saturated = if there { self.saturated | 1 << k } else { self.saturated & !(1 << k) };
+            if there { self.saturated.insert(k) } else { self.saturated.remove(k) }
         }
         self.origin = self.u_ref;
-        for k in ones(self.saturated) {
+        for k in self.saturated.iter() {
             let (slot, normal, _) = self.constraint(p, Constraint::Row(k));
             for i in 0..N {
                 self.origin[i] += slot.cap * normal[i] * self.reach[i];

@@ -1,0 +1,379 @@
+//! One barrier of a filter: its derivatives, its promise, when that is in force, and what a sample makes of it.
+
+use super::errors::{ErrorSlopes, MeasurementErrors};
+use super::hold::Lowest;
+use super::outlook::Outlook;
+use super::step::Moment;
+use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, Status};
+use crate::convergence::comparison::Stack;
+use crate::convergence::sampled::PeriodBound;
+use crate::convergence::stay::Means;
+use crate::convergence::{DerivativeBound, FixedTime};
+use crate::lie::{DerivativeSource, Derivatives};
+use crate::qp::{Bounds, Enforcement, Row};
+use crate::{MAX_RELATIVE_DEGREE, reach};
+
+/// When a barrier begins to be enforced. Its deadline counts from the filter's first sample in any case, so
+/// that "be in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Begin {
+    /// At the first sample.
+    #[default]
+    AtOnce,
+    /// This many seconds after it, finite, ≥ 0, less than the deadline.
+    At(f64),
+    /// When the barrier of this number, counted from 0 and added before, has arrived.
+    AfterArrival(usize),
+}
+
+/// When a barrier ceases to be enforced ([`Phase::Released`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum End {
+    /// Never.
+    #[default]
+    Never,
+    /// This many seconds after the filter's first sample, finite, > 0.
+    At(f64),
+    /// As soon as h ≥ 0 has been reached.
+    OnArrival,
+}
+
+/// What becomes of a barrier's constraint where not all can be met within the input bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Strictness {
+    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: what is safe is kept before
+    /// what is promised is reached.
+    #[default]
+    KeepFirst,
+    /// Hard: met as far as the bounds and the barriers of smaller numbers allow; of equal ones the one added
+    /// first goes first.
+    Priority(u32),
+    /// Soft, with an exact penalty: it yields, also to u_ref, where it would cost more than this distance
+    /// ‖u − u_ref‖, in units of u, finite, > 0.
+    Soft(f64),
+}
+
+/// One barrier of a filter.
+pub(super) struct BarrierSlot {
+    pub(super) name: String,
+    pub(super) source: Box<dyn DerivativeSource>,
+    pub(super) promise: FixedTime,
+    pub(super) begin: Begin,
+    pub(super) end: End,
+    pub(super) strictness: Strictness,
+    /// Whether the state is measured without errors.
+    pub(super) exact: bool,
+    /// What the present sample makes of it.
+    pub(super) now: SlotSample,
+}
+
+/// What a sample makes of a barrier: scratch memory that every sample writes anew.
+pub(super) struct SlotSample {
+    /// Whether the barrier is in force; all that follows is of such a one.
+    pub(super) in_force: bool,
+    /// The state from which the input acts.
+    pub(super) from: Vec<f64>,
+    /// Of h there, along the plant.
+    pub(super) derivatives: Derivatives,
+    /// Of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
+    pub(super) slopes: Vec<ErrorSlopes>,
+    /// The least h⁽ⁿ⁾ that keeps the promise.
+    pub(super) bound: DerivativeBound,
+    /// The row on u that this is.
+    pub(super) row: Row,
+    pub(super) enforcement: Enforcement,
+    /// What h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ have to meet at the end of the period.
+    pub(super) period_bound: PeriodBound,
+    /// Where the held input breaks the promise before the next sample, if it does.
+    pub(super) lowest: Option<Lowest>,
+}
+
+impl SlotSample {
+    fn new(states: usize) -> Self {
+        Self {
+            in_force: false,
+            from: vec![0.0; states],
+            derivatives: Derivatives::ZERO,
+            slopes: Vec::new(),
+            bound: DerivativeBound::NONE,
+            row: Row::ZERO,
+            enforcement: Enforcement::Hard { priority: 0 },
+            period_bound: PeriodBound::ZERO,
+            lowest: None,
+        }
+    }
+
+    /// Asks for nothing.
+    fn idle(&mut self) {
+        self.in_force = false;
+        (self.row, self.period_bound, self.lowest) = (Row::ZERO, PeriodBound::ZERO, None);
+    }
+}
+
+/// Round-off of a time that is a sum of steps, as a part of it.
+const SAME_TIME: f64 = 1e-12;
+
+impl BarrierSlot {
+    pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
+        let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
+        let now = SlotSample::new(source.state_dim());
+        Self { name: name.to_owned(), source, promise, begin, end, strictness, exact: true, now }
+    }
+
+    /// n.
+    #[inline]
+    pub(super) fn degree(&self) -> usize {
+        self.promise.relative_degree()
+    }
+
+    /// Evaluates h and its derivatives along the plant where the input begins to act (docs/theory.md, sections 2 and 8).
+    /// Returns h at the sample itself.
+    #[inline]
+    pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64]) -> f64 {
+        let Self { source, now, .. } = self;
+        source.evaluate(moment.t, moment.x, &mut now.derivatives);
+        let h = now.derivatives.drift[0];
+        now.from.copy_from_slice(moment.x);
+        if moment.delay > 0.0 {
+            source.predict(&mut now.from, acting, moment.delay);
+            source.evaluate(moment.begin, &now.from, &mut now.derivatives);
+        }
+        h
+    }
+
+    /// Moves the promise number `index` of `promises` to the sample, where h is `h` (section 5): whether it is in force, its
+    /// anchor, phase, and the least h⁽ⁿ⁾ that keeps it. Returns whether the deadline is unreachable.
+    ///
+    /// # Errors
+    ///
+    /// Derivatives that carry no constraint.
+    #[inline]
+    pub(super) fn advance(
+        &mut self,
+        promises: &mut [FixedTimeState],
+        index: usize,
+        h: f64,
+        moment: &Moment,
+        bounds: &Bounds,
+        errors: &MeasurementErrors,
+    ) -> Result<bool, Status> {
+        self.now.in_force = self.in_force(promises, index, moment.t, h);
+        if !self.now.in_force {
+            self.now.idle();
+            return Ok(false);
+        }
+        if let Some(status) = defect(&self.now.derivatives) {
+            return Err(status);
+        }
+        let (promise, n) = (&mut promises[index], self.degree());
+        let unsure = self.unsure(moment, errors);
+        let drift = self.now.derivatives.drift;
+        let lowest: Stack = std::array::from_fn(|k| drift[k] - unsure[k]);
+        let lowest = &lowest[..n];
+        self.anchor(promise, moment, lowest);
+        let means = self.means(promise, moment, bounds);
+        let move_on =
+            |promise: &mut _| self.promise.advance_by(promise, moment.begin, &drift[..n], &unsure, &means);
+        let mut bound = move_on(promise);
+        // A new anchor is a new promise, at this very sample.
+        if self.promise.restart(promise, moment.begin, lowest, moment.covered()) {
+            bound = move_on(promise);
+        }
+        let mut is_unreachable = self.is_unreachable(promise, moment, bounds, bound.time_left);
+        if is_unreachable && self.postpone(promise, moment, bounds, lowest) {
+            bound = move_on(promise);
+            is_unreachable = false;
+        }
+        self.now.bound = bound;
+        Ok(is_unreachable)
+    }
+
+    /// The row of that: L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (section 2), and (S) of the period (section 7). Returns whether there
+    /// is one of the period.
+    #[inline]
+    pub(super) fn form_row(&mut self, promise: &FixedTimeState, moment: &Moment) -> bool {
+        let n = self.degree();
+        self.now.enforcement = self.enforcement(promise);
+        let Derivatives { row: normal, drift, .. } = &self.now.derivatives;
+        let floor = self.now.bound.floor - drift[n];
+        let bound = moment
+            .period
+            .and_then(|period| self.promise.over_period(promise, moment.begin, &drift[..n], period));
+        self.now.row = Row { normal: *normal, floor };
+        self.now.period_bound = bound.unwrap_or(PeriodBound::ZERO);
+        bound.is_some()
+    }
+
+    /// (S) over another time in s, `None` where the barrier is not in force or has none.
+    pub(super) fn over(
+        &self,
+        promise: &FixedTimeState,
+        moment: &Moment,
+        duration: f64,
+    ) -> Option<PeriodBound> {
+        let stack = &self.now.derivatives.drift[..self.degree()];
+        self.now.in_force.then(|| self.promise.over_period(promise, moment.begin, stack, duration))?
+    }
+
+    /// What the derivatives say of h until the next sample.
+    pub(super) fn outlook(&self) -> Outlook<'_> {
+        Outlook { n: self.degree(), drift: &self.now.derivatives.drift }
+    }
+
+    /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
+    #[inline]
+    fn unsure(&mut self, moment: &Moment, errors: &MeasurementErrors) -> Stack {
+        if errors.is_exact() {
+            return [0.0; MAX_RELATIVE_DEGREE];
+        }
+        errors.of_derivatives(&*self.source, moment.t, moment.x, moment.u_ref.len(), &mut self.now.slopes)
+    }
+
+    /// What plant and inputs can do about h; notes in `promise` how well it can be influenced.
+    #[inline]
+    fn means(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds) -> Means {
+        let Derivatives { drift, row, .. } = &self.now.derivatives;
+        let (mut square, mut reach) = (0.0, 0.0);
+        for i in 0..moment.u_ref.len() {
+            let a = row[i];
+            square += a * a;
+            if a != 0.0 {
+                reach += f64::max(a * bounds.min[i], a * bounds.max[i]);
+            }
+        }
+        let size = square.sqrt();
+        promise.gain = promise.gain.max(size);
+        let weight = if promise.gain > 0.0 { size / promise.gain } else { 1.0 };
+        Means { drift: drift[self.degree()], reach, weight, hold: moment.hold }
+    }
+
+    /// How strictly its row is enforced.
+    pub(super) fn enforcement(&self, promise: &FixedTimeState) -> Enforcement {
+        match self.strictness {
+            Strictness::KeepFirst => Enforcement::Hard { priority: u32::from(!promise.was_inside()) },
+            Strictness::Priority(priority) => Enforcement::Hard { priority },
+            Strictness::Soft(penalty) => Enforcement::Soft { penalty },
+        }
+    }
+
+    /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it
+    /// where it has ceased to be.
+    #[inline]
+    pub(super) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
+        let begun = !matches!(barriers[index].phase, Phase::Waiting | Phase::Released);
+        begun && self.end == End::Never || self.is_due(barriers, index, t, h)
+    }
+
+    fn is_due(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
+        let start = *barriers[index].start_time.get_or_insert(t);
+        let reached = |seconds: f64| t - start >= seconds - SAME_TIME * t.abs().max(seconds);
+        let begun = barriers[index].phase != Phase::Waiting
+            || match self.begin {
+                Begin::AtOnce => true,
+                Begin::At(seconds) => reached(seconds),
+                Begin::AfterArrival(other) => barriers[other].arrival.is_some(),
+            };
+        let promise = &mut barriers[index];
+        let ended = match self.end {
+            End::Never => false,
+            End::At(seconds) => reached(seconds),
+            End::OnArrival => begun && (h >= 0.0 || promise.arrival.is_some()),
+        };
+        if ended && promise.phase != Phase::Released {
+            promise.phase = Phase::Released;
+            promise.unmet = None;
+            if h >= 0.0 {
+                promise.arrival.get_or_insert(t);
+            }
+        }
+        begun && !ended
+    }
+
+    /// Anchors `promise` where it waits for that, from the least derivatives `h`; and where samples turn out to be further
+    /// apart than was thought then, takes the margin for that into account.
+    #[inline]
+    fn anchor(&self, promise: &mut FixedTimeState, moment: &Moment, h: &[f64]) {
+        let covered = moment.covered();
+        if promise.phase == Phase::Waiting {
+            let sampled = moment.begin - moment.delay;
+            let waited = sampled - promise.start_time.unwrap_or(sampled);
+            let deadline = self.promise.deadline() - waited - moment.delay;
+            self.promise.anchor(promise, moment.begin, h, deadline, covered);
+        } else if moment.measures
+            && promise.phase == Phase::Approach
+            && covered > promise.period * (1.0 + SAME_PERIOD)
+        {
+            self.promise.resample(promise, covered);
+        }
+    }
+
+    /// Whether model and measurement say all of h: what a disturbance may do for it is never ruled out.
+    pub(super) fn is_undisturbed(&self) -> bool {
+        self.exact && self.promise.settings().disturbance == 0.0
+    }
+
+    /// Whether the deadline, in `time_left` s, certainly cannot be met: no input within `bounds` has h ≥ 0 then, or it has
+    /// passed outside.
+    fn is_unreachable(
+        &self,
+        promise: &FixedTimeState,
+        moment: &Moment,
+        bounds: &Bounds,
+        time_left: f64,
+    ) -> bool {
+        match promise.phase {
+            Phase::Late => true,
+            Phase::Approach if moment.bounded && self.is_undisturbed() => {
+                let size = promise.anchor[0].abs() + promise.margin;
+                reach::ruled_out(&*self.source, (moment.begin, &self.now.from), bounds, time_left, size)
+            }
+            _ => false,
+        }
+    }
+
+    /// Gives up a deadline that is lost, where the settings say so: starts the promise anew with a later one
+    /// ([`Infeasible::Soonest`]). Returns whether it did.
+    fn postpone(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds, h: &[f64]) -> bool {
+        /// How much longer than what is not ruled out: getting there takes less than stopping there does.
+        const FACTOR: f64 = 2.0;
+        const GROWTH: f64 = 1.5;
+        /// The longest deadline looked for, in units of the configured one.
+        const HORIZON: f64 = 1e3;
+        if self.promise.settings().infeasible != Infeasible::Soonest {
+            return false;
+        }
+        let configured = self.promise.deadline();
+        let now = (moment.begin, &*self.now.from);
+        let soonest = reach::soonest(&*self.source, now, bounds, HORIZON * configured);
+        let factor = FACTOR * GROWTH.powi(promise.postponed.min(16) as i32);
+        // Near the set the soonest time tends to zero: never shorter than ten samples.
+        let deadline = match soonest {
+            Some(soonest) if soonest > 0.0 => (factor * soonest).max(10.0 * moment.period.unwrap_or(0.0)),
+            _ => configured,
+        };
+        let postponed = promise.postponed.saturating_add(1);
+        let unmet = promise.unmet;
+        self.promise.anchor(promise, now.0, h, deadline, moment.period.unwrap_or(0.0));
+        (promise.postponed, promise.unmet) = (postponed, unmet);
+        true
+    }
+}
+
+/// Why derivatives cannot carry a constraint, if they cannot.
+#[inline]
+fn defect(derivatives: &Derivatives) -> Option<Status> {
+    /// An input that enters below the declared degree by more than this part of the row is real.
+    const OF_ROW: f64 = 1e-9;
+    /// So is one by more than this part of the derivatives themselves; round-off of cancelling terms stays below.
+    const OF_DERIVATIVES: f64 = 1e-13;
+    if !derivatives.is_finite() {
+        return Some(Status::Singular);
+    }
+    if derivatives.lower_sensitivity <= 0.0 {
+        return None;
+    }
+    let size = derivatives.row.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
+    let terms = derivatives.drift.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
+    let is_real = derivatives.lower_sensitivity > (OF_ROW * size).max(OF_DERIVATIVES * terms);
+    is_real.then_some(Status::WrongRelativeDegree)
+}

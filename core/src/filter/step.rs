@@ -1,0 +1,316 @@
+//! One sample, in the order of the mathematics: evaluate, advance, rows, solve, report. Section numbers are those of
+//! docs/theory.md.
+
+use super::hold::Hold;
+use super::search::{PeriodProblem, Requirement};
+use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace};
+use crate::convergence::{FixedTimeState, Unmet};
+use crate::error::{Error, length};
+use crate::qp::{Enforcement, Outcome, Problem, Solution};
+use crate::scalar::all_finite;
+use crate::{MAX_INPUTS, MAX_ROWS};
+
+/// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
+const ROUNDS: u32 = 3;
+
+/// Of steps in a row that do not meet a constraint, so many of the first look far around for an input, and then every
+/// such one.
+const WIDE: (u32, u32) = (8, 16);
+
+/// How much further from u_ref, or 1, an instant may move the input.
+const MUCH_FURTHER: f64 = 4.0;
+
+/// When and where a sample is taken, and for how long its input is held.
+pub(super) struct Moment<'a> {
+    /// Time of the sample in s.
+    pub(super) t: f64,
+    /// From the sample until its input acts, in s.
+    pub(super) delay: f64,
+    /// Time in s from which its input acts.
+    pub(super) begin: f64,
+    pub(super) x: &'a [f64],
+    pub(super) u_ref: &'a [f64],
+    /// The period in s that the rows look over, `None` for the pointwise constraint.
+    pub(super) period: Option<f64>,
+    /// How long the input may be held, in s.
+    pub(super) hold: f64,
+    /// How long a hold may turn out that is thought to last `hold`.
+    pub(super) long: f64,
+    /// Whether the period is measured.
+    pub(super) measures: bool,
+    /// Whether an input has a bound: without any nothing is ruled out.
+    pub(super) bounded: bool,
+}
+
+impl Moment<'_> {
+    /// The hold in s that margins and rates account for, 0 for the pointwise constraint.
+    pub(super) fn covered(&self) -> f64 {
+        self.period.map_or(0.0, |_| self.hold)
+    }
+}
+
+impl SafetyFilter {
+    /// Makes a sample: its input to `u`, its report and the state after it to the workspace.
+    pub(super) fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
+        length("x", x.len(), self.state_dim)?;
+        length("u_ref", u_ref.len(), self.input_dim)?;
+        length("u", u.len(), self.input_dim)?;
+        self.workspace.next.clone_from(&self.state);
+        self.workspace.report.reset(t);
+        if !t.is_finite() || !all_finite(x) || !all_finite(u_ref) {
+            self.workspace.report.barriers.fill(BarrierReport::BLANK);
+            self.abstain(Status::InvalidInput, u);
+            return Ok(());
+        }
+        let moment = self.moment(t, x, u_ref);
+        match self.rows(&moment) {
+            Err(status) => self.abstain(status, u),
+            Ok(is_sampled) => {
+                self.require_longest(&moment, is_sampled);
+                let solution = self.solve(&moment, u);
+                self.report_on(&moment, solution, u);
+            }
+        }
+        Ok(())
+    }
+
+    fn moment<'a>(&self, t: f64, x: &'a [f64], u_ref: &'a [f64]) -> Moment<'a> {
+        let period = self.sampling.period(&self.state, t, self.first_period, self.expected);
+        let since = self.state.time.map_or(0.0, |last| (t - last).max(0.0));
+        let hold = period.unwrap_or(since).max(self.period_max);
+        let told = self.expected.is_some() || self.period_max > 0.0;
+        Moment {
+            t,
+            delay: self.delay,
+            begin: t + self.delay,
+            x,
+            u_ref,
+            period,
+            hold,
+            long: self.sampling.longest(hold, told),
+            measures: matches!(self.sampling, Sampling::Measured { .. }),
+            bounded: self.bounded,
+        }
+    }
+
+    /// Evaluates every barrier, moves its promise to the sample, and forms its row (sections 2, 5 and 7). Returns whether
+    /// all have a row over the period.
+    ///
+    /// # Errors
+    ///
+    /// Derivatives or a row that are no constraint.
+    fn rows(&mut self, moment: &Moment) -> Result<bool, Status> {
+        let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
+        let Workspace { next, report, requirements, .. } = &mut self.workspace;
+        // Within the capacity: a step does not allocate.
+        requirements.clear();
+        let (mut found, mut is_sampled) = (Ok(()), moment.period.is_some());
+        let promises = &mut next.barriers[..];
+        for (i, (slot, report)) in self.slots.iter_mut().zip(&mut report.barriers).enumerate() {
+            let h = slot.evaluate(moment, &acting[..moment.u_ref.len()]);
+            *report = BarrierReport { h, ..BarrierReport::BLANK };
+            let deadline_unreachable = match slot.advance(promises, i, h, moment, &self.bounds, &self.errors)
+            {
+                Ok(is_unreachable) => is_unreachable,
+                Err(status) => {
+                    found = Err(status);
+                    continue;
+                }
+            };
+            if slot.now.in_force {
+                is_sampled &= slot.form_row(&promises[i], moment);
+                let of = BarrierReport::of(&promises[i], h, slot.now.bound, slot.now.row);
+                *report = BarrierReport { deadline_unreachable, ..of };
+                if !slot.now.row.floor.is_finite() {
+                    found = Err(Status::Singular);
+                }
+            } else {
+                report.remember(&promises[i]);
+            }
+            if let Some(ahead) = moment.period {
+                requirements.push(Requirement { barrier: i, bound: slot.now.period_bound, ahead });
+            }
+        }
+        found.map(|()| is_sampled)
+    }
+
+    /// Where the next sample may come at the end of the period or of the longest step, asks for both (section 7).
+    fn require_longest(&mut self, moment: &Moment, is_sampled: bool) {
+        let Workspace { next, report, requirements, .. } = &mut self.workspace;
+        let period = moment.period.filter(|_| is_sampled);
+        report.period = period.unwrap_or(0.0);
+        let Some(period) = period else {
+            requirements.clear();
+            return;
+        };
+        if period <= 0.0 || self.period_max <= period * (1.0 + SAME_PERIOD) {
+            return;
+        }
+        let room = MAX_ROWS - self.slots.len();
+        for (i, (slot, promise)) in self.slots.iter().zip(&next.barriers).enumerate().take(room) {
+            if let Some(bound) = slot.over(promise, moment, self.period_max) {
+                requirements.push(Requirement { barrier: i, bound, ahead: self.period_max });
+            }
+        }
+    }
+
+    /// Solves; where h would break its promise between the samples, once more with that instant as a row (section 7).
+    fn solve(&mut self, moment: &Moment, u: &mut [f64]) -> Solution {
+        let listed = self.workspace.requirements.len();
+        let (mut round, mut allowed) = (0, f64::INFINITY);
+        loop {
+            let solution = self.solve_once(moment, listed, u);
+            self.look(moment, u);
+            // An input that turns the plant by many radians makes any prediction true.
+            let distance = u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+            let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
+            if self.workspace.requirements.len() > listed && !met {
+                // That instant cannot be had as well: the flag says so.
+                self.workspace.requirements.truncate(listed);
+                round = ROUNDS;
+                continue;
+            }
+            // With n = 1 the model hardly turns, and an instant soon after the sample takes what it takes.
+            if self.slots.iter().any(|slot| slot.now.lowest.is_some() && slot.degree() > 1) {
+                let size = moment.u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
+                allowed = MUCH_FURTHER * size;
+            }
+            if round == ROUNDS || !met || !self.workspace.report.predicted || !self.require_instants() {
+                return solution;
+            }
+            round += 1;
+        }
+    }
+
+    /// Solves the quadratic program, over the period where all barriers have a row of it and a model to predict with
+    /// (sections 7 and 9); the first `listed` requirements begin from the pointwise rows.
+    fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
+        let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
+        let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
+        if !requirements.is_empty() {
+            for (i, requirement) in requirements.iter().enumerate() {
+                let now = &self.slots[requirement.barrier].now;
+                enforcement[i] = now.enforcement;
+                rows[i] = match i < listed {
+                    true => now.row,
+                    false => self.slots[requirement.barrier].outlook().row_at(requirement, &now.row.normal),
+                };
+            }
+            // Where rows have not been met for some steps, looking far around at each would find what it found before.
+            let widens =
+                |b: &FixedTimeState| b.unmet.is_none_or(|u| u.steps < WIDE.0 || u.steps % WIDE.1 == 0);
+            let problem = PeriodProblem {
+                slots: &self.slots,
+                requirements,
+                t: moment.begin,
+                bounds,
+                u_ref,
+                enforcement: &enforcement[..requirements.len()],
+                correction_limit,
+                errors: &self.errors,
+                widens: self.state.barriers.iter().all(widens),
+            };
+            let last = self.state.time.map(|_| &self.state.input[..u.len()]);
+            if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, qp, u) {
+                report.predicted = true;
+                return solution;
+            }
+        }
+        report.predicted = false;
+        for (i, slot) in self.slots.iter().enumerate() {
+            (rows[i], enforcement[i]) = (slot.now.row, slot.now.enforcement);
+        }
+        let count = self.slots.len();
+        let problem = Problem::new(&rows[..count], bounds, u_ref, correction_limit);
+        qp.solve(&Problem { enforcement: &enforcement[..count], ..problem }, u)
+    }
+
+    /// Looks at every instant until the next sample under the held input `u`.
+    fn look(&mut self, moment: &Moment, u: &[f64]) {
+        let Workspace { next, scratch, .. } = &mut self.workspace;
+        for (slot, promise) in self.slots.iter_mut().zip(&next.barriers) {
+            let held = Hold { source: &*slot.source, t: moment.begin, x: &slot.now.from, u };
+            let holds = [moment.hold, moment.long];
+            slot.now.lowest = match slot.now.in_force {
+                true => slot.outlook().look(promise, &held, &slot.now.row.normal, holds, scratch),
+                false => None,
+            };
+        }
+    }
+
+    /// Asks for the instants at which the answer breaks a promise. Returns whether there are any.
+    fn require_instants(&mut self) -> bool {
+        let Workspace { next, requirements, .. } = &mut self.workspace;
+        let before = requirements.len();
+        for (i, (slot, promise)) in self.slots.iter().zip(&next.barriers).enumerate() {
+            let requirement = slot.outlook().requirement(i, promise, slot.now.lowest);
+            requirements.extend(requirement.filter(|_| before + i < MAX_ROWS));
+        }
+        requirements.len() > before
+    }
+
+    /// Says what the step did, and what becomes of each promise (section 5).
+    fn report_on(&mut self, moment: &Moment, solution: Solution, u: &[f64]) {
+        let Workspace { next, report, rows, requirements, qp, .. } = &mut self.workspace;
+        if moment.measures && self.state.time.is_some_and(|last| moment.t > last) {
+            next.period = moment.period;
+        }
+        next.time = Some(moment.t);
+        next.input[..u.len()].copy_from_slice(u);
+        report.solver = solution.solver;
+        report.iterations = solution.iterations;
+        report.status = match solution.outcome {
+            Outcome::Optimal if u == moment.u_ref => Status::Unchanged,
+            Outcome::Optimal => Status::Filtered,
+            Outcome::Infeasible => Status::Infeasible,
+            Outcome::IllConditioned => Status::NoAuthority,
+            Outcome::Failed => Status::SolverFailed,
+        };
+        let (status, predicted) = (report.status, report.predicted);
+        let mut blocked = false;
+        for (i, slot) in self.slots.iter().enumerate().filter(|(_, slot)| slot.now.in_force) {
+            let (row, promise, report) = (&rows[i], &mut next.barriers[i], &mut report.barriers[i]);
+            if let Some(period) = moment.period.filter(|_| predicted) {
+                report.sampling_loss = slot.now.period_bound.loss(slot.now.row.slack(u), period);
+                report.row = *row;
+            }
+            report.slack = row.slack(u);
+            let soft = matches!(slot.now.enforcement, Enforcement::Soft { .. });
+            let met = status.is_satisfied() && !soft || row.holds(u);
+            // A row without what the errors may do is not the one of the theorem.
+            let is_kept = slot.now.lowest.is_none() && (predicted || self.errors.is_exact());
+            promise.guaranteed &= met && is_kept;
+            promise.unmet = (!met).then(|| Unmet::after(promise.unmet, moment.t, report.h));
+            report.guaranteed = promise.guaranteed;
+            report.unmet_steps = promise.unmet.map_or(0, |unmet| unmet.steps);
+            blocked |= !met;
+        }
+        if blocked {
+            let barrier = |row: usize| requirements.get(row).map_or(row, |requirement| requirement.barrier);
+            report.find_deadlocks(moment.t, &next.barriers, qp.active(), barrier);
+        }
+    }
+
+    /// Enforces nothing: the admissible input nearest 0. The promises stay as they were, but those already given lose their
+    /// guarantee.
+    fn abstain(&mut self, status: Status, u: &mut [f64]) {
+        let Workspace { next, report, .. } = &mut self.workspace;
+        report.status = status;
+        next.clone_from(&self.state);
+        for (promise, b) in next.barriers.iter_mut().zip(&mut report.barriers) {
+            promise.guaranteed = false;
+            b.remember(promise);
+        }
+        for (i, ui) in u.iter_mut().enumerate() {
+            *ui = self.bounds.clamp(i, 0.0);
+        }
+    }
+
+    /// The input that acts until that of the present step does.
+    pub(super) fn acting(&self) -> [f64; MAX_INPUTS] {
+        match self.state.time {
+            Some(_) => self.state.input,
+            None => std::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
+        }
+    }
+}
