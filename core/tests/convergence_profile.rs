@@ -1,9 +1,7 @@
 //! Profiles of one's own: the check accepts what is right and names what is not; distinct rates.
 
 use punctual_core::convergence::comparison::factorial;
-use punctual_core::convergence::hermite::Hermite;
 use punctual_core::convergence::operator::Operator;
-use punctual_core::convergence::profile::Profile;
 use punctual_core::convergence::profile::{Derivatives, Hermite, LowPeak, Profile, ProfileError, check};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, ProfileKind, Refusal};
 

@@ -148,84 +148,98 @@ impl PeriodProblem<'_> {
         let mut pointwise = [0.0; MAX_INPUTS];
         let pointwise = &mut pointwise[..m];
         let first = qp.solve(&self.problem(at.rows), pointwise);
-        for (i, ui) in u.iter_mut().enumerate() {
-            *ui = self.bounds.clamp(i, self.u_ref[i]);
-        }
-        // Nothing to do where u_ref meets the sampled rows, those first of which it is doubtful.
+        // Nothing to do where u_ref meets the sampled rows.
         let doubtful = active(qp);
-        self.linearise(u, doubtful, &mut at)?;
-        if (at.violated() & doubtful).is_empty() {
-            self.linearise(u, RowSet::ALL, &mut at)?;
-            if at.worst(RowSet::EMPTY) <= 0.0 {
-                return Some(Solution {
-                    outcome: Outcome::Optimal,
-                    solver: Solver::Unchanged,
-                    iterations: 0,
-                });
-            }
+        if self.is_met_by_reference(u, doubtful, &mut at)? {
+            return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
         }
+        // Newton's method from both guesses.
         let watched = doubtful | at.violated();
         let against = at.most_violated();
-        let mut best: Option<Candidate> = None;
-        let mut guess = [0.0; MAX_INPUTS];
-        // Whether the rows are linearised at the best guess.
-        let mut at_best = false;
-        // Whether the answer is surely right: by steps that contracted, or the same from both guesses.
-        let mut settled = false;
-        let soft = self.soft();
-        for start in [Some(&*pointwise), last].into_iter().flatten() {
-            // The last input may come from a state that was made under other bounds.
-            for i in 0..m {
-                guess[i] = self.bounds.clamp(i, start[i]);
-            }
-            at_best = false;
-            if let Some(found) = self.newton(&mut guess[..m], watched, &mut at, qp) {
-                let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
-                    && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
-                settled |= same && found.ended;
-                if !best.as_ref().is_none_or(|b| found.better_than(b)) {
-                    continue;
-                }
-                u.copy_from_slice(&guess[..m]);
-                let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
-                let (found_sure, sure) = (found.sure, found.sure && near);
-                (best, at_best) = (Some(found), true);
-                settled |= found_sure;
-                if sure {
-                    break;
-                }
-            }
-        }
-        let mut best = best?;
+        let Found { mut best, mut at_best, mut settled } =
+            self.descend(u, [Some(&*pointwise), last], watched, &mut at, qp)?;
         // An input that far out turns the plant by an angle: there the rows have other answers, which steps that
         // contract do not see.
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
         settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, i, &mut at));
-        let widens = self.widens || best.is_met(soft) || first.outcome == Outcome::Optimal;
+        // Far around, where the answer is in doubt.
+        let widens = self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal;
         if !settled
             && widens
             && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, qp)
         {
             (best, at_best) = (found, false);
         }
-        at_best &= settled;
-        if !at_best {
+        if !(at_best && settled) {
             self.judge(u, &mut at)?;
             // What is active at the answer.
-            qp.solve(&self.problem(at.rows), &mut guess[..m]);
+            qp.solve(&self.problem(at.rows), pointwise);
         }
         let outcome = match best.outcome {
             Outcome::Optimal if best.violation <= 0.0 => Outcome::Optimal,
             // The linearised rows can be met, the rows themselves could not.
             Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
             Outcome::Optimal => Outcome::IllConditioned,
-            // What was given up on the way has been met after all.
+            // What was relaxed on the way has been met after all.
             Outcome::Infeasible | Outcome::IllConditioned if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
+    }
+
+    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows; those that are `doubtful` are looked at
+    /// first, and alone if one of them is violated.
+    fn is_met_by_reference(&self, u: &mut [f64], doubtful: RowSet, at: &mut Linearised) -> Option<bool> {
+        for (i, ui) in u.iter_mut().enumerate() {
+            *ui = self.bounds.clamp(i, self.u_ref[i]);
+        }
+        self.linearise(u, doubtful, at)?;
+        if !(at.violated() & doubtful).is_empty() {
+            return Some(false);
+        }
+        self.linearise(u, RowSet::ALL, at)?;
+        Some(at.worst(RowSet::EMPTY) <= 0.0)
+    }
+
+    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later ones are left out
+    /// where one before met every row by steps that contracted.
+    fn descend(
+        &self,
+        u: &mut [f64],
+        guesses: [Option<&[f64]>; 2],
+        watched: RowSet,
+        at: &mut Linearised,
+        qp: &mut Workspace,
+    ) -> Option<Found> {
+        let (m, soft, last) = (u.len(), self.soft(), guesses[1]);
+        let mut guess = [0.0; MAX_INPUTS];
+        let mut best: Option<Candidate> = None;
+        let (mut at_best, mut settled) = (false, false);
+        for start in guesses.into_iter().flatten() {
+            // The last input may come from a state that was made under other bounds.
+            for i in 0..m {
+                guess[i] = self.bounds.clamp(i, start[i]);
+            }
+            at_best = false;
+            let Some(found) = self.newton(&mut guess[..m], watched, at, qp) else { continue };
+            let same = best.as_ref().is_some_and(|b| b.is_met(soft) && found.is_met(soft))
+                && (0..m).all(|i| (u[i] - guess[i]).abs() <= SAME * u[i].abs().max(1.0));
+            settled |= same && found.ended;
+            if !best.as_ref().is_none_or(|b| found.better_than(b)) {
+                continue;
+            }
+            u.copy_from_slice(&guess[..m]);
+            let near = last.is_none_or(|last| found.distance <= (1.0 + MET) * self.distance(last));
+            let is_only = found.sure && near;
+            settled |= found.sure;
+            (best, at_best) = (Some(found), true);
+            if is_only {
+                break;
+            }
+        }
+        Some(Found { best: best?, at_best, settled })
     }
 
     fn problem<'b>(&'b self, rows: &'b [Row]) -> Problem<'b> {
@@ -396,57 +410,35 @@ impl PeriodProblem<'_> {
             sure: true,
         };
         let mut target = [0.0; MAX_INPUTS];
-        let mut last_way = f64::INFINITY;
+        let (target, mut last_way) = (&mut target[..m], f64::INFINITY);
         let mut ended = false;
         for _ in 0..ITERATIONS {
-            let target = &mut target[..m];
+            // The answer of the program linearised here.
             let solution = qp.solve(&self.problem(at.rows), target);
             found.relaxed = soft | qp.relaxed() | qp.ill_conditioned();
-            found.outcome = solution.outcome;
-            found.solver = solution.solver;
+            (found.outcome, found.solver) = (solution.outcome, solution.solver);
             found.iterations += solution.iterations;
-            let violation = at.worst(found.relaxed);
-            let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+            found.violation = at.worst(found.relaxed);
             let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-            found.violation = violation;
-            if violation <= 0.0 && way <= MET * size {
-                if watched == RowSet::ALL {
-                    ended = true;
-                    break;
+            // It is the end where that moves nothing any more, and every row has been linearised.
+            if found.violation <= 0.0 && way <= MET * size {
+                if watched != RowSet::ALL {
+                    self.linearise(u, RowSet::ALL, at)?;
+                    watched = RowSet::ALL;
+                    found.violation = at.worst(found.relaxed);
                 }
-                self.linearise(u, RowSet::ALL, at)?;
-                watched = RowSet::ALL;
-                found.violation = at.worst(found.relaxed);
-                if found.violation <= 0.0 {
-                    ended = true;
+                ended = found.violation <= 0.0;
+                if ended {
                     break;
                 }
                 continue;
             }
+            // Towards it, as far as the violation decreases.
             found.sure &= way <= CONTRACTION * last_way;
             last_way = way;
             watched |= active(qp) | at.violated();
-            let mut part = 1.0;
-            let mut moved = false;
-            for _ in 0..=HALVINGS {
-                for i in 0..m {
-                    // Between two points within the bounds, but for round-off.
-                    u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
-                }
-                if self.linearise(u, watched, at).is_some() {
-                    let there = at.worst(found.relaxed);
-                    if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
-                        found.violation = there;
-                        moved = true;
-                        break;
-                    }
-                }
-                part /= 2.0;
-                found.sure = false;
-            }
-            if !moved {
-                u.copy_from_slice(&from[..m]);
+            if !self.line_search(u, target, watched, at, &mut found) {
                 break;
             }
         }
@@ -459,6 +451,47 @@ impl PeriodProblem<'_> {
         found.distance = self.distance(u);
         Some(found)
     }
+
+    /// Moves `u` towards `target` by a part of the way that lets the violation decrease sufficiently. Leaves it where it is,
+    /// and returns false, where there is none.
+    fn line_search(
+        &self,
+        u: &mut [f64],
+        target: &[f64],
+        watched: RowSet,
+        at: &mut Linearised,
+        found: &mut Candidate,
+    ) -> bool {
+        let m = u.len();
+        let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+        let (violation, mut part) = (found.violation, 1.0);
+        for _ in 0..=HALVINGS {
+            for i in 0..m {
+                // Between two points within the bounds, but for round-off.
+                u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
+            }
+            if self.linearise(u, watched, at).is_some() {
+                let there = at.worst(found.relaxed);
+                if there <= 0.0 || there <= (1.0 - SUFFICIENT * part) * violation {
+                    found.violation = there;
+                    return true;
+                }
+            }
+            part /= 2.0;
+            found.sure = false;
+        }
+        u.copy_from_slice(&from[..m]);
+        false
+    }
+}
+
+/// What Newton's method found from all guesses.
+struct Found {
+    best: Candidate,
+    /// Whether the rows are linearised at the best.
+    at_best: bool,
+    /// Whether it is surely right: by steps that contracted, or the same from both guesses.
+    settled: bool,
 }
 
 /// What a search came to.
