@@ -101,7 +101,7 @@ impl Exponent {
 pub struct FirstOrder(pub Exponent);
 
 impl Condition for FirstOrder {
-    #[inline]
+    #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
         let (Self(exponent), anchor, e) = (self, at.anchor[0], at.e[0]);
         let lower = exponent.lower_bound(anchor, at.deadline, at.elapsed);

@@ -256,23 +256,20 @@ impl FixedTime {
         errors: &Stack,
         means: &Means,
     ) -> (f64, f64) {
-        let (stay, keeps) = (Stay(&self.settings), self.keeps(state));
-        match state.phase {
-            Phase::Stay if keeps => stay.choose(state, h, lowest, means),
-            Phase::Left if keeps => stay.pull_back(state, lowest, means),
-            _ => {}
-        }
         let mut e = *h;
-        e[0] -= state.margin_in_force();
-        let sample = state.sample(elapsed, &e, errors);
-        if keeps {
-            let bound = stay.bound(&sample);
-            return (bound.floor, sample.margin);
+        if self.keeps(state) {
+            let stay = Stay(&self.settings);
+            match state.phase {
+                Phase::Left => stay.pull_back(state, lowest, means),
+                _ => stay.choose(state, h, lowest, means),
+            }
+            e[0] -= state.stay_margin;
+            return (stay.bound(&state.on_stay(elapsed, &e)).floor, state.stay_margin);
         }
-        let bound = self.approach.bound(&sample);
-        let profile = bound.lower + sample.margin;
+        e[0] -= state.margin;
+        let bound = self.approach.bound(&state.on_approach(elapsed, &e, errors));
         state.guaranteed = state.phase == Phase::Approach && bound.applies;
-        (bound.floor, profile)
+        (bound.floor, bound.lower + state.margin)
     }
 
     /// Whether the stay constraint takes over inside.
@@ -295,12 +292,16 @@ impl FixedTime {
         h: &[f64],
         f: impl FnOnce(&dyn Condition, &Sample) -> R,
     ) -> R {
-        let stay = Stay(&self.settings);
-        let condition = if self.keeps(state) { &stay } else { self.approach.condition() };
         let mut e = [0.0; MAX_RELATIVE_DEGREE];
-        e[..self.n].copy_from_slice(&h[..self.n]);
-        e[0] -= state.margin_in_force();
-        f(condition, &state.sample(state.elapsed(t), &e[..self.n], &[]))
+        let (e, elapsed) = (&mut e[..self.n], state.elapsed(t));
+        e.copy_from_slice(&h[..self.n]);
+        if self.keeps(state) {
+            e[0] -= state.stay_margin;
+            f(&Stay(&self.settings), &state.on_stay(elapsed, e))
+        } else {
+            e[0] -= state.margin;
+            f(self.approach.condition(), &state.on_approach(elapsed, e, &[]))
+        }
     }
 
     /// (S) of [`sampled`] from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and

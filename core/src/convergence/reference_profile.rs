@@ -77,7 +77,7 @@ impl ReferenceProfile {
 }
 
 impl Condition for ReferenceProfile {
-    #[inline]
+    #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
         let n = at.e.len();
         let r = match (&self.own, self.kind) {

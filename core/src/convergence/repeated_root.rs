@@ -261,7 +261,7 @@ pub struct RepeatedRoot;
 const MARGIN_TOLERANCE: f64 = 1e-12;
 
 impl Condition for RepeatedRoot {
-    #[inline]
+    #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
         // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
         let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));

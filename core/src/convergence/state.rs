@@ -81,20 +81,12 @@ impl FixedTimeState {
         (t - self.anchor_time).max(0.0)
     }
 
-    /// μ of the condition in force: the margin that h is compared with.
+    /// What the method of the approach sees, with `e` = h − `margin` and its derivatives.
     #[inline(always)]
-    pub(super) fn margin_in_force(&self) -> f64 {
-        if self.phase.keeps() { self.stay_margin } else { self.margin }
-    }
-
-    /// What the condition in force sees, with `e` = h − μ and its derivatives.
-    #[inline(always)]
-    pub(super) fn sample<'a>(&'a self, elapsed: f64, e: &'a [f64], errors: &'a [f64]) -> Sample<'a> {
-        let (rate, pull) = if self.phase.keeps() { (self.stay_rate, self.pull) } else { (self.rate, 0.0) };
+    pub(super) fn on_approach<'a>(&'a self, elapsed: f64, e: &'a [f64], errors: &'a [f64]) -> Sample<'a> {
         Sample {
-            margin: self.margin_in_force(),
-            rate,
-            pull,
+            margin: self.margin,
+            rate: self.rate,
             fallback: self.fallback,
             guaranteed: self.guaranteed,
             errors,
@@ -102,15 +94,21 @@ impl FixedTimeState {
         }
     }
 
+    /// What the stay constraint sees, with `e` = h − `stay_margin` and its derivatives.
+    #[inline(always)]
+    pub(super) fn on_stay<'a>(&'a self, elapsed: f64, e: &'a [f64]) -> Sample<'a> {
+        Sample {
+            margin: self.stay_margin,
+            rate: self.stay_rate,
+            pull: self.pull,
+            guaranteed: self.guaranteed,
+            ..Sample::new(&self.anchor[..e.len()], self.deadline, elapsed, e)
+        }
+    }
+
     /// What the method of the approach sees at the anchor.
     pub(super) fn at_anchor(&self, n: usize) -> Sample<'_> {
-        let anchor = &self.anchor[..n];
-        Sample {
-            margin: self.margin,
-            rate: self.rate,
-            fallback: self.fallback,
-            ..Sample::new(anchor, self.deadline, 0.0, anchor)
-        }
+        self.on_approach(0.0, &self.anchor[..n], &[])
     }
 
     /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.
