@@ -1,5 +1,6 @@
 """The workflows and shell scripts, which run on other machines too, by the tools that know their mistakes."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -41,6 +42,13 @@ def test_workflows_call_scripts_that_exist(workflow):
     called = {command.split()[0] for command in commands}
     assert called <= {"cargo", *(str(path.relative_to(ROOT)) for path in scripts())}, called
     assert ".ci/toolchain" in called
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
+def test_every_job_says_why_it_exists(workflow):
+    lines = workflow.read_text().partition("\njobs:\n")[2].splitlines()
+    jobs = [k for k, line in enumerate(lines) if re.fullmatch(r"  [a-z]+:", line)]
+    assert jobs and all(k > 0 and lines[k - 1].startswith("  # ") for k in jobs)
 
 
 def test_scripts_are_sound():

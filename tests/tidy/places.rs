@@ -66,14 +66,6 @@ fn identifiers_are_ascii() {
     }
 }
 
-#[test]
-fn no_file_is_too_long_to_read() {
-    for text in TEXTS.iter().filter(|t| [".rs", ".py", ".c"].iter().any(|end| t.path.ends_with(end))) {
-        let lines = text.text.lines().count();
-        assert!(lines <= 600, "{} has {lines} lines, must have at most 600", text.path);
-    }
-}
-
 /// A test may be left to another one that runs it in a process of its own, and says so.
 #[test]
 fn no_test_is_ignored() {

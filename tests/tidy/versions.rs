@@ -94,6 +94,12 @@ fn the_lock_file_has_this_version() {
     assert!(ours >= 5, "{ours} packages of the workspace");
 }
 
+#[test]
+fn what_is_cited_has_this_version() {
+    let cited = text("CITATION.cff").lines().filter_map(|line| line.strip_prefix("version: "));
+    assert_eq!(cited.collect::<Vec<_>>(), [VERSION], "CITATION.cff");
+}
+
 /// `## [VERSION] - DATE`, or `unreleased` in place of the date.
 #[test]
 fn the_changelog_begins_with_this_version() {
