@@ -23,23 +23,23 @@ struct Arguments {
 enum Command {
     /// Turn a filter, plant or controller configuration into an FMU, or a system into an SSP package
     Build(build::Arguments),
-    /// Say what a configuration comes to: relative degree, rates, guarantee from a start, warnings
+    /// Check a configuration before it is built: relative degree, rates, guarantee from a start, warnings
     Check(check::Arguments),
     /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
     Demo(demo::Arguments),
-    /// Show the paper's tables and figures beside ours and those of other methods; CSV, SVG and a page
+    /// Compare the paper's tables and figures with ours and with other methods; write CSV, SVG and a page
     Reproduce(reproduce::Arguments),
     /// Couple FMUs as a system file says; write CSV and pictures
     Run(run::Arguments),
     /// Run a system from many drawn starts, parameters and disturbances; write a Parquet file
     Campaign(campaign::Arguments),
-    /// Make one run of a campaign again, with CSV and pictures; check that it is the same
+    /// Repeat one run of a campaign, with CSV and pictures, and check that it is the same
     Replay(replay::Arguments),
-    /// Show what an FMU offers
+    /// Show the variables of an FMU, with units, ranges and dependencies
     Inspect(inspect::Arguments),
-    /// Join equal FMUs that were built on different systems to one for all of them
+    /// Join equal FMUs that were built on different systems into one for all of them
     Merge(merge::Arguments),
-    /// Say what is wrong with an FMU, ours or another's, before a master stumbles over it
+    /// Find what is wrong with an FMU, ours or another's, before a master stumbles over it
     Validate(validate::Arguments),
     /// The part of `validate` that may crash, in a process of its own
     #[command(hide = true)]

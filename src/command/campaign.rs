@@ -27,10 +27,10 @@ pub struct Arguments {
     /// campaign file with the ending .parquet]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// How many runs are made at once [default: one for each core]
+    /// The number of runs made at once [default: one for each core]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
-    /// How many of the worst runs are told
+    /// How many of the worst runs to list
     #[arg(long, value_name = "N", default_value_t = 10)]
     worst: usize,
     /// Print JSON instead of text

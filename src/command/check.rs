@@ -25,10 +25,10 @@ const ROUND_OFF: f64 = 1e-12;
 pub struct Arguments {
     /// The configuration file (TOML): `kind = "filter"`, `"plant"` or `"controller"`
     configuration: PathBuf,
-    /// Also check a filter from the start of this plant configuration
+    /// Also check the filter from the start of this plant configuration
     #[arg(long, value_name = "FILE", conflicts_with = "x0")]
     plant: Option<PathBuf>,
-    /// Also check a filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
+    /// Also check the filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
     /// The u_ref of the closed loop that is simulated from the start: "none" (0), "damping" (the vehicles by name),

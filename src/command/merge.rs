@@ -18,7 +18,7 @@ pub struct Arguments {
     /// The .fmu files, two or more, equal but for their platforms' folders
     #[arg(required = true, num_args = 2.., value_name = "FMU")]
     files: Vec<PathBuf>,
-    /// The .fmu file to write; may be one of them
+    /// The .fmu file to write; may be one of those read
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Print JSON instead of text

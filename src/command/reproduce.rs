@@ -18,13 +18,13 @@ pub struct Arguments {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
-    /// A few runs of everything, in place of hundreds
+    /// Make a few runs of everything, in place of hundreds
     #[arg(long)]
     quick: bool,
     /// Do not measure times, so that the output is the same each time
     #[arg(long)]
     untimed: bool,
-    /// Only make the pictures and numbers of guide.md in this folder anew, such as docs
+    /// Only renew the pictures and numbers of guide.md in this folder, such as docs
     #[arg(long, value_name = "DIR")]
     guide: Option<PathBuf>,
 }

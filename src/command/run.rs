@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
-    /// Run in a process of its own: a crash of an FMU is told, and the rows until then are kept
+    /// Run in a process of its own: report a crash of an FMU, and keep the rows until then
     #[arg(long)]
     isolate: bool,
     /// Exit with code 1 unless every barrier of every filter was on time and inside from then on

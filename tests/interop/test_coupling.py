@@ -88,7 +88,7 @@ def test_inputs_stay_small_with_the_reference_profile(run):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_long_steps_from_random_starts(model, tmp_path):
-    # Theory, section 8: T = 5 s, 50 ms, with the constraint enforced on the predicted state.
+    # Theory, section 7: T = 5 s, 50 ms, with the constraint enforced on the predicted state.
     deadline, step = 5.0, 0.05
     (tmp_path / "filter.toml").write_text(
         f"""kind = "filter"

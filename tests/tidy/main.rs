@@ -1,11 +1,12 @@
 //! The repository's own rules: which crate and module may use which, where unsafe code and printing
-//! stand, that examples parse, that formulas can be set, that documents agree with the program and versions
-//! with each other. Each rule is one test.
+//! stand, that examples parse, that formulas can be set, that references lead somewhere, that documents agree
+//! with the program and versions with each other. Each rule is one test.
 
 mod dependencies;
 mod documents;
 mod formulas;
 mod lexer;
 mod places;
+mod references;
 mod sources;
 mod versions;

@@ -74,8 +74,8 @@ impl Hold<'_> {
                 differ = if by <= differ { differ } else { by };
             }
             let (mut seen, mut sure) = (LARGEST, LARGEST);
-            for three in fine[..=2 * parts].array_windows().step_by(2) {
-                let (found, off) = dips(three);
+            for three in fine[..=2 * parts].windows(3).step_by(2) {
+                let (found, off) = dips(&[three[0], three[1], three[2]]);
                 let unsure = UNSURE * (differ + off);
                 sure = sure.or(Lowest { h: found.h - unsure, ..found });
                 seen = seen.or(Lowest { h: found.h + unsure, ..found });
