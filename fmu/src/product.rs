@@ -173,37 +173,13 @@ fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> En
     }
 }
 
-/// The name and meaning of a status, as importers see them.
-pub fn describe(status: Status) -> (&'static str, &'static str) {
-    match status {
-        Status::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
-        Status::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
-        Status::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
-        Status::NoAuthority => ("no_authority", "the barrier cannot be influenced at this state"),
-        Status::InvalidInput => ("invalid_input", "an input is not a number or infinite: u nearest 0"),
-        Status::Singular => ("singular", "the model is not finite at this state: u nearest 0"),
-        Status::WrongRelativeDegree => {
-            ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
-        }
-        Status::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
-    }
-}
-
 fn status_type() -> EnumerationType {
-    let items = Status::ALL.map(|s| (describe(s).0, s as i32, describe(s).1));
+    let items = Status::ALL.map(|status| (status.name(), status as i32, status.meaning()));
     enumeration(STATUS, "What the filter's input means", &items)
 }
 
 fn phase_type() -> EnumerationType {
-    let items = [
-        ("waiting", Phase::Waiting, "no step with valid inputs yet"),
-        ("approach", Phase::Approach, "on the way, before the deadline"),
-        ("late", Phase::Late, "the deadline passed outside; the approach goes on"),
-        ("stay", Phase::Stay, "inside, and kept there"),
-        ("left", Phase::Left, "outside again; pulled back without a deadline"),
-        ("released", Phase::Released, "let go: nothing is asked any more"),
-    ]
-    .map(|(name, phase, description)| (name, phase as i32, description));
+    let items = Phase::ALL.map(|phase| (phase.name(), phase as i32, phase.meaning()));
     enumeration(PHASE, "Where a barrier stands with its promise", &items)
 }
 

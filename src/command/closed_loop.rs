@@ -1,11 +1,11 @@
 //! What `check` finds by running the filter it checks in a closed loop, on the filter's own model and with the
 //! u_ref that is asked for: whether each promise is kept, the soonest deadline, the smallest bounds.
 
-use punctual_core::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_core::filter::{ProfileKind, SafetyFilter};
-use punctual_core::nominal::damping;
-use punctual_core::simulation::Schedule;
 use punctual_fmu::configuration::{FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
+use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
+use punctual_reference::nominal::damping;
+use punctual_reference::simulation::Schedule;
 use serde::Serialize;
 
 use crate::coupling::Kept;

@@ -1,9 +1,9 @@
 //! What is compared: constraints with their parameters, and the settings they are run in.
 
-use punctual_core::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
 use punctual_core::lie::DerivativeSource;
+use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
 
 /// A constraint with its parameters, for relative degree 2.
 #[derive(Clone, Copy, Debug, PartialEq)]

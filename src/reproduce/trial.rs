@@ -7,8 +7,8 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{Report, SafetyFilter};
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
-use punctual_core::simulation::{Schedule, closed_loop_by};
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_reference::simulation::{Schedule, closed_loop_by};
 
 use super::baseline::Baseline;
 use crate::error::Error;

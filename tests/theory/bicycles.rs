@@ -2,7 +2,7 @@
 
 use punctual_core::dynamics::{DynPlant, Erased};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Integrator, SafetyFilter, Sampling};
-use punctual_core::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
+use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 
 use super::distance;
 use super::starts::{DEADLINE, starts};

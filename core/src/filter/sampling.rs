@@ -8,6 +8,7 @@ use crate::error::{Error, positive};
 
 /// How the filter accounts for inputs that are held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Sampling {
     /// Not at all: the constraint is enforced at the samples, and the margin has to cover what the held
     /// input costs, Mδ/aⁿ.

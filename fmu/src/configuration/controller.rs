@@ -1,6 +1,6 @@
 //! `kind = "controller"`: a nominal controller, which says what is wanted of a plant without any promise.
 
-use punctual_core::nominal::Heading;
+use punctual_reference::nominal::Heading;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -11,7 +11,7 @@ use super::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControllerName {
-    /// [`damping`](punctual_core::nominal::damping): of speeds, and of the angle that a rate steers.
+    /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
     Damping,
     /// [`Heading`] to one goal.
     Heading,

@@ -7,7 +7,7 @@ use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
-use punctual_core::plants::{PointMass, Unicycle};
+use punctual_reference::plants::{PointMass, Unicycle};
 use serde::{Deserialize, Serialize};
 
 use super::barrier::{BarrierSection, Visitor};

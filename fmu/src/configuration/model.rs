@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::plants::Signal;
 use punctual_models::Model;
+use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
 use super::external::check_inputs as check_external_inputs;

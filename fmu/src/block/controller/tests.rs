@@ -1,6 +1,6 @@
 //! The values of controllers are those of `core`, bit for bit, whenever and however often asked.
 
-use punctual_core::nominal::{Heading, damping};
+use punctual_reference::nominal::{Heading, damping};
 
 use super::*;
 use crate::block::build;

@@ -2,9 +2,9 @@
 
 use nalgebra::SVector;
 
-use crate::dynamics::{ControlAffine, rk4_step};
-use crate::error::{Error, positive};
-use crate::filter::{Report, SafetyFilter};
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::error::{Error, positive};
+use punctual_core::filter::{Report, SafetyFilter};
 
 /// Step size and length of a closed-loop run.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! High-order control barrier functions: a chain of class-K functions.
 
 use super::{Bound, Condition, Sample, checked_order};
-use crate::MAX_RELATIVE_DEGREE;
-use crate::error::{Error, ErrorKind, length, positive};
-use crate::jet::Taylor;
-use crate::scalar::Scalar;
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::error::{Error, ErrorKind, length, positive};
+use punctual_core::jet::Taylor;
+use punctual_core::scalar::Scalar;
 
 /// An extended class-K function α: increasing, α(0) = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,7 +178,7 @@ impl Condition for Chain {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::convergence::operator::Operator;
+    use punctual_core::convergence::operator::Operator;
 
     fn floor(chain: &Chain, e: &[f64]) -> f64 {
         chain.bound(&Sample::new(e, 1.0, 0.0, e)).floor

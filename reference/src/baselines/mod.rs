@@ -1,5 +1,5 @@
 //! Constraints of the literature, to compare with: each a [`Condition`] that
-//! [`FilterBuilder::condition`](crate::filter::FilterBuilder::condition) puts in the place of this project's methods.
+//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) puts in the place of this project's methods.
 //!
 //! | condition | h⁽ⁿ⁾ ≥ φ such that | deadline | source |
 //! |---|---|---|---|
@@ -17,14 +17,14 @@ mod exponential;
 mod first_order;
 mod tube;
 
-pub use crate::convergence::condition::{Bound, Condition, Sample};
 pub use chain::{Chain, ClassK};
 pub use exponential::Exponential;
 pub use first_order::FirstOrderFixedTime;
+pub use punctual_core::convergence::condition::{Bound, Condition, Sample};
 pub use tube::Tube;
 
-use crate::MAX_RELATIVE_DEGREE;
-use crate::error::{Error, ErrorKind};
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::error::{Error, ErrorKind};
 
 /// `n`, a possible number of links.
 fn checked_order(field: &str, n: usize) -> Result<usize, Error> {

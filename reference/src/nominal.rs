@@ -4,8 +4,8 @@
 //! nominal controller: with u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`]
 //! is the least that belongs into every loop; [`Heading`] drives to a goal.
 
-use crate::error::{Error, finite, positive};
-use crate::scalar::Scalar;
+use punctual_core::error::{Error, finite, positive};
+use punctual_core::scalar::Scalar;
 
 /// Damping: −gain · v for a velocity or speed v (m/s), in m/s²; `gain` in 1/s, 1 in the figures of the
 /// documentation. On the point mass for each component, on unicycle and bicycle for the acceleration.
@@ -251,7 +251,7 @@ mod tests {
     /// In every quadrant, within and beyond the limits, and for the point mass at the goal itself.
     #[test]
     fn derivatives_are_those_of_the_laws() {
-        use crate::jet::Tangent;
+        use punctual_core::jet::Tangent;
         let heading = Heading::towards([4.0, -3.0]);
         let along = [0.3, -0.7, 0.4, 0.9];
         let states = [

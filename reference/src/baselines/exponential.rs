@@ -1,9 +1,9 @@
 //! The exponential control barrier function.
 
 use super::{Bound, Condition, Sample, checked_order};
-use crate::MAX_RELATIVE_DEGREE;
-use crate::convergence::operator::Operator;
-use crate::error::Error;
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::convergence::operator::Operator;
+use punctual_core::error::Error;
 
 /// Π (D + a_i) h ≥ 0 with n positive rates, equal or not: no deadline.
 ///

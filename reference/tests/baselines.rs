@@ -4,7 +4,6 @@
 //! constraint with equality; held inputs of `STEP` seconds leave an error of first order in it.
 
 use punctual_core::barrier::Barrier;
-use punctual_core::baselines::{Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Sample, Tube};
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::ControlAffine;
@@ -12,7 +11,10 @@ use punctual_core::filter::{BarrierSettings, Method, Phase, SafetyFilter, Status
 use punctual_core::lie;
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::baselines::{
+    Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Sample, Tube,
+};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// ẋ₁ = x₂, …, ẋ_N = u.
 #[derive(Clone, Copy)]

@@ -2,9 +2,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
-use crate::error::{Error, positive};
-use crate::scalar::Scalar;
+use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
+use punctual_core::error::{Error, positive};
+use punctual_core::scalar::Scalar;
 
 /// One component of a state or input: what it is called, its unit and its meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,12 +4,12 @@
 //! Both are found by running the closed loop, so they are facts about one start, one plant and one u_ref,
 //! and upper bounds: another filter may do with less.
 
-use crate::MAX_INPUTS;
-use crate::dynamics::DynPlant;
-use crate::error::{Error, non_negative, positive};
-use crate::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
-use crate::judge::{Course, Judge, Judgement, Standing, Verdict};
 use crate::simulation::Schedule;
+use punctual_core::MAX_INPUTS;
+use punctual_core::dynamics::DynPlant;
+use punctual_core::error::{Error, non_negative, positive};
+use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
+use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 
 /// A closed loop to run.
 #[derive(Clone, Copy)]
@@ -209,7 +209,7 @@ pub fn run(
 /// works there.
 ///
 /// ```
-/// let found = punctual_core::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
+/// let found = punctual_reference::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
 /// assert!(found.is_ok_and(|x| x.is_some_and(|x| (7.0..7.01).contains(&x))));
 /// ```
 ///

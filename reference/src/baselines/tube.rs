@@ -1,9 +1,9 @@
 //! A tube that constricts to the set by the deadline.
 
 use super::{Bound, Condition, Sample, checked_order};
-use crate::MAX_RELATIVE_DEGREE;
-use crate::convergence::comparison::{binomial, lower_terms};
-use crate::error::{Error, ErrorKind, positive};
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::convergence::comparison::{binomial, lower_terms};
+use punctual_core::error::{Error, ErrorKind, positive};
 
 /// h + s(t) ≥ 0 is kept, with s(τ) = s₀ (1 − τ/T)ᵏ until T and 0 from then on: (D + a)ⁿ (h + s) ≥ 0.
 ///
