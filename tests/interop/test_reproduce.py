@@ -71,8 +71,8 @@ def test_the_same_again(study, tmp_path):
 
 
 def test_the_guide_is_what_the_program_makes(tmp_path):
-    """Words exactly; numbers up to what another platform's `sin` and `cos` change: a pixel in a picture (ten units of
-    its file), a per cent or two units of the last digit in a table."""
+    """Words exactly; numbers up to what another platform's `sin` and `cos` change: a pixel in a picture, a per cent or
+    two units of the last digit in a table."""
     docs = ROOT / "docs"
     shutil.copy(docs / "guide.md", tmp_path)
     punctual("reproduce", "--guide", tmp_path)
@@ -80,7 +80,7 @@ def test_the_guide_is_what_the_program_makes(tmp_path):
     assert made == sorted(path.name for path in (docs / "guide").iterdir())
     text = (docs / "guide.md").read_text()
     assert sorted(re.findall(r"\]\(guide/(.*?)\)", text)) == made
-    for name, absolute, part in [("guide.md", 0.02, 0.01)] + [(f"guide/{name}", 10, 0) for name in made]:
+    for name, absolute, part in [("guide.md", 0.02, 0.01)] + [(f"guide/{name}", 1, 0) for name in made]:
         wanted, found = (docs / name).read_text(), (tmp_path / name).read_text()
         assert NUMBER.sub("#", wanted) == NUMBER.sub("#", found), name
         for w, f in zip(map(float, NUMBER.findall(wanted)), map(float, NUMBER.findall(found))):
