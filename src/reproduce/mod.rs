@@ -5,6 +5,7 @@
 //! FMI.
 
 pub mod baseline;
+pub mod bicycles;
 pub mod cases;
 pub mod demo;
 pub mod figures;

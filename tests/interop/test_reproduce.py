@@ -3,6 +3,7 @@
 Here and not beside the other tests of the command line, since it takes an optimised build.
 """
 
+import json
 import re
 import shutil
 
@@ -44,6 +45,20 @@ def test_the_numbers_of_a_few_runs(study):
     for head in ["at 1 ms", "at 10 ms", "at 50 ms"]:
         late = column(report, "step_size", head, "lateness (s)", "profile, compensated")
         assert len(late) == 3 and all(float(value) < 0 for value in late)
+
+
+def test_the_bicycles():
+    """A few starts of the table of docs/bicycle.md: the car is kept by every filter on every plant."""
+    done = punctual("reproduce", "--bicycles", "--quick", "--json")
+    table = json.loads(done.stdout)
+    head = table["header"].index
+    # Three vehicles: on three plants four remedies and a filter for small slip, on one its own model.
+    assert len(table["rows"]) == 3 * (3 * 5 + 1)
+    car = [row for row in table["rows"] if row[head("vehicle")] == "car"]
+    assert len(car) == 16
+    for row in car:
+        assert row[head("on time")] == row[head("inside from T to 2T")] == 4, row
+        assert row[head("least h (m)")] >= 0, row
 
 
 def test_a_file_for_each_table_and_picture(study):
