@@ -58,9 +58,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let (table, kept) = bicycles::table(&options, &tell)?;
         drop(progress);
         if arguments.json {
-            output::json(&table)
+            output::json(&table);
         } else {
-            output::result(&table.text())
+            output::result(&table.text());
         }
         return Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) });
     }
