@@ -142,10 +142,14 @@ impl Baseline {
             Some(bounds) => builder.bounds(&bounds.map(|b| -b), &bounds)?,
             None => builder,
         };
-        let sampling = match self {
-            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(setup.step) },
+        builder.sampling(self.sampling(setup.step)).and_then(FilterBuilder::build)
+    }
+
+    /// Whether the period between samples is accounted for; `step` is the first, in s.
+    pub fn sampling(self, step: f64) -> Sampling {
+        match self {
+            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(step) },
             _ => Sampling::Pointwise,
-        };
-        builder.sampling(sampling).and_then(FilterBuilder::build)
+        }
     }
 }

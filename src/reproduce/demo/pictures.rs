@@ -3,22 +3,17 @@
 use std::path::Path;
 
 use super::Run;
-use super::cases::{CENTRE, DEADLINE, MODELS, Method, Model, RADIUS, run_stem};
 use crate::error::Error;
 use crate::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
 use crate::recording::Recording;
+use crate::reproduce::cases::{self, CENTRE, DEADLINE, RADIUS, Vehicle};
 
-/// Draws all pictures into `folder`.
-pub(super) fn draw(runs: &[Run], folder: &Path) -> Result<(), Error> {
-    for model in MODELS {
-        let of = |method| runs.iter().find(|run| run.model.key == model.key && run.method == method);
-        let [Some(paper), Some(ours)] = Method::ALL.map(of) else { continue };
-        plot::path(&paths(model, paper, ours)?, &folder.join(format!("{}-paths.svg", model.key)))?;
-        plot::times(&barriers(paper, ours)?, &folder.join(format!("{}-h.svg", model.key)))?;
-        for run in [paper, ours] {
-            let file = folder.join(format!("{}-inputs.svg", run_stem(model, run.method)));
-            plot::times(&inputs(run)?, &file)?;
-        }
+/// Draws all pictures of `vehicle` into `folder`.
+pub(super) fn draw(vehicle: Vehicle, paper: &Run, ours: &Run, folder: &Path) -> Result<(), Error> {
+    plot::path(&paths(vehicle, paper, ours)?, &folder.join(format!("{}-paths.svg", vehicle.key())))?;
+    plot::times(&barriers(paper, ours)?, &folder.join(format!("{}-h.svg", vehicle.key())))?;
+    for run in [paper, ours] {
+        plot::times(&inputs(run)?, &folder.join(format!("{}-inputs.svg", run.case.stem())))?;
     }
     Ok(())
 }
@@ -27,10 +22,8 @@ pub(super) fn draw(runs: &[Run], folder: &Path) -> Result<(), Error> {
 /// the whole of it.
 fn shown(run: &Run) -> usize {
     let len = run.recording.len();
-    match run.method {
-        Method::RepeatedRoot => arrival(run).map_or(len, |k| (k + 1).min(len)),
-        Method::ReferenceProfile => len,
-    }
+    let end = arrival(run).filter(|_| run.case.is_the_papers());
+    end.map_or(len, |k| (k + 1).min(len))
 }
 
 fn arrival(run: &Run) -> Option<usize> {
@@ -46,18 +39,18 @@ fn deadline() -> Vec<Mark> {
     vec![Mark { label: format!("deadline {DEADLINE} s"), at: DEADLINE }]
 }
 
-fn paths(model: Model, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
+fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
     let mut lines = Vec::new();
     for (run, style, suffix) in [(ours, Style::Solid, ""), (paper, Style::Dashed, ", to its arrival")] {
         let mut x = series(&run.recording, "plant.x.x_p")?;
         let mut y = series(&run.recording, "plant.x.y_p")?;
         x.truncate(shown(run));
         y.truncate(shown(run));
-        let label = format!("{}{suffix}", run.method.title());
+        let label = format!("{}{suffix}", run.case.title);
         lines.push(plot::Path { label, x, y, arrival: arrival(run), style });
     }
     Ok(PathPlot {
-        title: format!("{}: from rest at the origin into the disc", model.title),
+        title: format!("{}: from rest at the origin into the disc", vehicle.title()),
         x_label: "x_p (m)".into(),
         y_label: "y_p (m)".into(),
         paths: lines,
@@ -82,8 +75,8 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
             })
         };
         plots.push(TimePlot {
-            title: format!("{}: {}", run.model.title, run.method.title()),
-            y_label: format!("h ({})", run.method.unit()),
+            title: format!("{}: {}", run.case.vehicle.title(), run.case.title),
+            y_label: format!("h ({})", run.case.setup.shape.unit()),
             series: vec![
                 line("h", "filter.goal.h", Style::Solid, 0)?,
                 line("promised lower bound", "filter.goal.profile", Style::Dashed, 1)?,
@@ -99,7 +92,7 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
         let values = x.iter().zip(&y).map(|(x, y)| RADIUS - (x - CENTRE[0]).hypot(y - CENTRE[1])).collect();
         let time = run.recording.times().to_vec();
         lines.push(Series {
-            label: run.method.title().into(),
+            label: run.case.title.into(),
             time,
             values,
             style: Style::Solid,
@@ -126,8 +119,11 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
 fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
     let end = shown(run);
     let time = run.recording.times()[..end].to_vec();
+    // The paper's go from rest to tens of thousands: only a logarithm shows more than the last sample.
+    let logarithmic = run.case.is_the_papers();
     let mut plots = Vec::new();
-    for (i, (name, unit)) in run.model.inputs.into_iter().enumerate() {
+    for (i, signal) in run.case.vehicle.inputs().iter().enumerate() {
+        let (name, unit) = (signal.name, cases::unit(signal));
         let mut lines = Vec::new();
         for (label, variable, style, colour) in
             [("safe input u", "u", Style::Steps, 0), ("nominal input", "u_ref", Style::Dashed, 1)]
@@ -146,20 +142,13 @@ fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
             });
         }
         let to = if end < run.recording.len() { ", to its arrival" } else { "" };
-        let title = format!("{}: inputs, {}{to}", run.model.title, run.method.title());
+        let title = format!("{}: inputs, {}{to}", run.case.vehicle.title(), run.case.title);
         plots.push(TimePlot {
             title: if i == 0 { title } else { String::new() },
-            y_label: match run.method {
-                Method::RepeatedRoot => format!("|{name}| ({unit})"),
-                Method::ReferenceProfile => format!("{name} ({unit})"),
-            },
+            y_label: if logarithmic { format!("|{name}| ({unit})") } else { format!("{name} ({unit})") },
             series: lines,
             instants: deadline(),
-            // From rest to tens of thousands: only a logarithm shows more than the last sample.
-            scale: match run.method {
-                Method::RepeatedRoot => Scale::Logarithmic,
-                Method::ReferenceProfile => Scale::Linear,
-            },
+            scale: if logarithmic { Scale::Logarithmic } else { Scale::Linear },
             ..TimePlot::default()
         });
     }
