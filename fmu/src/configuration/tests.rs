@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::names::check_identifier;
 use super::*;
 
 const FILTER: &str = r#"
