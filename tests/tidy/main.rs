@@ -7,5 +7,6 @@ mod documents;
 mod formulas;
 mod lexer;
 mod places;
+mod schema;
 mod sources;
 mod versions;

@@ -184,7 +184,7 @@ pub(super) static SECTION: Section = Section {
         static KEYS: [Key; 7] = [
             Key::new("kind", Word(&["controller"]), None, ""),
             Key::new("name", Name, Some("`controller`"), "the FMU's name"),
-            Key::new("plant", Table(&reference::SECTION), None, "the vehicle"),
+            Key::new("plant", Table(&reference::SECTION), None, "`model`, `l_r`, `l_f` of a vehicle"),
             Key::new(
                 "controller",
                 Word(&["damping", "heading", "waypoints"]),

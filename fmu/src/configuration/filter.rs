@@ -129,7 +129,7 @@ pub(super) static SECTION: Section = Section {
             Key::new("barrier", Tables(&barrier::SECTION), None, "[the safe sets](#barriers), at least one"),
             Key::new(
                 "bounds",
-                PairByName(Of("its unit")),
+                PairByName(Of("unit of the input")),
                 Some("none"),
                 "`[min, max]` of any input. Never relaxed",
             ),
@@ -158,7 +158,7 @@ pub(super) static SECTION: Section = Section {
             ),
             Key::new(
                 "measurement_errors",
-                NumberByName(Of("its unit"), Range::NON_NEGATIVE),
+                NumberByName(Of("unit of the state"), Range::NON_NEGATIVE),
                 Some("none"),
                 "largest error of a measured state, by name: the promise then holds for the true state, to first order \
                  ([theory](theory.md), section 12). Needs the reference profile, prediction over the period, no delay",

@@ -59,8 +59,8 @@ pub(super) static SECTION: Section = Section {
                 Some("2"),
                 "how fast it follows `u_ref.<state>` where nothing is in the way",
             ),
-            Key::new("min", Number(Of("its unit"), LIMIT), Some("none"), "its smallest value"),
-            Key::new("max", Number(Of("its unit"), LIMIT), Some("none"), "its largest value"),
+            Key::new("min", Number(Of("in its unit"), LIMIT), Some("none"), "its smallest value"),
+            Key::new("max", Number(Of("in its unit"), LIMIT), Some("none"), "its largest value"),
         ];
         KEYS.iter().collect()
     },

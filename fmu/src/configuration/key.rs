@@ -73,7 +73,7 @@ pub struct Key {
     pub value: Value,
     /// What holds without it, in words; empty where that depends on other keys. `None`: it must be given.
     pub default: Option<&'static str>,
-    /// Meaning, in Markdown without links.
+    /// Meaning, in Markdown of docs/configuration.md.
     pub meaning: &'static str,
 }
 

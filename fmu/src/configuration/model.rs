@@ -133,19 +133,19 @@ pub(super) static PLANT: Section = Section {
                 "states",
                 Tables(&VARIABLE),
                 Some(""),
-                "your own model: [variables](#variables), in order, at most 32",
+                "your own model: variables, in order, at most 32",
             ),
             Key::new(
                 "inputs",
                 Tables(&VARIABLE),
                 Some(""),
-                "your own model: [variables](#variables), in order, at most 12",
+                "your own model: variables, in order, at most 12",
             ),
             Key::new(
                 "parameters",
                 Tables(&PARAMETER),
                 Some("none"),
-                "your own model: [constants](#variables), parameters of the FMU",
+                "your own model: constants, parameters of the FMU",
             ),
             Key::new(
                 "derivatives",
@@ -179,12 +179,12 @@ pub(super) static VARIABLE: Section = Section {
             DESCRIPTION,
             Key::new(
                 "min",
-                Number(Of("its unit"), Range::FINITE),
+                Number(Of("in its unit"), Range::FINITE),
                 Some("none"),
                 "of a state: where the model is meant, and the relative degree looked for; of an input: its bound where \
                  `[bounds]` says nothing",
             ),
-            Key::new("max", Number(Of("its unit"), Range::FINITE), Some("none"), "the same from above"),
+            Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "the same from above"),
         ];
         KEYS.iter().collect()
     },
@@ -198,14 +198,14 @@ pub(super) static PARAMETER: Section = Section {
             NAME,
             Key::new(
                 "start",
-                Number(Of("its unit"), Range::FINITE),
+                Number(Of("in its unit"), Range::FINITE),
                 None,
                 "its value until an importer sets another one",
             ),
             UNIT,
             DESCRIPTION,
-            Key::new("min", Number(Of("its unit"), Range::FINITE), Some("none"), "its smallest value"),
-            Key::new("max", Number(Of("its unit"), Range::FINITE), Some("none"), "its largest value"),
+            Key::new("min", Number(Of("in its unit"), Range::FINITE), Some("none"), "its smallest value"),
+            Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "its largest value"),
         ];
         KEYS.iter().collect()
     },

@@ -30,7 +30,7 @@ pub(super) static SECTION: Section = Section {
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models)"),
             Key::new(
                 "x0",
-                NumberByName(Of("its unit"), Range::FINITE),
+                NumberByName(Of("unit of the state"), Range::FINITE),
                 Some("0, or nearest to it in the state's range"),
                 "initial value of a state, by name",
             ),
@@ -63,18 +63,18 @@ pub(super) static DISTURBANCE: Section = Section {
         static KEYS: [Key; 4] = [
             Key::new(
                 "inputs",
-                NumberByName(Of("its unit"), SIZE),
+                NumberByName(Of("unit of the input"), SIZE),
                 Some("nothing"),
                 "largest size of what is added to an input, by name",
             ),
             Key::new(
                 "measurements",
-                NumberByName(Of("its unit"), SIZE),
+                NumberByName(Of("unit of the state"), SIZE),
                 Some("nothing"),
                 "largest size of what is added to an output `x.<state>`, by the state's name",
             ),
             Key::new("seed", Number(Is("1"), SEED), Some("0"), "another number, another sequence"),
-            Key::new("period", Number(Is("s"), PERIOD), Some("0.01"), "that a value lasts"),
+            Key::new("period", Number(Is("s"), PERIOD), Some("0.01"), "how long a value lasts"),
         ];
         KEYS.iter().collect()
     },

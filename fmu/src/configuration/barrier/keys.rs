@@ -205,7 +205,7 @@ static KEYS: [Row; 33] = [
             name: "centre",
             value: Pair(M, Range::FINITE),
             default: Some(""),
-            meaning: "of a moving disc where it is at time 0; of a half-plane a point of its line",
+            meaning: "the centre, of a moving disc where it is at time 0; a point of the line of a half-plane",
         },
         parameters: &[
             part("[1]", "x of a point of the line", |b| b.shape.line().map(|(centre, _)| &mut centre[0])),
@@ -218,15 +218,15 @@ static KEYS: [Row; 33] = [
         "centre_input",
         Flag,
         Some("`false`"),
-        "centre and velocity are inputs of the FMU, such as another FMU's outputs, that start with the values here: \
-         `escort-filter.toml` in examples/vehicles",
+        "centre and velocity are inputs of the FMU, such as another FMU's outputs, that start with the values here \
+         ([`escort.toml`](../examples/vehicles/escort.toml))",
     ),
     Row {
         key: Key {
             name: "velocity",
             value: Pair(Is("m/s"), Range::FINITE),
             default: Some("0"),
-            meaning: "of the centre",
+            meaning: "the velocity of the centre",
         },
         parameters: &[
             part("[1]", "velocity of the centre along x", |b| b.shape.point().map(|p| &mut p.velocity[0])),
@@ -238,7 +238,7 @@ static KEYS: [Row; 33] = [
             name: "radius",
             value: Number(M, Range::POSITIVE),
             default: Some(""),
-            meaning: "of the disc",
+            meaning: "the radius of the disc",
         },
         parameters: &[whole("radius of the disc", |b| b.shape.radius())],
     },
@@ -258,7 +258,7 @@ static KEYS: [Row; 33] = [
             name: "half_axes",
             value: Pair(M, Range::POSITIVE),
             default: Some(""),
-            meaning: "at the angle, and across",
+            meaning: "the one at the angle, and the one across",
         },
         parameters: &[
             part("[1]", "half axis at the angle", |b| b.shape.half_axes().map(|a| &mut a[0])),
@@ -270,7 +270,7 @@ static KEYS: [Row; 33] = [
             name: "half_sides",
             value: Pair(M, Range::POSITIVE),
             default: Some(""),
-            meaning: "at the angle, and across",
+            meaning: "the one at the angle, and the one across",
         },
         parameters: &[
             part("[1]", "half side at the angle", |b| b.shape.half_sides().map(|a| &mut a[0])),
@@ -282,7 +282,7 @@ static KEYS: [Row; 33] = [
             name: "angle",
             value: Number(Is("rad"), Range::FINITE),
             default: Some("0"),
-            meaning: "from the x axis",
+            meaning: "the angle from the x axis",
         },
         parameters: &[whole("from the x axis", |b| b.shape.angle())],
     },

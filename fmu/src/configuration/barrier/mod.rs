@@ -5,6 +5,7 @@
 
 mod keys;
 mod raw;
+mod reader;
 mod shape;
 
 pub use shape::{Point, SHAPES, Shape, ShapeRow};

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::shape::Kind;
+use super::reader::Kind;
 use super::{InfeasibleName, MethodName, ProfileName};
 
 /// The keys of a `[[barrier]]`; [`KEYS`](super::keys::KEYS) says what they mean.
