@@ -1,14 +1,18 @@
 //! The keys of `[[barrier]]`, and the parameters of the FMU that their numbers are.
 
+use punctual_core::MAX_RELATIVE_DEGREE;
+
 use super::super::key::{
     Key, Section,
-    Unit::{Is, OfH, OfHighestDerivative},
+    Unit::{self, Is, OfH, OfHighestDerivative},
     Value::{self, Count, Flag, Name, Number, Numbers, Pair, Text, Word},
 };
 use super::super::{FilterConfiguration, Parameter, PlantSection, Range};
 use super::BarrierSection;
 use super::shape::NAMES;
-use punctual_core::MAX_RELATIVE_DEGREE;
+
+const S: Unit = Is("s");
+const M: Unit = Is("m");
 
 /// A key with the parameters that it gives.
 struct Row {
@@ -40,9 +44,6 @@ const fn part(
 ) -> Part {
     Part { index, range: None, description, access }
 }
-
-const S: super::super::key::Unit = Is("s");
-const M: super::super::key::Unit = Is("m");
 
 /// A key without parameters.
 const fn plain(
