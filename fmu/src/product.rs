@@ -3,6 +3,10 @@
 //! The table built here is the only place that knows value references; the XML file and the accessors
 //! of the running instance are both read from it.
 
+mod outputs;
+
+pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
+
 use punctual_core::filter::{Phase, Status};
 use punctual_modeldescription::{
     Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
@@ -12,8 +16,7 @@ use uuid::Uuid;
 
 use crate::configuration::{
     BarrierInput, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
-    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, over_seconds,
-    quantity,
+    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, quantity,
 };
 
 /// Log categories: name and meaning.
@@ -51,9 +54,6 @@ pub struct Layout {
     /// One past the last parameter.
     pub end: usize,
 }
-
-/// Outputs of one barrier, in the order of the table.
-pub const BARRIER_OUTPUTS: usize = 13;
 
 impl Product {
     /// Derives everything from a completed configuration.
@@ -305,33 +305,15 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     table.add("status".into(), "what u means", output, enumerated(STATUS));
     for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
         let unit = &barrier.unit(&c.plant);
-        let rate_unit = &over_seconds(unit, degree);
-        let name = |field: &str| format!("{}.{field}", barrier.name);
-        let flag = || VariableKind::Boolean { start: None };
-        let count = || VariableKind::Integer { start: None, min: Some(0), max: None };
-        let first = table.variables.len();
-        table.add(name("h"), "barrier; the state is safe where it is >= 0", output, real(None, unit));
-        table.add(name("profile"), "lower bound on h that is promised now", output, real(None, unit));
-        table.add(name("time_left"), "time to the deadline, 0 from then on", output, real(None, "s"));
-        let slack = "row times u minus its floor; < 0: the constraint is violated by that much";
-        table.add(name("slack"), slack, output, real(None, rate_unit));
-        let margin = "h to arrive and stay above: the parameter, and what held inputs are expected to cost";
-        table.add(name("margin_used"), margin, output, real(None, unit));
-        let loss = "how far below its promise h may fall within the step because u is held";
-        table.add(name("sampling_loss"), loss, output, real(None, unit));
-        let unmet = "steps in a row that did not meet the constraint, this one included";
-        table.add(name("unmet_steps"), unmet, output, count());
-        let postponed = "how often a deadline that is lost was given up for a later one";
-        table.add(name("postponed"), postponed, output, count());
-        table.add(name("arrived"), "h >= 0 has been reached", output, flag());
-        let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
-        table.add(name("guaranteed"), guaranteed, output, flag());
-        let late = "no input within the bounds is inside at the deadline, or it passed outside";
-        table.add(name("deadline_unreachable"), late, output, flag());
-        let deadlocked = "other barriers block the way, and h does not rise: needs another u_ref";
-        table.add(name("deadlocked"), deadlocked, output, flag());
-        table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
-        debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
+        for row in &BARRIER_OUTPUTS {
+            let kind = match row.reading {
+                Reading::Real(own, ..) => real(None, &own.of_barrier(unit, degree)),
+                Reading::Count(_) => VariableKind::Integer { start: None, min: Some(0), max: None },
+                Reading::Flag(_) => VariableKind::Boolean { start: None },
+                Reading::Phase => enumerated(PHASE),
+            };
+            table.add(format!("{}.{}", barrier.name, row.name), row.description, output, kind);
+        }
     }
     if let Some(integrator) = &c.integrator {
         let (name, inputs) = (&integrator.state, c.commanded());
