@@ -19,9 +19,11 @@ pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
     MAX_UNPACKED_BYTES, SMALL_BYTES,
 };
-pub use description::{Capabilities, DefaultExperiment, Description, Item, Kind, Output, Variable};
+pub use description::{Description, Output};
 pub use logging::LogMessage;
-pub use punctual_modeldescription::{Causality, PLATFORM, Variability};
+pub use punctual_modeldescription::{
+    Causality, DefaultExperiment, PLATFORM, ScalarType, Variability, Variable, VariableKind,
+};
 pub use slave::Slave;
 
 use library::Library;
@@ -122,7 +124,7 @@ impl Fmu {
         if let Some(library) = self.library.get() {
             return Ok(library);
         }
-        let path = self.archive.library(&self.description.model_identifier);
+        let path = self.archive.library(&self.description.co_simulation.model_identifier);
         if !path.is_file() {
             let present = self.archive.platforms().to_vec();
             return Err(Error::fmu(self.path(), FmuProblem::NoBinary { wanted: PLATFORM, present }));

@@ -5,10 +5,10 @@ use std::collections::HashSet;
 
 use object::read::NameOrOrdinal;
 use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
+use punctual_modeldescription::Located;
 
 use super::finding::Findings;
 use super::layout::ending;
-use super::model::Model;
 use crate::host::Archive;
 
 /// The functions of FMI 2.0 for co-simulation: sections 2.1 and 4.2.
@@ -52,8 +52,8 @@ const FUNCTIONS: [&str; 34] = [
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
-pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Findings) {
-    let Some(identifier) = model.interface().and_then(|interface| interface.identifier) else { return };
+pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
+    let Some(identifier) = model.model_identifier() else { return };
     for platform in archive.platforms() {
         let Some(ending) = ending(platform) else { continue };
         let entry = format!("binaries/{platform}/{identifier}{ending}");
