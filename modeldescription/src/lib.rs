@@ -1,7 +1,7 @@
 //! FMI 2.0 co-simulation model descriptions from typed variables, SSP 1.0 system structures, and
 //! reproducible `.fmu` and `.ssp` archives.
 //!
-//! This crate owns the file `modelDescription.xml` and the zip container around it. It knows nothing
+//! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
 //! of what the slave computes, reads no file and no environment variable and prints nothing.
 //!
 //! A [`ModelDescription`] is plain data with public fields: one model for whoever writes a description, reads one
@@ -23,6 +23,7 @@
 //! | `read` | the file, read |
 //! | `names` | what a text, a C identifier and a structured name may contain |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
+//! | `fmi2` | the C interface: types, and one table of the functions |
 //! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and what they may say |
 //! | `archive` | the zip file |
 //!
@@ -76,6 +77,7 @@ mod archive;
 mod calendar;
 mod description;
 mod error;
+pub mod fmi2;
 mod names;
 #[cfg(feature = "read")]
 mod read;

@@ -99,7 +99,7 @@ pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
     let mut trial = Trial { file, told: HashSet::new() };
     if let Err(error) = trial.all(path) {
         let rule = match error.as_call() {
-            Some(call) if call.status == Some(Status::Discard) => "trial.discard",
+            Some(call) if call.status == Some(Status::DISCARD) => "trial.discard",
             Some(_) => "trial.call",
             None => "trial.load",
         };
