@@ -157,7 +157,7 @@ mod tests {
         let (instance, category, format) = (c"i".as_ptr(), c"logError".as_ptr(), c"%s is %d".as_ptr());
         // SAFETY: the environment lives; texts are literals; arguments match the format.
         unsafe {
-            punctual_host_logger(environment, instance, Status::ERROR, category, format, c"n".as_ptr(), 7)
+            punctual_host_logger(environment, instance, Status::ERROR, category, format, c"n".as_ptr(), 7);
         };
         // SAFETY: as above.
         unsafe { punctual_host_logger(environment, null, Status(-5), null, null) };
@@ -186,7 +186,7 @@ mod tests {
                     Status::OK,
                     std::ptr::null(),
                     long.as_ptr(),
-                )
+                );
             };
         }
         assert_eq!(logging.messages().len(), KEPT);

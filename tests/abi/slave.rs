@@ -1,7 +1,6 @@
 //! One instance with its log, used by variable names.
 
 use std::ffi::{CStr, CString, c_int, c_void};
-use std::ptr::null;
 use std::sync::Mutex;
 
 use punctual_core::filter::SafetyFilter;

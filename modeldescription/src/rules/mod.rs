@@ -5,10 +5,12 @@
 //! variables. One that was read ([`Located`](crate::Located)) may break any rule, and some of its attributes may
 //! not be values of their type at all: the model has nothing there, and rules that would need it are silent.
 
+// The structure of a description that is written follows from its variables.
+#[cfg(feature = "read")]
 mod structure;
 mod variables;
 
-use crate::{ModelDescription, ModelStructure, NamingConvention, ScalarType, is_c_identifier};
+use crate::{ModelDescription, NamingConvention, ScalarType, is_c_identifier};
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
@@ -67,7 +69,7 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
 ];
 
-/// A list of [`ModelStructure`].
+/// A list of [`ModelStructure`](crate::ModelStructure).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum UnknownList {
     /// `Outputs`.
@@ -139,7 +141,8 @@ impl Check<'_> {
     }
 
     /// Checks every rule on the structure.
-    pub(crate) fn structure(&mut self, structure: &ModelStructure) {
+    #[cfg(feature = "read")]
+    pub(crate) fn structure(&mut self, structure: &crate::ModelStructure) {
         structure::check(self, structure);
     }
 
