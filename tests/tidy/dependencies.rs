@@ -78,7 +78,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     }
 }
 
-/// No module of the crate whose folder it is in: it is compiled into plug-ins.
+/// Compiled into plug-ins too: the paths in it are theirs.
 const FOR_PLUGINS: &str = "fmu/src/abi/plugin/punctual_model.rs";
 
 /// A crate's modules: each line uses only the lines above it, and none of its own line but itself.
