@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_modeldescription::CoSimulation;
 use serde::Serialize;
 
 use crate::error::Error;
-use punctual_modeldescription::CoSimulation;
-
 use crate::host::{DefaultExperiment, Description, Fmu, Output, Variable};
 use crate::output;
 

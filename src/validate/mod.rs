@@ -24,11 +24,10 @@ use std::time::Duration;
 pub use finding::{Finding, Place, rules};
 pub use punctual_modeldescription::Severity;
 
-use punctual_modeldescription::Located;
-
 use crate::error::{Error, FmuProblem};
 use crate::host::Archive;
 use finding::Findings;
+use punctual_modeldescription::Located;
 
 /// What was found in one FMU.
 #[derive(Clone, Debug, Default)]

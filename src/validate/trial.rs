@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Duration;
 
+use punctual_modeldescription::Located;
+
 use super::finding::{Finding, Findings, Place, severity};
 use crate::error::Error;
 use crate::host::{
     Archive, Causality, Fmu, PLATFORM, ScalarType, Slave, Status, Variability, Variable, journal,
 };
 use crate::isolation::{self, Child, End, Voice};
-use punctual_modeldescription::Located;
 
 /// The name of the trial's instance.
 const INSTANCE: &str = "trial";

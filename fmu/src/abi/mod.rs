@@ -25,18 +25,18 @@ use std::ptr;
 
 pub use plugin::{PluginFolder, file_name};
 
+use punctual_modeldescription::fmi2::{
+    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
+    TERMINATED, Text, ValueReference,
+};
+
+use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
+use logger::Logger;
 use states::{
     fmi2DeSerializeFMUstate, fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SerializeFMUstate,
     fmi2SerializedFMUstateSize, fmi2SetFMUstate,
 };
 use unsupported::fmi2CancelStep;
-
-use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
-use logger::Logger;
-use punctual_modeldescription::fmi2::{
-    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
-    TERMINATED, Text, ValueReference,
-};
 
 use crate::instance::{Call, Instance, Mode};
 

@@ -1,8 +1,9 @@
 //! Resolution of system files against made-up descriptions, one defect each.
 
+use punctual_modeldescription::{EnumerationItem, ModelDescription, Plain, Real, SimpleType};
+
 use super::*;
 use crate::host::{Variability, VariableKind};
-use punctual_modeldescription::{EnumerationItem, ModelDescription, Plain, Real, SimpleType};
 
 fn real() -> VariableKind {
     VariableKind::Real(Real::default())
