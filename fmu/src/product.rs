@@ -9,8 +9,8 @@ pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 
 use punctual_core::filter::{Phase, Status};
 use punctual_modeldescription::{
-    Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
-    ModelDescription, NamingConvention, Unit, Variability, Variable, VariableKind,
+    Causality, CoSimulation, DefaultExperiment, EnumerationItem, Integer, LogCategory, ModelDescription,
+    NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
 };
 use uuid::Uuid;
 
@@ -107,7 +107,7 @@ impl Product {
                 ..CoSimulation::default()
             },
             units: units(&self.variables),
-            enumerations: match &self.configuration {
+            types: match &self.configuration {
                 Configuration::Filter(_) => vec![status_type(), phase_type()],
                 Configuration::Plant(_) | Configuration::Controller(_) => Vec::new(),
             },
@@ -115,7 +115,7 @@ impl Product {
                 .map(|(name, description)| LogCategory { name: name.into(), description: description.into() })
                 .into(),
             default_experiment: Some(DefaultExperiment {
-                start_time: experiment.start_time,
+                start_time: Some(experiment.start_time),
                 stop_time: Some(experiment.stop_time),
                 step_size: Some(experiment.step_size),
                 tolerance: None,
@@ -139,18 +139,14 @@ fn guid(canonical: &str, variables: &[Variable]) -> String {
 
 /// The units used. One that [`base_unit`] cannot read is left out, and the XML is then refused.
 fn units(variables: &[Variable]) -> Vec<Unit> {
-    let mut names: Vec<&str> = variables
-        .iter()
-        .filter_map(|v| match &v.kind {
-            VariableKind::Real { unit, .. } => unit.as_deref(),
-            _ => None,
-        })
-        .collect();
+    let mut names: Vec<&str> = variables.iter().filter_map(|v| v.kind.unit()).collect();
     names.sort_unstable();
     names.dedup();
     names
         .into_iter()
-        .filter_map(|name| Some(Unit { name: name.to_owned(), base: base_unit(name)? }))
+        .filter_map(|name| {
+            Some(Unit { name: name.to_owned(), base: Some(base_unit(name)?), ..Unit::default() })
+        })
         .collect()
 }
 
@@ -160,25 +156,21 @@ const STATUS: &str = "Status";
 /// The enumeration type of `<barrier>.phase`.
 const PHASE: &str = "Phase";
 
-fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> EnumerationType {
+fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> SimpleType {
     let item = |&(name, value, description): &(&str, i32, &str)| EnumerationItem {
         name: name.into(),
         value,
         description: description.into(),
     };
-    EnumerationType {
-        name: name.into(),
-        description: description.into(),
-        items: items.iter().map(item).collect(),
-    }
+    SimpleType::enumeration(name, description, items.iter().map(item).collect())
 }
 
-fn status_type() -> EnumerationType {
+fn status_type() -> SimpleType {
     let items = Status::ALL.map(|status| (status.name(), status as i32, status.meaning()));
     enumeration(STATUS, "What the filter's input means", &items)
 }
 
-fn phase_type() -> EnumerationType {
+fn phase_type() -> SimpleType {
     let items = Phase::ALL.map(|phase| (phase.name(), phase as i32, phase.meaning()));
     enumeration(PHASE, "Where a barrier stands with its promise", &items)
 }
@@ -201,7 +193,7 @@ impl Table {
         let value_reference = self.variables.len() as u32;
         let variability = match (causality, &kind) {
             (Causality::Parameter, _) => Variability::Fixed,
-            (_, VariableKind::Real { .. }) => Variability::Continuous,
+            (_, VariableKind::Real(_)) => Variability::Continuous,
             _ => Variability::Discrete,
         };
         self.variables.push(Variable {
@@ -237,14 +229,14 @@ impl Table {
     }
 
     fn parameter<C>(&mut self, row: &Parameter<C>, configuration: &mut C) {
-        let kind = VariableKind::Real {
+        let kind = VariableKind::Real(Real {
             start: Some(row.get(configuration)),
             min: row.range.min,
             max: row.range.max,
-            nominal: None,
             quantity: quantity(&row.unit),
             unit: Some(row.unit.clone().into_owned()),
-        };
+            ..Real::default()
+        });
         self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
         self.ranges.push(row.range);
     }
@@ -267,14 +259,12 @@ impl Table {
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
-    VariableKind::Real {
+    VariableKind::Real(Real {
         start,
-        min: None,
-        max: None,
-        nominal: None,
         quantity: quantity(unit),
         unit: Some(unit.to_owned()),
-    }
+        ..Real::default()
+    })
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
@@ -282,7 +272,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     let mut table = Table::default();
     for state in states {
         let measured = table.signal("x", state, "measured ", Causality::Input);
-        if let VariableKind::Real { start, min, max, .. } = &mut measured.kind {
+        if let VariableKind::Real(Real { start, min, max, .. }) = &mut measured.kind {
             (*start, *min, *max) = (Some(state.range().nearest(0.0)), state.min, state.max);
         }
     }
@@ -293,7 +283,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     for input in inputs {
         table.signal("u_ref", input, "wanted ", Causality::Input);
     }
-    let rearm = VariableKind::Boolean { start: Some(false) };
+    let rearm = VariableKind::Boolean(Plain { start: Some(false), declared_type: None });
     table.add("rearm".into(), "a rising edge starts every deadline anew", Causality::Input, rearm);
 
     let outputs = table.variables.len();
@@ -301,15 +291,15 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     for input in inputs {
         table.signal("u", input, "safe ", output);
     }
-    let enumerated = |t: &str| VariableKind::Enumeration { declared_type: t.into(), start: None };
+    let enumerated = |t: &str| VariableKind::enumeration(t);
     table.add("status".into(), "what u means", output, enumerated(STATUS));
     for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
         let unit = &barrier.unit(&c.plant);
         for row in &BARRIER_OUTPUTS {
             let kind = match row.reading {
                 Reading::Real(own, ..) => real(None, &own.of_barrier(unit, degree)),
-                Reading::Count(_) => VariableKind::Integer { start: None, min: Some(0), max: None },
-                Reading::Flag(_) => VariableKind::Boolean { start: None },
+                Reading::Count(_) => VariableKind::Integer(Integer { min: Some(0), ..Integer::default() }),
+                Reading::Flag(_) => VariableKind::Boolean(Plain::default()),
                 Reading::Phase => enumerated(PHASE),
             };
             table.add(format!("{}.{}", barrier.name, row.name), row.description, output, kind);
@@ -377,8 +367,8 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
         table.signal("u_ref", &input.into(), "wanted ", Causality::Output).dependencies = Some(dependencies);
     }
     if c.controller == ControllerName::Waypoints {
-        let kind =
-            VariableKind::Integer { start: None, min: Some(1), max: i32::try_from(c.points.len()).ok() };
+        let max = i32::try_from(c.points.len()).ok();
+        let kind = VariableKind::Integer(Integer { min: Some(1), max, ..Integer::default() });
         let waypoint = "which of the points is the goal, from 1";
         let position = if c.direct_feedthrough { vec![0, 1] } else { Vec::new() };
         table.add("waypoint".into(), waypoint, Causality::Output, kind).dependencies = Some(position);

@@ -49,7 +49,7 @@ impl Measures {
             let description = &campaign.descriptions()[c];
             let unit = |variable: &str| {
                 let found = description.index_of(variable).map(|i| &description.variables[i]);
-                found.and_then(|v| v.unit.clone()).unwrap_or_default()
+                found.and_then(|v| v.kind.unit()).unwrap_or_default().to_owned()
             };
             filters.push(FilterPlan {
                 component: component.name.clone(),

@@ -101,7 +101,7 @@ fn the_variables_of_the_filter_are_listed() {
     {
         assert_eq!(quoted_in_row(document, head), variables(causality), "docs/fmu.md, {head}");
     }
-    let items = filter().model_description().enumerations.into_iter().flat_map(|e| e.items);
+    let items = filter().model_description().types.into_iter().flat_map(|e| e.items);
     let rows: Vec<_> = items.map(|i| format!("| {} `{}` | {} |", i.value, i.name, i.description)).collect();
     assert!(rows.len() > 10, "statuses and phases: {rows:?}");
     for row in rows {

@@ -19,7 +19,7 @@ impl Bench {
         let product = Configuration::parse(&text).and_then(Product::new).unwrap_or_else(|e| panic!("{e}"));
         let mut values = Values::zeros(product.variables.len());
         for (i, variable) in product.variables.iter().enumerate() {
-            if let punctual_modeldescription::VariableKind::Real { start: Some(start), .. } = variable.kind {
+            if let Some(start) = variable.kind.start_number() {
                 values.reals[i] = start;
             }
         }
