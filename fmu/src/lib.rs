@@ -5,6 +5,7 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | `filter_loop` | a filter with its integrator, if it has one |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
 //! | [`block`] | what is computed: a filter, plant or controller between value arrays |
@@ -20,8 +21,10 @@ compile_error!("the FMU guards every exported function against panics, which nee
 mod abi;
 pub mod block;
 pub mod configuration;
+mod filter_loop;
 pub mod instance;
 pub mod product;
 pub mod state;
 
 pub use abi::{PluginFolder, file_name as plugin_file_name};
+pub use filter_loop::FilterLoop;

@@ -3,7 +3,10 @@
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Integrator, SafetyFilter, Sampling};
+use punctual_core::filter::{
+    BarrierSettings, FilterBuilder, IntegratedFilter, Integration, SafetyFilter, Sampling,
+};
+use punctual_fmu::FilterLoop;
 use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use rayon::prelude::*;
 
@@ -131,12 +134,6 @@ pub struct Pairing {
     pub step: f64,
 }
 
-/// A filter, with the angle that it integrates itself.
-struct Controlled {
-    filter: SafetyFilter,
-    angle: Option<Integrator>,
-}
-
 impl Pairing {
     /// Those of the table with steps above `finest` (in s), in its order.
     fn all(finest: f64) -> Vec<Self> {
@@ -157,7 +154,7 @@ impl Pairing {
         all
     }
 
-    fn controlled(&self) -> Result<Controlled, punctual_core::Error> {
+    fn controlled(&self) -> Result<FilterLoop, punctual_core::Error> {
         let Self { size, remedy, step, .. } = *self;
         let settings = BarrierSettings {
             rate: Some(remedy.rate),
@@ -179,29 +176,28 @@ impl Pairing {
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(step) }))
             .and_then(|b| b.bounds(&[-ACCELERATION, -second], &[ACCELERATION, second]))
             .and_then(FilterBuilder::build)?;
+        if !integrates {
+            return Ok(FilterLoop::Plain(filter));
+        }
         let limit = match self.filter {
             Model::Kinematic => size.kinematic()?.steering_angle(size.slip),
             _ => size.slip,
         };
-        let angle =
-            integrates.then(|| Integrator::new(&filter, (4, 1), [-limit, limit], GAIN)).transpose()?;
-        Ok(Controlled { filter, angle })
+        let angle = Integration { state: 4, input: 1, limits: [-limit, limit], gain: GAIN };
+        IntegratedFilter::new(filter, angle).map(FilterLoop::Integrated)
     }
 
     /// From `x0` until 2T: the outcome, and whether a step before the deadline was not satisfied.
     fn run(&self, x0: [f64; 4]) -> Result<(Outcome, bool), punctual_core::Error> {
         let setup = Setup::advised(DEADLINE, self.step);
         let plant = self.plant.plant(self.size, self.filter)?;
-        let Controlled { mut filter, mut angle } = self.controlled()?;
+        let mut filter = self.controlled()?;
         let (mut x, mut u) = (x0, [0.0; 2]);
         let (mut outcome, mut unmet) = (Outcome::default(), false);
         for k in 0..=(setup.end / self.step).round() as usize {
             let t = k as f64 * self.step;
             let u_ref = [-x[3], 0.0];
-            let report = match &mut angle {
-                Some(angle) => angle.step(&mut filter, t, self.step, &x, &u_ref, &mut u)?,
-                None => filter.step(t, &x, &u_ref, &mut u)?,
-            };
+            let report = filter.step(t, self.step, &x, &u_ref, &mut u)?;
             let (h, satisfied) = (report.barriers[0].h, report.status.is_satisfied());
             let arrival = outcome.arrival.or((h >= 0.0).then_some(t));
             outcome.take(&setup, &Measured { t, position: [x[0], x[1]], u, h, arrival, satisfied });

@@ -1,42 +1,40 @@
 //! Dynamic extension inside the filter: a state that is commanded and not measured.
 
-use super::{NoDerivative, Report, SafetyFilter, SampleDerivative};
+use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::qp::Bounds;
 
-/// An integrator between a filter and its plant. The filter is one of a plant whose state `state` has the input
-/// `input` for its derivative, such as `SmallSlipBicycleWithRate` or
-/// `KinematicBicycle` of the reference plants; the plant outside takes that state as its input. So
-/// x lacks it, and u and u_ref have it in the place of its rate.
+/// A filter with an integrator between it and its plant. The filter inside is one of a plant whose state
+/// [`Integration::state`] has the input [`Integration::input`] for its derivative, such as `SmallSlipBicycleWithRate` or
+/// `KinematicBicycle` of the reference plants. The plant outside takes that state as its input. So x lacks it, and u and
+/// u_ref have it in the place of its rate.
 ///
-/// Over each period the filter's model has it change evenly; what is handed out, to be held, is its mean over the
+/// Over each period the filter's model has it change evenly; the input handed out, to be held, is its mean over the
 /// period. The two differ by O(δ²) in the state at the end. The wish v for it becomes the rate
-/// `gain` (v − value), or what leads there within the period where that is less.
+/// `gain` (v − value), or the rate that leads there within the period where that is less.
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*};
 /// # use punctual_reference::plants::SmallSlipBicycle;
 /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let model = SmallSlipBicycle::new(10.0)?.with_rate();
-/// let mut filter = SafetyFilter::builder(5, 2)
+/// let filter = SafetyFilter::builder(5, 2)
 ///     .barrier("goal", model, goal, BarrierSettings::within(10.0))?
 ///     .build()?;
 /// // β, the last state, is the integral of input 1, and within 0.5 rad.
-/// let mut beta = Integrator::new(&filter, (4, 1), [-0.5, 0.5], 10.0)?;
+/// let beta = Integration { state: 4, input: 1, limits: [-0.5, 0.5], gain: 10.0 };
+/// let mut filter = IntegratedFilter::new(filter, beta)?;
 /// let mut u = [0.0; 2];
-/// let report = beta.step(&mut filter, 0.0, 0.01, &[0.0, 0.0, 0.5, 3.0], &[0.0; 2], &mut u)?;
+/// let report = filter.step(0.0, 0.01, &[0.0, 0.0, 0.5, 3.0], &[0.0; 2], &mut u)?;
 /// assert!(report.status.is_satisfied());
-/// assert_eq!(u[1], beta.value() / 2.0);
+/// assert_eq!(u[1], filter.value() / 2.0);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
-#[derive(Clone, Debug)]
-pub struct Integrator {
-    state: usize,
-    input: usize,
-    limits: [f64; 2],
+pub struct IntegratedFilter {
+    filter: SafetyFilter,
+    of: Integration,
     /// The filter's bounds on the rate; those of a sample are tighter.
     rates: [f64; 2],
-    gain: f64,
     value: f64,
     /// Scratch: the filter's state and its direction.
     x: [Vec<f64>; 2],
@@ -44,20 +42,29 @@ pub struct Integrator {
     u_ref: [Vec<f64>; 2],
 }
 
-impl Integrator {
-    /// For a `filter` whose state number `place.0` is the integral of its input number `place.1`, both counted from
-    /// 0; the value stays within `limits` and begins with what is nearest 0 there. `gain` in 1/s, finite, > 0.
+/// The input that an [`IntegratedFilter`] integrates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integration {
+    /// The number of the filter's state that is integrated, counted from 0.
+    pub state: usize,
+    /// The number of the input that is its derivative, counted from 0.
+    pub input: usize,
+    /// Least and largest value of the state, in its unit; ±infinity where there is none. The value begins with the number
+    /// nearest 0 within them.
+    pub limits: [f64; 2],
+    /// How fast the value follows the wish for it, 1/s, finite, > 0.
+    pub gain: f64,
+}
+
+impl IntegratedFilter {
+    /// Puts the integrator `of` before the plant of `filter`.
     ///
     /// # Errors
     ///
-    /// A place that is none; limits that are not min ≤ max; bounds of the rate that exclude 0; a delayed filter; a gain
-    /// out of range.
-    pub fn new(
-        filter: &SafetyFilter,
-        (state, input): (usize, usize),
-        limits: [f64; 2],
-        gain: f64,
-    ) -> Result<Self, Error> {
+    /// A state or an input that there is not; limits that are not min ≤ max; bounds of the rate that exclude 0; a delayed
+    /// filter; a gain out of range.
+    pub fn new(filter: SafetyFilter, of: Integration) -> Result<Self, Error> {
+        let Integration { state, input, limits, gain } = of;
         for (field, index, count) in [("state", state, filter.state_dim), ("input", input, filter.input_dim)]
         {
             if index >= count {
@@ -81,31 +88,52 @@ impl Integrator {
             let message = format!("is {}, must be 0 with an integrator", filter.delay);
             return Err(Error::new(ErrorKind::Unsupported, "actuation_delay", message));
         }
+        positive("gain", gain)?;
         let x = [vec![0.0; filter.state_dim], vec![0.0; filter.state_dim]];
         let u_ref = [vec![0.0; filter.input_dim], vec![0.0; filter.input_dim]];
-        let mut own =
-            Self { state, input, limits, rates, gain: positive("gain", gain)?, value: 0.0, x, u_ref };
+        let mut own = Self { filter, of, rates, value: 0.0, x, u_ref };
         own.set_value(0.0);
         Ok(own)
     }
 
-    /// The number of the input that is integrated.
-    pub fn input(&self) -> usize {
-        self.input
+    /// The filter inside, on the rate: to look at.
+    pub fn filter(&self) -> &SafetyFilter {
+        &self.filter
     }
 
-    /// What has been integrated: the value at the end of the last step.
+    /// As [`SafetyFilter::rearm`]; the value stays.
+    pub fn rearm(&mut self) {
+        self.filter.rearm();
+    }
+
+    /// Puts back the state of the [filter](Self::filter) and the [`value`](Self::value).
+    ///
+    /// # Errors
+    ///
+    /// A state with another number of barriers.
+    pub fn restore(&mut self, state: &FilterState, value: f64) -> Result<(), Error> {
+        self.filter.restore(state)?;
+        self.set_value(value);
+        Ok(())
+    }
+
+    /// The number of the input that is integrated.
+    pub fn input(&self) -> usize {
+        self.of.input
+    }
+
+    /// The integral: the value at the end of the last step.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Puts back what [`Self::value`] returned; the nearest within the limits.
+    /// Puts back a [`Self::value`]; the nearest within the limits.
     pub fn set_value(&mut self, value: f64) {
         self.value = self.limited(value);
     }
 
     fn limited(&self, value: f64) -> f64 {
-        value.max(self.limits[0]).min(self.limits[1])
+        value.max(self.of.limits[0]).min(self.of.limits[1])
     }
 
     /// As [`SafetyFilter::step`], for an input that is held for `hold` seconds, finite, > 0. The report's rows are
@@ -114,87 +142,79 @@ impl Integrator {
     /// # Errors
     ///
     /// A slice of the wrong length; a time to hold that is out of range.
-    pub fn step<'f>(
+    pub fn step(
         &mut self,
-        filter: &'f mut SafetyFilter,
         t: f64,
         hold: f64,
         x: &[f64],
         u_ref: &[f64],
         u: &mut [f64],
-    ) -> Result<&'f Report, Error> {
-        self.begin(filter, hold, x, u_ref)?;
-        let report = filter.step(t, &self.x[0], &self.u_ref[0], u)?;
-        let after = self.finish(hold, u);
-        self.value = after;
-        Ok(report)
+    ) -> Result<&Report, Error> {
+        self.begin(hold, x, u_ref)?;
+        self.filter.step(t, &self.x[0], &self.u_ref[0], u)?;
+        self.value = self.finish(hold, u);
+        Ok(self.filter.report())
     }
 
-    /// What [`Self::step`] would return, and the value after it, without remembering the sample.
+    /// The input of [`Self::step`], and the value after it, without remembering the sample.
     ///
     /// # Errors
     ///
     /// As for [`Self::step`].
-    pub fn peek(
-        &mut self,
-        filter: &mut SafetyFilter,
-        t: f64,
-        hold: f64,
-        x: &[f64],
-        u_ref: &[f64],
-        u: &mut [f64],
-    ) -> Result<f64, Error> {
-        self.begin(filter, hold, x, u_ref)?;
-        filter.peek(t, &self.x[0], &self.u_ref[0], u)?;
+    pub fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<f64, Error> {
+        self.begin(hold, x, u_ref)?;
+        self.filter.peek(t, &self.x[0], &self.u_ref[0], u)?;
         Ok(self.finish(hold, u))
     }
 
-    /// As [`SafetyFilter::differentiate`], of what [`Self::peek`] gives; the value after the step moves by twice what
-    /// its mean does.
+    /// As [`SafetyFilter::differentiate`], of the result of [`Self::peek`]. The value after the step moves by twice as much
+    /// as its mean.
     ///
     /// # Errors
     ///
     /// As for [`Self::step`]; a direction that is not finite.
     pub fn differentiate(
         &mut self,
-        filter: &mut SafetyFilter,
         (t, hold): (f64, f64),
         [x, dx]: [&[f64]; 2],
         [u_ref, du_ref]: [&[f64]; 2],
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
-        self.begin(filter, hold, x, u_ref)?;
+        self.begin(hold, x, u_ref)?;
         length("dx", dx.len(), x.len())?;
         length("du_ref", du_ref.len(), u_ref.len())?;
-        insert(&mut self.x[1], dx, self.state, 0.0);
+        let Integration { state, input, gain, .. } = self.of;
+        insert(&mut self.x[1], dx, state, 0.0);
         self.u_ref[1].copy_from_slice(du_ref);
-        self.u_ref[1][self.input] *= self.gain.min(1.0 / hold);
+        self.u_ref[1][input] *= gain.min(1.0 / hold);
         let ([x, dx], [u_ref, du_ref]) = (&self.x, &self.u_ref);
-        let unknown = filter.differentiate(t, [x, dx], [u_ref, du_ref], out)?;
-        out.u[self.input] *= hold / 2.0;
+        let unknown = self.filter.differentiate(t, [x, dx], [u_ref, du_ref], out)?;
+        out.u[input] *= hold / 2.0;
         Ok(unknown)
     }
 
     /// Completes state, wish and bounds of the filter for a sample.
-    fn begin(&mut self, filter: &mut SafetyFilter, hold: f64, x: &[f64], u_ref: &[f64]) -> Result<(), Error> {
+    fn begin(&mut self, hold: f64, x: &[f64], u_ref: &[f64]) -> Result<(), Error> {
+        let Self { filter, of: Integration { state, input, limits, gain }, value, .. } = self;
+        let (state, input, value) = (*state, *input, *value);
         length("x", x.len(), filter.state_dim - 1)?;
         length("u_ref", u_ref.len(), filter.input_dim)?;
         let hold = positive("hold", hold)?;
-        insert(&mut self.x[0], x, self.state, self.value);
+        insert(&mut self.x[0], x, state, value);
         self.u_ref[0].copy_from_slice(u_ref);
-        let wish = &mut self.u_ref[0][self.input];
-        *wish = (*wish - self.value) * self.gain.min(1.0 / hold);
+        let wish = &mut self.u_ref[0][input];
+        *wish = (*wish - value) * gain.min(1.0 / hold);
         // 0 is within these too, since the value is within its limits.
-        filter.bounds.min[self.input] = self.rates[0].max((self.limits[0] - self.value) / hold);
-        filter.bounds.max[self.input] = self.rates[1].min((self.limits[1] - self.value) / hold);
+        filter.bounds.min[input] = self.rates[0].max((limits[0] - value) / hold);
+        filter.bounds.max[input] = self.rates[1].min((limits[1] - value) / hold);
         filter.bounded = filter.bounds != Bounds::NONE;
         Ok(())
     }
 
     /// Puts the mean over `hold` s in the place of the rate; returns the value then.
     fn finish(&self, hold: f64, u: &mut [f64]) -> f64 {
-        let rate = u[self.input];
-        u[self.input] = self.limited(self.value + rate * hold / 2.0);
+        let rate = u[self.of.input];
+        u[self.of.input] = self.limited(self.value + rate * hold / 2.0);
         self.limited(self.value + rate * hold)
     }
 }

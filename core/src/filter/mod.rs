@@ -21,7 +21,7 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 pub use builder::FilterBuilder;
-pub use integrator::Integrator;
+pub use integrator::{IntegratedFilter, Integration};
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
@@ -192,7 +192,7 @@ impl SafetyFilter {
     /// How far `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, is from satisfying the
     /// conditions of optimality of its qp: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
     /// the search stops where it looked over the period ([`Report::predicted`]; of the rows linearised at `u`).
-    /// `None` where no program was solved. Costs another solve: a check, not for every step. Behind an [`Integrator`]
+    /// `None` where no program was solved. Costs another solve: a check, not for every step. Inside an [`IntegratedFilter`]
     /// u and u_ref are those of the rate.
     ///
     /// # Errors

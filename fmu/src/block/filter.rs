@@ -1,8 +1,9 @@
 //! A filter: samples its inputs, remembers its promises.
 
-use punctual_core::filter::{FilterState, Integrator, NoDerivative, SafetyFilter, SampleDerivative, Status};
+use punctual_core::filter::{FilterState, NoDerivative, SampleDerivative, Status};
 
 use super::{Block, BlockState, Values};
+use crate::FilterLoop;
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout, Reading};
 
@@ -10,8 +11,7 @@ pub(super) struct FilterBlock {
     configuration: FilterConfiguration,
     parameters: Vec<Parameter<FilterConfiguration>>,
     layout: Layout,
-    filter: SafetyFilter,
-    integrator: Option<Integrator>,
+    filter: FilterLoop,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
     /// Scratch: what to go back to after looking ahead over a re-arming.
@@ -27,11 +27,10 @@ impl FilterBlock {
         configuration: FilterConfiguration,
         layout: Layout,
     ) -> Result<Self, ConfigurationError> {
-        let (parameters, filter) = (configuration.parameters(), configuration.build()?);
-        let integrator = configuration.build_integrator(&filter)?;
-        let (kept, u) = (filter.state().clone(), vec![0.0; layout.inputs]);
+        let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
+        let (kept, u) = (filter.filter().state().clone(), vec![0.0; layout.inputs]);
         let change = SampleDerivative::default();
-        Ok(Self { configuration, parameters, layout, filter, integrator, rearm_seen: false, kept, u, change })
+        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, kept, u, change })
     }
 
     fn rearm_index(&self) -> usize {
@@ -48,7 +47,7 @@ impl FilterBlock {
     fn rearm(&mut self, values: &Values) -> bool {
         let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
-            self.kept.clone_from(self.filter.state());
+            self.kept.clone_from(self.filter.filter().state());
             self.filter.rearm();
         }
         rising
@@ -56,7 +55,7 @@ impl FilterBlock {
 
     /// For how long the input is going to be held, in s, where no step says so.
     fn hold(&self) -> f64 {
-        self.filter.state().period.unwrap_or(self.configuration.experiment.step_size)
+        self.filter.filter().state().period.unwrap_or(self.configuration.experiment.step_size)
     }
 
     /// One sample at `t`: with the length of a step it is remembered, else only looked at.
@@ -65,26 +64,23 @@ impl FilterBlock {
         let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
         let [x, u_ref] = self.inputs(&values.reals);
         let (filter, u) = (&mut self.filter, &mut self.u);
-        let mut integrated = self.integrator.as_ref().map_or(0.0, Integrator::value);
-        let done = match (&mut self.integrator, step) {
-            (None, Some(_)) => filter.step(t, x, u_ref, u).map(|_| ()),
-            (None, None) => filter.peek(t, x, u_ref, u).map(|_| ()),
-            (Some(integrator), Some(h)) => integrator.step(filter, t, hold, x, u_ref, u).map(|_| {
+        let before = filter.integrated();
+        let done = match step {
+            None => filter.peek(t, hold, x, u_ref, u),
+            Some(h) => {
+                let stepped = filter.step(t, hold, x, u_ref, u).map(drop);
                 if h == 0.0 {
-                    integrator.set_value(integrated);
+                    filter.set_integrated(before);
                 }
-                integrated = integrator.value();
-            }),
-            (Some(integrator), None) => {
-                integrator.peek(filter, t, hold, x, u_ref, u).map(|value| integrated = value)
+                stepped.map(|()| filter.integrated())
             }
         };
         if step.is_some() {
             self.rearm_seen = values.booleans[self.rearm_index()];
         } else if rising {
-            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
+            self.filter.restore(&self.kept, before).map_err(|e| e.to_string())?;
         }
-        done.map_err(|e| e.to_string())?;
+        let integrated = done.map_err(|e| e.to_string())?;
         self.write(values, integrated);
         Ok(())
     }
@@ -95,7 +91,7 @@ impl FilterBlock {
             NoDerivative::Source(i)
             | NoDerivative::Profile(i)
             | NoDerivative::Postponed(i)
-            | NoDerivative::Kept(i) => self.filter.barrier_names().nth(i),
+            | NoDerivative::Kept(i) => self.filter.filter().barrier_names().nth(i),
             _ => None,
         };
         match barrier {
@@ -106,7 +102,7 @@ impl FilterBlock {
 
     /// Writes the last sample to the outputs, in the order of the variable table.
     fn write(&self, values: &mut Values, integrated: f64) {
-        let report = self.filter.report();
+        let report = self.filter.filter().report();
         let mut at = self.layout.outputs;
         values.reals[at..][..self.u.len()].copy_from_slice(&self.u);
         at += self.u.len();
@@ -123,7 +119,7 @@ impl FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if self.integrator.is_some() {
+        if self.filter.integrated_input().is_some() {
             values.reals[at] = integrated;
         }
     }
@@ -133,12 +129,10 @@ impl Block for FilterBlock {
     fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError> {
         let numbers = &values.reals[self.layout.parameters..self.layout.end];
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
-        let filter = configuration.build()?;
-        self.integrator = configuration.build_integrator(&filter)?;
-        self.filter = filter;
+        self.filter = configuration.build_loop()?;
         self.configuration = configuration;
         self.rearm_seen = false;
-        self.kept.clone_from(self.filter.state());
+        self.kept.clone_from(self.filter.filter().state());
         Ok(())
     }
 
@@ -158,13 +152,10 @@ impl Block for FilterBlock {
         let rising = self.rearm(values);
         let hold = self.hold();
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
-        let (filter, change) = (&mut self.filter, &mut self.change);
-        let unknown = match &mut self.integrator {
-            None => filter.differentiate(t, [x, dx], [u_ref, du_ref], change),
-            Some(integrator) => integrator.differentiate(filter, (t, hold), [x, dx], [u_ref, du_ref], change),
-        };
+        let before = self.filter.integrated();
+        let unknown = self.filter.differentiate((t, hold), [x, dx], [u_ref, du_ref], &mut self.change);
         if rising {
-            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
+            self.filter.restore(&self.kept, before).map_err(|e| e.to_string())?;
         }
         if let Some(reason) = unknown.map_err(|e| e.to_string())? {
             return Err(self.named(reason));
@@ -182,8 +173,8 @@ impl Block for FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if let Some(integrator) = &self.integrator {
-            derivative[at] = 2.0 * self.change.u[integrator.input()];
+        if let Some(input) = self.filter.integrated_input() {
+            derivative[at] = 2.0 * self.change.u[input];
         }
         Ok(())
     }
@@ -197,7 +188,6 @@ impl Block for FilterBlock {
         let Self {
             rearm_seen: now,
             filter: memory,
-            integrator,
             configuration: _,
             parameters: _,
             layout: _,
@@ -205,7 +195,7 @@ impl Block for FilterBlock {
             u: _,
             change: _,
         } = self;
-        let value = integrator.as_ref().map_or(0.0, Integrator::value);
+        let (memory, value) = (memory.filter(), memory.integrated());
         match state {
             BlockState::Filter { rearm_seen, filter, integrated } => {
                 (*rearm_seen, *integrated) = (*now, value);
@@ -222,11 +212,8 @@ impl Block for FilterBlock {
         let BlockState::Filter { rearm_seen, filter, integrated } = state else {
             return Err(state.mismatch("filter"));
         };
-        self.filter.restore(filter).map_err(|e| e.to_string())?;
+        self.filter.restore(filter, *integrated).map_err(|e| e.to_string())?;
         self.rearm_seen = *rearm_seen;
-        if let Some(integrator) = &mut self.integrator {
-            integrator.set_value(*integrated);
-        }
         Ok(())
     }
 
@@ -244,8 +231,8 @@ impl Block for FilterBlock {
             let name = self.configuration.plant.input_name(i);
             let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
             // Not `clamp`, which panics where the bounds contradict each other.
-            values.reals[outputs + i] = match &self.integrator {
-                Some(integrator) if integrator.input() == i => integrator.value(),
+            values.reals[outputs + i] = match self.filter.integrated_input() {
+                Some(input) if input == i => self.filter.integrated(),
                 _ => 0.0_f64.max(min).min(max),
             };
         }

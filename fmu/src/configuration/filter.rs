@@ -257,9 +257,8 @@ impl FilterConfiguration {
             parameter.check(&mut configuration)?;
         }
         // Whatever the ranges of single numbers cannot say.
-        let mut filter = configuration.build()?;
-        configuration.build_integrator(&filter)?;
-        configuration.check_margins(&mut filter)?;
+        configuration.build_loop()?;
+        configuration.check_margins(&mut configuration.build()?)?;
         Ok(configuration)
     }
 

@@ -1,6 +1,6 @@
 //! `[integrator]` of a filter: a state of its model that is commanded and not measured.
 
-use punctual_core::filter::{Integrator, SafetyFilter};
+use punctual_core::filter::{IntegratedFilter, Integration};
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
@@ -12,9 +12,10 @@ use super::key::{
 use super::{
     ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, UNBOUNDED, VariableSection,
 };
+use crate::FilterLoop;
 
 /// `[integrator]`: dynamic extension inside the filter. The plant outside has this state of the filter's model for its
-/// input; the filter solves for its rate and integrates that itself ([`Integrator`]).
+/// input; the filter solves for its rate and integrates that itself ([`IntegratedFilter`]).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntegratorSection {
@@ -126,13 +127,14 @@ impl FilterConfiguration {
         inputs
     }
 
-    /// The integrator of `filter`, which was built from this.
+    /// The filter with its integrator, if it has one.
     ///
     /// # Errors
     ///
     /// A number out of range, or numbers that contradict each other.
-    pub fn build_integrator(&self, filter: &SafetyFilter) -> Result<Option<Integrator>, ConfigurationError> {
-        let Some(section) = &self.integrator else { return Ok(None) };
+    pub fn build_loop(&self) -> Result<FilterLoop, ConfigurationError> {
+        let filter = self.build()?;
+        let Some(section) = &self.integrator else { return Ok(FilterLoop::Plain(filter)) };
         let end = |value: f64| if value.abs() >= UNBOUNDED { value.signum() * f64::INFINITY } else { value };
         let limits = [section.min, section.max].map(end);
         let refused = |e: punctual_core::Error| {
@@ -143,7 +145,8 @@ impl FilterConfiguration {
             };
             ConfigurationError::new(field, e.message())
         };
-        let place = section.place(&self.plant)?;
-        Integrator::new(filter, place, limits, section.gain).map(Some).map_err(refused)
+        let (state, input) = section.place(&self.plant)?;
+        let of = Integration { state, input, limits, gain: section.gain };
+        IntegratedFilter::new(filter, of).map(FilterLoop::Integrated).map_err(refused)
     }
 }
