@@ -7,6 +7,7 @@ use super::first_order::FirstOrder;
 use super::reference_profile::ReferenceProfile;
 use super::repeated_root::RepeatedRoot;
 use super::settings::{FixedTimeSettings, Method};
+use crate::error::{Error, ErrorKind};
 
 /// A condition by its type, so that a step calls it directly.
 #[derive(Clone)]
@@ -19,6 +20,20 @@ pub(super) enum Approach {
     First(FirstOrder),
     /// A user's own.
     Own(Arc<dyn Condition + Send + Sync>),
+}
+
+/// Whether `method` exists for relative degree `n`.
+pub(super) fn check(method: Method, n: usize) -> Result<(), Error> {
+    let message = match method {
+        Method::RepeatedRoot if n == 1 => {
+            "the repeated root does not exist for relative degree 1; use the reference profile".to_owned()
+        }
+        Method::FirstOrder(_) if n != 1 => format!(
+            "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
+        ),
+        _ => return Ok(()),
+    };
+    Err(Error::new(ErrorKind::Unsupported, "method", message))
 }
 
 impl Approach {

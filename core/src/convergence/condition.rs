@@ -155,6 +155,8 @@ pub struct Abilities {
     pub hands_over: bool,
     /// Its margin covers what held inputs cost, and changes where samples turn out to be further apart.
     pub covers_holds: bool,
+    /// Its bound allows for [errors](Sample::errors) of the derivatives.
+    pub allows_errors: bool,
     /// It may start anew on the way at any time, and has its theorem again.
     pub restarts: bool,
 }

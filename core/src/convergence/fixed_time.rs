@@ -272,6 +272,11 @@ impl FixedTime {
         (bound.floor, bound.lower + state.margin)
     }
 
+    /// Whether the condition allows for errors of the derivatives ([`Self::advance_within`]).
+    pub fn allows_errors(&self) -> bool {
+        self.approach.abilities().allows_errors
+    }
+
     /// Whether the stay constraint takes over inside.
     #[inline(always)]
     fn hands_over(&self) -> bool {

@@ -107,7 +107,7 @@ impl Condition for ReferenceProfile {
 
     fn abilities(&self) -> Abilities {
         // The check of a profile of one's own takes long.
-        Abilities { hands_over: true, covers_holds: true, restarts: self.own.is_none() }
+        Abilities { hands_over: true, covers_holds: true, allows_errors: true, restarts: self.own.is_none() }
     }
 
     fn anchor(&self, at: &Anchoring) -> Anchored {

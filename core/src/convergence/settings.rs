@@ -129,16 +129,7 @@ impl FixedTimeSettings {
             let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
             return Err(Error::new(ErrorKind::RelativeDegree, "relative_degree", message));
         }
-        if self.method == Method::RepeatedRoot && n == 1 {
-            return unsupported(
-                "the repeated root does not exist for relative degree 1; use the reference profile".into(),
-            );
-        }
-        if matches!(self.method, Method::FirstOrder(_)) && n != 1 {
-            return unsupported(format!(
-                "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
-            ));
-        }
+        super::approach::check(self.method, n)?;
         if let Some(deadline) = self.deadline {
             positive("deadline", deadline)?;
         } else if self.method != Method::ReferenceProfile {

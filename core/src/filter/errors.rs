@@ -4,8 +4,8 @@
 //! derivatives at the measured state. For a sampled row these depend on u, so that it is no longer affine: it is
 //! linearised with the rest of the row.
 
+use super::Sampling;
 use super::slot::BarrierSlot;
-use super::{Method, Sampling};
 use crate::convergence::sampled::PeriodBound;
 use crate::error::{Error, ErrorKind};
 use crate::lie::{Ahead, DerivativeSource};
@@ -133,7 +133,7 @@ pub(super) fn check_all(
     }
     for slot in slots {
         let named = |e: Error| e.within(&slot.name);
-        if slot.promise.settings().method != Method::ReferenceProfile || slot.promise.has_condition() {
+        if !slot.promise.allows_errors() {
             return refuse("needs the reference profile".into()).map_err(named);
         }
         check(&*slot.source, inputs).map_err(named)?;
