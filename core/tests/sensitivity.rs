@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, QuadraticDisc, StateBound};
 use punctual_core::convergence::first_order::Exponent;
+use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{
     BarrierSettings, FilterBuilder, Infeasible, Method, NoDerivative, Phase, ProfileKind, SafetyFilter,
@@ -359,4 +360,29 @@ fn what_is_not_known_is_said() {
     let (x, zeros) = ([0.0; 4], [0.0; 4]);
     let unknown = late.differentiate(0.0, [&x, &zeros], [&[0.0; 2], &[1.0, 0.0]], &mut out).expect("lengths");
     assert_eq!(unknown, Some(NoDerivative::Postponed(0)));
+}
+
+/// Where a sample anchors a set that is to be kept, only round-off goes with h into the margin; on the way to one, what
+/// held inputs cost along the profile.
+#[test]
+fn the_margin_of_an_anchor() {
+    let promise = FixedTime::new(2, BarrierSettings::within(5.0)).expect("valid settings");
+    for h in [[3.0, 0.5], [-3.0, 0.5]] {
+        let anchored = |h: [f64; 2]| {
+            let mut state = FixedTimeState::default();
+            promise.anchor(&mut state, 0.0, &h, 5.0, 0.1);
+            promise.advance(&mut state, 0.0, &h);
+            state
+        };
+        let dh = [1.0, -0.7];
+        let moved = |by: f64| anchored([h[0] + by * dh[0], h[1] + by * dh[1]]).margin;
+        let wanted = (moved(1e-3) - moved(-1e-3)) / 2e-3;
+        let found = promise.differentiate(&anchored(h), true, 0.0, [&h, &dh], Some(0.1)).expect("known");
+        // The margin is linear where one piece of it is in force; what is left is the round-off of the difference.
+        assert!(
+            (found.margin - wanted).abs() <= 1e-9 * wanted.abs().max(1e-3),
+            "{} for {wanted}",
+            found.margin
+        );
+    }
 }

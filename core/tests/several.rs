@@ -140,3 +140,24 @@ fn windows_are_checked() {
         "window: there is no barrier yet to have one"
     );
 }
+
+/// A barrier that waits, or has been released, asks for nothing at the end of the longest step either.
+#[test]
+fn a_window_and_a_longest_step() {
+    let mut filter = SafetyFilter::builder(4, 2)
+        .barrier("A", PointMass, disc(5.0, 0.0), BarrierSettings::within(3.0))
+        .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
+        .and_then(|b| b.barrier("B", PointMass, disc(-5.0, 0.0), BarrierSettings::within(6.0)))
+        .and_then(|b| b.window(Begin::AfterArrival(0), End::Never))
+        .and_then(|b| b.period_max(0.02))
+        .and_then(FilterBuilder::build)
+        .expect("a valid filter");
+    let mut phases = [[false; 6]; 2];
+    run(&mut filter, [0.0; 4], 7.0, |_, _, filter| {
+        for (seen, b) in phases.iter_mut().zip(&filter.report().barriers) {
+            seen[b.phase as usize] = true;
+        }
+    });
+    assert!(phases[0][Phase::Released as usize] && phases[1][Phase::Waiting as usize]);
+    assert_eq!(filter.report().barriers[1].phase, Phase::Stay);
+}

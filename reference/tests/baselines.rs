@@ -3,11 +3,13 @@
 //! On a chain of n integrators with h = x₁ the least input is the floor itself, so the state follows the
 //! constraint with equality; held inputs of `STEP` seconds leave an error of first order in it.
 
+use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::barrier::Barrier;
+use punctual_core::convergence::condition::{Abilities, Anchored, Anchoring, Bound, Rates};
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
-use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, Method, Phase, SafetyFilter, Status};
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, Phase, SafetyFilter, Sampling, Status};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
@@ -172,4 +174,56 @@ fn settings_that_a_condition_would_replace_are_refused() {
     );
     let none = SafetyFilter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
     assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");
+}
+
+/// (D + 2)² (h − μ − r) ≥ 0 with r = 0.2, as a user writes it who says all that the trait can say.
+struct Complete;
+
+const AIM: f64 = 0.2;
+
+impl Condition for Complete {
+    fn bound(&self, at: &Sample) -> Bound {
+        Bound::floor(-4.0 * (at.e[0] - AIM + at.e[1]))
+    }
+
+    fn abilities(&self) -> Abilities {
+        let mut abilities = Abilities::default();
+        abilities.hands_over = true;
+        abilities
+    }
+
+    fn anchor(&self, at: &Anchoring) -> Anchored {
+        Anchored { margin: at.margin, rate: 2.0, fallback: false, applies: false }
+    }
+
+    fn rates(&self, at: &Sample) -> Option<Rates> {
+        Some(Rates::Repeated(at.rate))
+    }
+
+    fn profile(&self, _at: &Sample, _elapsed: f64) -> [f64; MAX_RELATIVE_DEGREE + 1] {
+        std::array::from_fn(|k| if k == 0 { AIM } else { 0.0 })
+    }
+}
+
+/// A condition with rates is enforced over the period; one that hands over is followed by the stay constraint, with its
+/// guarantee.
+#[test]
+fn a_condition_that_is_a_method() {
+    let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
+    let mut filter = SafetyFilter::builder(2, 1)
+        .source("line", lie::along(Integrators::<2>, First, 2).expect("a source"), settings)
+        .and_then(|b| b.condition(Complete))
+        .and_then(|b| b.sampling(Sampling::Period(0.01)))
+        .and_then(FilterBuilder::build)
+        .expect("a valid filter");
+    let (mut x, mut u) = (vector![-1.0, 0.0], vector![0.0]);
+    for k in 0..500 {
+        let report = filter.step(f64::from(k) * 0.01, x.as_slice(), &[-1.0], u.as_mut_slice()).unwrap();
+        assert!(report.predicted, "enforced over the period");
+        assert_eq!(report.barriers[0].guaranteed, report.barriers[0].phase == Phase::Stay);
+        x = rk4_step(&Integrators::<2>, &x, &u, 0.01);
+    }
+    let b = &filter.report().barriers[0];
+    assert_eq!((b.phase, b.guaranteed), (Phase::Stay, true));
+    assert!(b.h >= 0.05, "{}", b.h);
 }
