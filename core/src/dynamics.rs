@@ -211,6 +211,7 @@ where
 /// With the position and velocity of each sample a barrier on these states knows where the point is then,
 /// and expects it to go on like that until the next one. `NX` is the number of states of the plant
 /// inside; the extended one has `NX` + 4, which is checked at compile time.
+/// `docs/theory.md#measured-set` says what a point that accelerates costs.
 ///
 /// ```
 /// use punctual_core::barriers::{DistanceDisc, Outside};

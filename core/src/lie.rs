@@ -13,8 +13,8 @@
 //! \end{align}
 //! ```
 //!
-//! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off; (3) is checked at
-//! every evaluation, since an input that enters earlier invalidates every constraint built for n.
+//! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off. The filter checks (3) at every
+//! evaluation, since an input that enters earlier invalidates every constraint built for n.
 
 mod ahead;
 mod degree;

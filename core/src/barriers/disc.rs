@@ -107,20 +107,20 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
     }
 }
 
-/// Interior of a disc, distance-shaped and smooth: h = √(R² + ε²) − √(d² + ε²), in m.
+/// Interior of a disc, distance-shaped and smooth: h = √(R² + b²) − √(d² + b²), in m.
 ///
 /// The first two states are the position. h has the zero set of the disc, a gradient of length
-/// d/√(d² + ε²) < 1, and curvature at most 1/ε; it vanishes only at the centre.
+/// d/√(d² + b²) < 1, and curvature at most 1/b; it vanishes only at the centre.
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceDisc {
     centre: Centre,
     smoothing: f64,
-    /// √(R² + ε²).
+    /// √(R² + b²).
     level: f64,
 }
 
 impl DistanceDisc {
-    /// A disc around `centre` (m) with `radius` R > 0 (m) and `smoothing` ε > 0 (m; R is a good
+    /// A disc around `centre` (m) with `radius` R > 0 (m) and `smoothing` b > 0 (m; R is a good
     /// choice, smaller is closer to the true distance and sharper at the centre).
     ///
     /// # Errors

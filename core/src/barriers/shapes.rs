@@ -203,7 +203,7 @@ impl<const NX: usize> Barrier<NX> for StateBound {
 }
 
 /// One state of bounded size, or two neighbouring ones of bounded length, such as a speed limit:
-/// h = √(L² + ε²) − √(x_i² + x_{i+1}² + ε²) with ε = L/2, in their unit.
+/// h = √(L² + b²) − √(x_i² + x_{i+1}² + b²) with b = L/2, in their unit.
 #[derive(Clone, Copy, Debug)]
 pub struct NormBound {
     first: usize,

@@ -1,34 +1,29 @@
 //! The constraint in the form for an input that is held over a period δ.
 //!
-//! With ψ = (D + a)ⁿ⁻¹ e the constraint (D + a)ⁿ e ≥ 0 is ψ̇ + aψ ≥ 0. Enforced only at the samples, the
-//! held input lets it fall to −Mδ in between (M bounds |d/dt (D + a)ⁿ e|), and e to −Mδ/aⁿ. Its integral
-//! over the period,
+//! With ψ = (D + a_1) ⋯ (D + a_{n−1}) e the constraint is ψ̇ + a_n ψ ≥ 0. Its integral over the period,
 //!
 //! ```math
-//! \psi(t + \delta) \ge e^{-a\delta}\, \psi(t), \tag{S}
+//! \psi(t + \delta) \ge \exp(-a_n\delta)\, \psi(t), \tag{S}
 //! ```
 //!
-//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every
-//! sample, ψ ≥ 0 at every sample; for n = 1 that is e ≥ 0 at every sample, exactly. Within a period
-//! e^{aτ}ψ can dip below both its ends, where (D + a)ⁿ e is negative first and positive later: a function
-//! of slope at most M whose integral is ≥ 0 dips by at most Mδ²/8. With c₋ = max(0, −(D + a)ⁿ e) at the
-//! start of the period and an even slope, Mδ = 2c₋ and
+//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at every
+//! sample; for n = 1 that is e ≥ 0. In between e dips by what is of second order in δ (`docs/theory.md#held-inputs`), where
+//! the pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of (D + a)ⁿ e. With ψ_n⁻ the shortfall of the pointwise constraint at the start of
+//! the period and Λ = a_1 ⋯ a_{n−1}, the dip is about
 //!
 //! ```math
-//! \psi \ge -\frac{c_-\,\delta}{4}, \qquad e \ge -\frac{c_-\,\delta}{4\,a^{n-1}} \qquad \text{for } a > 0,\ n > 1, \tag{5}
+//! \psi \ge -\frac{\psi_n^-\,\delta}{4}, \qquad e \ge -\frac{\psi_n^-\,\delta}{4\,\Lambda} \qquad \text{for } n > 1. \tag{5}
 //! ```
 //!
-//! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`PeriodBound::loss`] is (5): an
-//! estimate to leading order, not a bound, since the slope is only seen through its mean.
+//! [`PeriodBound::loss`] is (5): an estimate to leading order, not a bound, since the slope is only seen through its mean.
 //!
-//! **The margin.** Along the profile c₋ is known beforehand: a held input keeps e⁽ⁿ⁾ constant, so M is
-//! the slope of r⁽ⁿ⁾ and c₋ = Mδ/2. [`margin`] is twice (5) for the steepest part of the profile, and a
-//! part of its size for round-off: what a promise needs on top of the margin it is given. What the plant
-//! adds (its own drift, turning gradients) is only seen on the way, as [`PeriodBound::loss`].
+//! [`margin`] is twice (5) for the steepest part of the profile, and a part of its size for round-off: what a promise needs
+//! on top of the margin it is given (`docs/theory.md#sampling-margin`). What the plant adds (its own drift, turning
+//! gradients) is only seen on the way, as [`PeriodBound::loss`].
 //!
-//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its
-//! samples' average. It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across
-//! the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
+//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its samples' average. It
+//! needs no root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is
+//! continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
 use super::condition::{AnchorChange, Condition, Rates, Sample};
@@ -39,14 +34,14 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeriodBound {
-    /// The coefficients of (D + a)ⁿ⁻¹, in 1/s^(n−1−k); zeros from n on.
+    /// The coefficients of ψ, those of (D + a)ⁿ⁻¹ for one rate, in 1/s^(n−1−k); zeros from n on.
     pub weights: Stack,
     /// The least value at the end of the period, `[h]`/sⁿ⁻¹.
     pub floor: f64,
-    /// ψ ≥ −c gives e ≥ −c/`attenuation`, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow, what they
-    /// grow to until the deadline: (n − 1)! e^{aτ}/τⁿ⁻¹ for the time τ until then.
+    /// Λ: ψ ≥ −c gives e ≥ −c/Λ, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow until
+    /// the deadline, (n − 1)! exp(aτ)/τⁿ⁻¹ with the time τ until then.
     pub attenuation: f64,
-    /// e^(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
+    /// exp(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
     pub decay: f64,
 }
 

@@ -1,17 +1,17 @@
-//! How what a promise asks for changes with the derivatives of h.
+//! The change of a promise's floors with the derivatives of h.
 //!
-//! At a sample that does not anchor, the floors are what [`FixedTime::advance`] and
-//! [`FixedTime::over_period`] compute from h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are: linear
-//! functions, but for the first-order condition. At a sample that anchors, the anchor is h itself; margin
-//! and the repeated root follow it:
+//! At a sample that does not anchor, [`FixedTime::advance`] and [`FixedTime::over_period`] compute the floors from
+//! h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are. They are linear functions, but for the first-order
+//! condition. At a sample that anchors, the anchor is h itself; margin and the repeated root follow it:
 //!
 //! ```text
-//! e = h − μ(h),   r' = (∂r/∂e₀) e₀',
-//! s' = −Σ_j y_j' E_{n−1−j}(s) / (dR/ds),   dR/ds = −Σ_j y_j s^{n−1−j}/(n−1−j)!   for the root of (R),
+//! e = h − μ(h),   r' = (∂r/∂e(0)) e(0)',
+//! ρ' = −Σ_j y_j' E_{n−1−j}(ρ) / Y_n'(ρ),
+//! Y_n'(ρ) = −Σ_j y_j ρ^{n−1−j}/(n−1−j)!   for the root of (R),
 //! ```
 //!
-//! where the prime is the derivative along a direction. Where a phase changes, a maximum has two candidates or a
-//! profile a kink, it is the derivative of the piece in force.
+//! where the prime is the derivative along a direction, but that of Y_n the one by ρ (`docs/theory.md#input-sensitivity`).
+//! Where a phase changes, a maximum has two candidates or a profile a kink, it is the derivative of the piece in force.
 
 use super::condition::AnchorChange;
 use super::fixed_time::FixedTime;

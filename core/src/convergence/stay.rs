@@ -1,32 +1,26 @@
 //! Staying inside: (D + a)ⁿ e ≥ 0 with a > 0 from a start with e ≥ 0.
 //!
-//! By the comparison lemma e ≥ e^{−aτ} P(τ), so e ≥ 0 for ever if every coefficient c_k(a) of P is ≥ 0
-//! at the start. For n = 1 that is e ≥ 0; for n = 2 it is a ≥ −ė/e.
-//!
-//! **The rates that do.** The k! c_k are an Appell sequence in a:
+//! It keeps e ≥ 0 for ever if all coefficients c_k(a) of the comparison lemma are ≥ 0 at the start
+//! (`docs/theory.md#stay-condition`). For n = 1 that is e ≥ 0; for n = 2 it is e ≥ 0 and a ≥ −ė/e. The k! c_k are an Appell
+//! sequence in a,
 //!
 //! ```math
 //! A_k(a) = k!\, c_k(a) = \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}, \qquad \frac{dA_k}{da} = k\, A_{k-1}. \tag{A}
 //! ```
 //!
-//! So where A_0 … A_{k−1} are ≥ 0 on a ray [a_{k−1}, ∞), A_k does not fall on it,
-//! and A_0 … A_k are ≥ 0 on a smaller ray [a_k, ∞), or nowhere if A_k is a negative constant. By
-//! induction the rates ≥ 0 with all c_k ≥ 0 are a ray [a_min, ∞), and there is none if and only if the
-//! first derivative that is not zero is negative. Every rate above [`smallest_rate`] will do as well.
-//!
-//! **The rate of a sample.** Along an active or inactive constraint the A_k stay ≥ 0, so a rate that would do at one
-//! sample does at the next: the rate may be chosen anew at every sample, from what is known there, and h ≥ 0 stays
-//! true. The least h⁽ⁿ⁾ that a rate asks for,
+//! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if the
+//! first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may be chosen
+//! anew at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
 //!
 //! ```math
 //! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
 //! ```
 //!
-//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can, and a larger one
+//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger one
 //! where the gentle one asks for what the inputs cannot give and nothing is about to be left.
 //!
-//! **Any margin will do.** With e = h − μ all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n: the least of them,
-//! [`affordable_margin`], is the largest margin with which the lemma holds.
+//! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, [`affordable_margin`], is the
+//! largest margin with which the condition holds.
 
 use std::array::from_fn;
 
@@ -136,6 +130,8 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 ///    can hardly be influenced (`means.weight`) or comes back by itself, by as much as the plant itself pulls h⁽ⁿ⁾ down
 ///    there. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
+///
+/// The reasons are in `docs/theory.md#rate-for-every-sample`.
 pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };

@@ -1,7 +1,6 @@
-//! How long an input is held, and what of that the constraint accounts for.
+//! How long an input is held, and how much of that the constraint accounts for (`docs/theory.md#period`).
 //!
-//! The constraint over a period is (S) of [`crate::convergence::sampled`]; the input that meets it is found in
-//! [`super::search`].
+//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds the input that meets it.
 
 use super::FilterState;
 use crate::error::{Error, positive};

@@ -1,32 +1,29 @@
-//! What a held input does until the next sample: the sampled form of the rows, and the search for an
-//! input that meets it.
+//! The rows over the sampling period, and the search for an input that meets them.
 //!
-//! The row of the pointwise constraint is affine in u; its integral over the period
-//! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
-//! through the plant. It is solved by Newton's method on the rows: linearise them at the present
-//! guess, solve the quadratic program, and go towards its answer as far as the violation decreases
-//! (halving the way), that of the rows which the program does not give up. On the way only rows that are
-//! active or violated are linearised anew; the others keep their last linearisation, at first the pointwise
-//! row, and all are evaluated where the search ends.
+//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`]) is
+//! not, because the state at the end of the period depends on u through the plant. Newton's method on the rows solves it:
+//! linearise at the present candidate, solve the QP, and go towards its answer. Each step goes as far as the violation of
+//! the rows that the QP does not give up decreases, halving the way. Only rows that are active or violated are linearised
+//! anew. The others keep their last linearisation, at first the pointwise row. All are evaluated where the search ends.
 //!
-//! The guesses start from the answer of the pointwise rows and from the input of the step before; the better
-//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
-//! guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries the turn that
-//! was begun on through the instants at which the linearisation cannot see it. It is left out where the first
-//! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
-//! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
-//! count as equal: a sample taken again gives the same bits.
+//! There are two candidates to start from: the answer of the pointwise rows, and the input of the step before. The better
+//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second candidate
+//! matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn that was begun on
+//! through the instants at which the linearisation cannot see it. It is left out where the first has met every row by full
+//! steps that became shorter tenfold each, and is no further from u_ref than the last input is. The rows are all but affine
+//! there, and the answer is the only one near. Answers that differ by round-off count as equal, so a sample taken again
+//! gives the same bits.
 //!
-//! An answer is settled where its steps contracted like that, or where both guesses end at it, and it is not far
-//! out against u_ref, where the plant turns and other answers exist, nor one aside of which the row that u_ref violates
-//! leaves more room than the way there costs: a vehicle that brakes straight ahead where it could turn to either side is at
-//! rest between two answers. So a step taken again, or cut in two, by a master that looks for the size of its steps gives
-//! the same. Any other one, above all one that does not meet the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
-//! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
-//! program says, by priority.
+//! An answer is settled where its steps contracted like that, or where both candidates end at it. Two answers are not
+//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside: the row
+//! that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where it could turn
+//! to either side is at rest between two such answers. So a master that takes a step again, or cuts it in two, gets the same
+//! input. From any answer that is not settled, above all from one that does not meet the rows, the module `wide` searches
+//! on. Its answer takes the place only if it meets all hard rows and is nearer, so what is right keeps its bits. Rows that
+//! cannot be met together are given up as the QP says, by priority.
 //!
-//! Violations are round-off where they are small against the terms that h and its derivatives are made of, not
-//! against what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
+//! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
+//! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
 mod wide;
 

@@ -2,15 +2,15 @@
 //!
 //! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds, G_i the row i: affine in u
 //! for the pointwise constraint, not where it is enforced over the period. With the active ones A, their
-//! multipliers λ and a prime for the derivative along the direction (x', u_ref'),
+//! multipliers ϑ and a prime for the derivative along the direction (x', u_ref'),
 //!
 //! ```text
-//! u' − Σ_{i∈A} (λ_i' ∇_u G_i + λ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
+//! u' − Σ_{i∈A} (ϑ_i' ∇_u G_i + ϑ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
 //! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
 //! ```
 //!
-//! by the implicit function theorem. A bound that holds u_j has u_j' = 0. A soft row at its largest
-//! multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
+//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft row at
+//! its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
 //! direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
 //!

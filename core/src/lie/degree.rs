@@ -1,13 +1,13 @@
-//! Which derivative of a barrier the inputs enter first.
+//! The relative degree: the order of the first derivative of a barrier that inputs enter.
 //!
-//! A constraint built for relative degree n needs every input that reaches h to enter h⁽ⁿ⁾ and none
-//! to enter an earlier derivative. An input that never enters is harmless (the steering of a vehicle
-//! does not act on a speed limit). Inputs that enter at *different* orders are not: one row on h⁽ⁿ⁾
-//! with the lower n uses only the input that comes first, with the higher n it is wrong.
+//! A constraint for relative degree n needs every input that reaches h to enter h⁽ⁿ⁾, and none to enter an earlier
+//! derivative. An input that never enters is harmless: the steering of a vehicle does not act on a speed limit. Inputs
+//! that enter at *different* orders are not harmless. A row on h⁽ⁿ⁾ with the lower n uses only the input that comes
+//! first; with the higher n it is wrong.
 //!
-//! The orders are read off the gradients of [`barrier_series`] at sample states. A sample may lie
-//! where a gradient vanishes by accident (the centre of a disc, standing still), so where an order is
-//! not the lowest found, two neighbours of the sample are asked as well.
+//! The orders are read off the gradients of [`barrier_series`] at sample states. At a sample a gradient may vanish by
+//! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of the
+//! sample are asked as well.
 
 use std::array::from_fn;
 

@@ -1,18 +1,14 @@
-//! How the solution of a program moves: one linear system.
+//! How the solution of a QP moves: one linear system.
 //!
-//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Along a
-//! direction in which everything they are made of moves, with the multipliers' change μ,
+//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Let everything they are
+//! made of move along a direction, and let ϑ' be the change of the multipliers. Then
 //!
 //! ```text
-//! H u' − Aᵀ μ = c,   A u' = d,                                                            (7)
+//! N u' − Aᵀ ϑ' = c,   A u' = d,                                                            (7)
 //! ```
 //!
-//! H the Hessian of the Lagrangian, c what moves its gradient and d what moves the constraints, at a fixed u.
-//!
-//! # References
-//!
-//! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
-//! Press 1983, theorem 3.2.2.
+//! with the Hessian N of the Lagrangian, the change c of its gradient and the change d of the constraints, both at a fixed u
+//! (`docs/theory.md#input-sensitivity`).
 
 use nalgebra::{SMatrix, SVector};
 
