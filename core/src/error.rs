@@ -1,4 +1,4 @@
-//! Misuse: the one error type of the crate. Numerical outcomes are statuses, not errors.
+//! The crate's one error type, for misuse. Numerical outcomes are statuses, not errors.
 
 mod degree;
 
@@ -6,7 +6,7 @@ use std::fmt;
 
 pub use degree::RelativeDegree;
 
-/// What kind of misuse an [`Error`] reports.
+/// The kind of misuse that an [`Error`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorKind {

@@ -67,7 +67,7 @@ where
 }
 
 /// Coefficient `J` of the state from those below: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where
-/// products of u with derivatives of g along u vanish. All series are cut off at what they are known to.
+/// products of u with derivatives of g along u vanish. Every series is cut off after its last known coefficient.
 #[inline]
 fn extend<P, const NX: usize, const NU: usize, const K: usize, const J: usize>(
     plant: &P,
@@ -109,8 +109,8 @@ impl Derivatives {
     }
 }
 
-/// Anything that supplies the derivatives of one barrier: [`along`] makes one from the traits, [`external`] takes
-/// them from whoever computes them, a user's own code can be another.
+/// A supplier of the derivatives of one barrier. [`along`] makes one from the traits, [`external`] takes the
+/// derivatives from whoever computes them, and a user's own code can be another.
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
@@ -136,9 +136,10 @@ pub trait DerivativeSource: Send {
         false
     }
 
-    /// Writes how what [`Self::ahead`] writes changes along a direction: `state` is x and its direction,
-    /// `input` the held u and its direction; for [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default
-    /// does not know: it returns false.
+    /// Writes the derivative along a direction of what [`Self::ahead`] writes: `state` is x and its direction,
+    /// `input` the held u and its direction. For
+    /// [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default does not know it and
+    /// returns false.
     fn ahead_along(
         &self,
         _t: f64,
@@ -242,8 +243,8 @@ where
 }
 
 /// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the plant's
-/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE); the number of states is always one, since the gradients of
-/// h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
+/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE). The number of states is always such a limit, since the gradients
+/// of h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
 /// # Errors
 ///

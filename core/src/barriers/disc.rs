@@ -7,7 +7,7 @@ use crate::dynamics::Region;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
-/// Where a disc is.
+/// The place of a disc.
 #[derive(Clone, Copy, Debug)]
 enum Centre {
     /// It moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
@@ -47,7 +47,7 @@ impl Centre {
     /// The least distance in m of the point from a position in `region` between the two times.
     fn nearest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let Self::Given { start, velocity } = self else { return None };
-        // As seen from the point: the region moved against the way of the point.
+        // Seen from the point, the region moves against the way of the point.
         let mut seen = *region;
         for (i, side) in seen.sides.iter_mut().enumerate() {
             let way = time.map(|t| start[i] + t * velocity[i]);

@@ -138,7 +138,7 @@ impl Rectangle {
         Ok(Self { axes: Axes::new(centre, angle)?, half_sides: lengths("half_sides", half_sides)? })
     }
 
-    /// The like of it that contains the true rectangle.
+    /// The same shape, enlarged until it contains the true rectangle.
     pub fn around(self) -> Self {
         Self { half_sides: self.half_sides.map(|side| side * 2_f64.powf(0.25)), ..self }
     }

@@ -39,7 +39,7 @@ use crate::error::{Error, ErrorKind};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent(f64);
 
-/// Never not-a-number, so equality is an equivalence.
+/// Equality is an equivalence, as p is never not-a-number.
 impl Eq for Exponent {}
 
 impl Default for Exponent {

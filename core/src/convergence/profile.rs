@@ -35,8 +35,7 @@ pub trait Profile {
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of what [`Self::evaluate`] gives, where the anchor (`anchor[0]`) moves along a direction
-    /// (`anchor[1]`); for [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not
+    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not
     /// know it.
     fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
         None
@@ -114,7 +113,7 @@ impl Profile for LowPeak {
 /// any mistake in one.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// What is wrong with a profile.
+/// A defect of a profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ProfileError {
@@ -201,6 +200,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
     let size = |r: &Derivatives| {
         (0..=n).fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * deadline.powi(k as i32)).abs()))
     };
+    // It leaves from the anchor.
     let mut largest = size(&start);
     for (order, (&found, &wanted)) in start.iter().zip(anchor).enumerate() {
         if (found - wanted).abs() * deadline.powi(order as i32) > TOLERANCE * largest {
@@ -216,6 +216,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
         let whole = profile.mean(a, b)?;
         let middle = a + (b - a) / 2.0;
         let (first, second) = (profile.mean(a, middle)?, profile.mean(middle, b)?);
+        // Each derivative has the mean that the one before says.
         for order in 1..=n {
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);

@@ -40,7 +40,7 @@ use super::polynomial::{self, Roots};
 use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
 
-/// Why a repeated root has no admissible rate.
+/// The reason why a repeated root has no admissible rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
@@ -68,7 +68,7 @@ pub enum Deadlines {
 /// No admissible rate exists for this anchor and deadline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoAdmissibleRate {
-    /// Why.
+    /// The reason.
     pub reason: Reason,
     /// The deadlines that would have one from the same anchor.
     pub deadlines: Deadlines,
@@ -233,7 +233,7 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 impl Condition for RepeatedRoot {
     #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
-        // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
+        // The e that the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
         let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));
         let scale = MARGIN_TOLERANCE * (at.anchor[0].abs() + at.margin);
         Bound {

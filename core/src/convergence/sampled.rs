@@ -48,16 +48,16 @@ pub struct PeriodBound {
 /// A [`PeriodBound`] with the derivatives at the end of the period put in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighted {
-    /// By how much it is met, in the unit of h⁽ⁿ⁾.
+    /// Its slack, in the unit of h⁽ⁿ⁾.
     pub value: f64,
-    /// The size of the terms whose sum that is.
+    /// The size of the terms whose sum the slack is.
     pub terms: f64,
     /// Its gradient by the input.
     pub normal: [f64; MAX_INPUTS],
 }
 
 impl PeriodBound {
-    /// Asks for nothing.
+    /// The bound that asks for nothing.
     pub const ZERO: Self =
         Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0, decay: 0.0 };
 
@@ -66,7 +66,7 @@ impl PeriodBound {
         self.weights == [0.0; MAX_RELATIVE_DEGREE]
     }
 
-    /// The row on h⁽ⁿ⁾ that this is at the end of the period, over `divisor`: from h⁽ᵏ⁾ there, k < n, and their gradients by
+    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their gradients by
     /// so many `inputs`.
     #[inline]
     pub fn weighted(
@@ -99,7 +99,7 @@ impl PeriodBound {
 /// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
 /// `attenuation` as in [`PeriodBound`].
 pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
-    // A profile of a few samples is followed on average only: its own size bounds what that can cost.
+    // A profile of a few samples is followed on average only; the cost is bounded by its own size.
     let (size, _) = size(anchor, deadline);
     let loss = steepest(profile, anchor, deadline).slope.abs() * period / 2.0 * period / 4.0 / attenuation;
     (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
@@ -172,10 +172,10 @@ pub(super) fn margin_change(
 /// The largest margin that is taken for held inputs, as a part of the anchor's size.
 const LARGEST_MARGIN: f64 = 0.01;
 
-/// The tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
+/// Margin for the tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
 pub(super) const ROUND_OFF: f64 = 1e-8;
 
-/// As in [`PeriodBound`], of (D + a)ⁿ.
+/// The attenuation of a [`PeriodBound`] of (D + a)ⁿ.
 pub(super) fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     if rate > 0.0 {
@@ -236,7 +236,7 @@ pub(super) fn over_period(
 ) -> Option<PeriodBound> {
     let n = at.degree();
     let cascade = Cascade::of(&condition.rates(at)?, n, at.time_left(period));
-    // What h is compared with: μ + r and its derivatives.
+    // The target of h: μ + r and its derivatives.
     let target = |elapsed: f64| {
         let mut r = condition.profile(at, elapsed);
         r[0] += at.margin;
@@ -276,7 +276,7 @@ pub(super) fn over_period_change(
     out.floor = (0..n).map(|k| weights[k] * (then[k] + decay * (dh[k] - now[k]))).sum();
     let by_rate = change.map_or(0.0, |change| change.rate);
     if by_rate != 0.0 {
-        // Of the repeated root only, whose target is the margin alone.
+        // Only the repeated root has a rate that moves, and its target is the margin alone.
         let rate = last;
         for k in 0..n {
             out.weights[k] = power_change(rate, n - 1, k) * by_rate;
@@ -296,8 +296,8 @@ pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
     if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * rate.powi(power as i32 - 1) }
 }
 
-/// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, may fall below its prediction under disturbances of
-/// h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
+/// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under disturbances
+/// of h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
 fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
     let (n, mut grown, mut sum) = (weights.len(), bound, 0.0);
     for k in (0..n).rev() {

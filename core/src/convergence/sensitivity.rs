@@ -35,9 +35,9 @@ pub struct BoundDerivative {
 }
 
 impl FixedTime {
-    /// The derivative along `dh` of what [`Self::advance`] and, over `period`, [`Self::over_period`] ask for
-    /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and `state` has been moved to; `anchors`: by being
-    /// anchored at this very sample, with a deadline that does not depend on h.
+    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give at
+    /// time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether it was
+    /// anchored there, with a deadline that does not depend on h.
     ///
     /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
     /// [derivative](super::profile::Profile::along), and under most [conditions](super::condition) of one's own.
@@ -69,7 +69,7 @@ impl FixedTime {
         })
     }
 
-    /// How the anchor that `state` has just been given at `h` changes.
+    /// The derivative of the anchor that `state` has just been given at `h`.
     fn anchor_change(&self, state: &FixedTimeState, h: [&[f64]; 2]) -> Option<AnchorChange> {
         let mut change =
             self.approach.condition().anchor_change(&state.at_anchor(self.n), h, state.period)?;

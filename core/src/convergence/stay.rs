@@ -76,10 +76,10 @@ pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     least
 }
 
-/// What plant and inputs can do about h⁽ⁿ⁾ at a sample.
+/// The influence of plant and inputs on h⁽ⁿ⁾ at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Means {
-    /// L_fⁿh, `[h]`/sⁿ: what h⁽ⁿ⁾ is without an input.
+    /// L_fⁿh, `[h]`/sⁿ: h⁽ⁿ⁾ without an input.
     pub drift: f64,
     /// The most that inputs within their bounds add to it, `[h]`/sⁿ; infinite without bounds.
     pub reach: f64,
@@ -90,52 +90,52 @@ pub struct Means {
 }
 
 impl Means {
-    /// Nothing is known: every h⁽ⁿ⁾ can be had at once.
+    /// Nothing known: every h⁽ⁿ⁾ can be had at once.
     pub const UNKNOWN: Self = Self { drift: 0.0, reach: f64::INFINITY, weight: 1.0, hold: 0.0 };
 }
 
-/// How the set is kept from a sample: (D + a)ⁿ (h − μ) ≥ pull.
+/// The constraint that keeps the set from a sample on: (D + a)ⁿ (h − μ) ≥ pull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keep {
     /// a in 1/s.
     pub rate: f64,
     /// μ ≥ 0, `[h]`.
     pub margin: f64,
-    /// What leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
+    /// The part of the floor that leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
     pub pull: f64,
     /// Whether the lemma holds with these: h ≥ μ from now on.
     pub is_invariant: bool,
 }
 
-/// Rate times hold that an error can follow: a faster one changes more within two samples than an input can do about it.
+/// Largest rate times hold: a faster error changes more within two samples than an input can do about it.
 pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 
-/// The rate of least peak over the smallest rate, for n = 2: braking from ė then takes ¾ ė²/e, where a constant ½ ė²/e
-/// would just do. (With the smallest rate it takes ė²/e.)
+/// The rate of least peak over the smallest rate, for n = 2. Braking from ė then takes ¾ ė²/e, with the smallest rate
+/// ė²/e; a constant ½ ė²/e would just do.
 const OVER_SMALLEST: f64 = 1.5;
 
 /// The part of the margin that is enough to keep the gentle rate.
 const ENOUGH: f64 = 0.5;
 
-/// Where no period limits the rate: this many times what is asked for.
+/// Largest rate over the one asked for, where no period limits it.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
-/// How to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): `margin` μ and rate `base` > 0 where they will do, what is
-/// needed where they do not.
+/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 where they will
+/// do, with a smaller margin and a larger rate where they do not.
 ///
 /// 1. The rate is `base` where that affords half the margin, with all that it affords.
-/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow, and
-///    the rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. It is raised where the input cannot give what it asks for: beyond what bounds allow (`means.reach`), and where h
-///    can hardly be influenced (`means.weight`) or comes back by itself, by as much as the plant itself pulls h⁽ⁿ⁾ down
-///    there. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
+///    rate is the smallest that will do, for n = 2 1.5 times that.
+/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be influenced
+///    (`means.weight`) or comes back by itself, it is raised by as much as the plant itself pulls h⁽ⁿ⁾ down. At the centre
+///    of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.
 pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
-    // What small dips have taken of the margin does not change the rate.
+    // 1. The gentle rate, with the margin that it affords. Small dips into the margin do not change the rate.
     let at_base = affordable_margin(base, h);
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
@@ -146,16 +146,17 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let e = &own[..h.len()];
     let is_invariant = affordable >= 0.0;
     if !is_invariant {
-        // As hard as it must be where that can be said, beyond what samples can follow.
+        // Not even the largest rate affords a margin ≥ 0: as hard as it must be, where a rate does it at all.
         let rate = smallest_rate(e).map_or(limit, |rate| rate.max(base));
         return Keep { rate, margin: kept, pull: 0.0, is_invariant };
     }
+    // 2. The smallest rate that will do, where the gentle one does not.
     let over_smallest = if h.len() == 2 { OVER_SMALLEST } else { 1.0 };
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
     let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
     let possible = means.drift + means.reach;
-    // What the plant pulls down is left to later where h can hardly be influenced, or comes back to it by itself.
+    // 3. The plant's own pull is left to later where h can hardly be influenced, or comes back by itself.
     let strength = means.weight.powi(2) * outwards(e, base);
     let eased = |wanted: f64| {
         let relieved = means.drift.min(0.0) + wanted.max(0.0);
@@ -166,12 +167,12 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let rate = if wanted <= most {
         gentle
     } else {
-        // What is eased is so until the end of the hold, the more the less h follows an input until then.
+        // It has to stay that low for a part of the hold: the larger a part, the less h follows an input.
         let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { own };
         let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
         if is_met(limit) { first(gentle, limit, is_met) } else { limit }
     };
-    // The gentle rate with all of the margin, as far as that is possible.
+    // 4. The gentle rate with all of the margin, as far as that is possible.
     let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
     let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
@@ -183,7 +184,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
 pub struct Stay<'a>(pub &'a FixedTimeSettings);
 
 impl Stay<'_> {
-    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes it to `state`.
+    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes that to `state`.
     pub(super) fn choose<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -200,7 +201,7 @@ impl Stay<'_> {
             chosen = keep_from(lowest);
         }
         (state.stay_rate, state.stay_margin, state.pull) = (chosen.rate, chosen.margin, chosen.pull);
-        // Errors are bounded to first order; what is left of the margin is for the rest.
+        // Errors are bounded to first order: half of the margin has to be left for the rest.
         let is_covered = || is_kept(chosen.rate) && chosen.margin >= ENOUGH * state.margin;
         state.guaranteed = chosen.is_invariant && (is_exact || is_covered());
     }
@@ -273,7 +274,7 @@ impl Condition for Stay<'_> {
     }
 }
 
-/// For n = 2 how much of e is being lost: 0 where ė ≥ a e, 1 where ė ≤ 0.
+/// The part of e that is being lost, for n = 2: 0 where ė ≥ a e, 1 where ė ≤ 0. For other n it is 1.
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
     // Not `clamp`, which keeps what is not a number: 0/0 at rest on the boundary.

@@ -126,7 +126,7 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     out.write((0..K).map(|k| h.derivative(k)));
 }
 
-/// As [`evaluate`], the derivative of what that writes along the direction (`dx`, `du`) of state and input.
+/// Writes the derivative of what [`evaluate`] writes, along the direction (`dx`, `du`) of state and input.
 pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),
     time: (f64, f64),

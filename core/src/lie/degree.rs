@@ -155,9 +155,9 @@ where
 /// For each input the first order at which it enters.
 type Orders = [Option<usize>; MAX_INPUTS];
 
-/// What the samples showed.
+/// The orders found on the samples.
 struct Findings {
-    /// Number of inputs; what follows is `None` for those above.
+    /// Number of inputs; orders are `None` for those above.
     inputs: usize,
     /// Per input the lowest order over all samples.
     lowest: Orders,
@@ -169,8 +169,8 @@ struct Findings {
 
 impl Findings {
     fn add(&mut self, t: f64, x: &[f64], series: &mut impl FnMut(f64, &[f64]) -> Coefficients) {
-        /// How far a neighbour is, as a part of the component and absolutely: far enough that a
-        /// gradient that vanishes at the sample only is seen there.
+        /// Distance of a neighbour, as a part of the component and absolutely. A gradient that vanishes at the
+        /// sample only is seen that far away.
         const AWAY: f64 = 1e-3;
         let Some(mut orders) = orders(&series(t, x)) else { return };
         let mut numbers = Numbers(1);

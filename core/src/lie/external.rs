@@ -63,8 +63,8 @@ fn dot(row: &[f64], u: &[f64]) -> f64 {
 /// L_f^n h (the derivative of order n where all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input
 /// adds to that), in `[h]`/s^k and `[h]`/(s^n · unit of u). Of a time-varying h they are total derivatives.
 ///
-/// They are taken as they are: nobody checks `n`, and nothing can be predicted, so that steps are those of
-/// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise) and the margin has to cover held inputs. For several
+/// They are taken as they are: nobody checks `n`. Nothing can be predicted, so steps are those of
+/// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise), and the margin has to cover held inputs. For several
 /// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded) picks each.
 ///
 /// # Errors
