@@ -69,7 +69,7 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
 pub struct Region {
     /// The box: smallest and largest coordinate along x, and along y, in m.
     pub sides: [[f64; 2]; 2],
-    /// In m, ≥ 0.
+    /// Distance in m, ≥ 0.
     pub radius: f64,
 }
 

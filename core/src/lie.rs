@@ -151,8 +151,8 @@ pub trait DerivativeSource: Send {
         false
     }
 
-    /// As [`Self::predict`], and moves the direction `dx` by its derivative. The default does not know: it
-    /// returns false.
+    /// Moves `x` as [`Self::predict`] does, and the direction `dx` by the derivative of that. The default does not
+    /// know it and returns false.
     fn predict_along(&self, _x: &mut [f64], _dx: &mut [f64], _u: &[f64], _duration: f64) -> bool {
         false
     }

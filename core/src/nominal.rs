@@ -158,7 +158,7 @@ impl Heading {
     }
 }
 
-/// Of the discs within `clearance` of the straight way from `position` to `goal` the first: the vector to its
+/// The first of the discs within `clearance` of the straight way from `position` to `goal`: the vector to its
 /// centre, and its radius with the clearance.
 fn first_in_the_way(
     position: [f64; 2],
@@ -186,7 +186,7 @@ fn first_in_the_way(
 /// `goal` is shorter: where a tangent from `position` touches the disc of radius `wide`, a little enlarged;
 /// from within that, as far again along its edge and a little outwards.
 fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2] {
-    /// So that the disc is not in the way of what passes it.
+    /// Enlargement of the disc, so that it is not in the way of a vehicle that passes it.
     const ENLARGED: f64 = 1.1;
     /// Sine of the angle away from the disc within it.
     const OUTWARDS: f64 = 0.3;

@@ -10,9 +10,9 @@ use crate::scalar::Scalar;
 /// The place of a disc.
 #[derive(Clone, Copy, Debug)]
 enum Centre {
-    /// It moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
+    /// A point that moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
     Given { start: [f64; 2], velocity: [f64; 2] },
-    /// At the two states from this one on.
+    /// The two states from this one on.
     State(usize),
 }
 

@@ -106,7 +106,7 @@ pub struct Anchoring<'a> {
     pub h: &'a [f64],
     /// T in s from now; ≤ 0 where it has passed.
     pub deadline: f64,
-    /// For how long inputs are held, in s; 0 where they are not, or where it is not known.
+    /// The time in s for which inputs are held; 0 where they are not, or where it is not known.
     pub period: f64,
     /// The margin of the settings, `[h]`.
     pub margin: f64,
@@ -163,11 +163,11 @@ pub struct Abilities {
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct AnchorChange {
-    /// Of e⁽ʲ⁾ at the anchor.
+    /// Derivatives of e⁽ʲ⁾ at the anchor.
     pub anchor: Stack,
-    /// Of the margin.
+    /// Derivative of the margin.
     pub margin: f64,
-    /// Of the rate.
+    /// Derivative of the rate.
     pub rate: f64,
 }
 
@@ -199,7 +199,7 @@ pub trait Condition {
         Anchored { margin: at.margin, rate: at.stay_rate, fallback: false, applies: false }
     }
 
-    /// Why it [fell back](Anchored::fallback) at the anchor of `at`.
+    /// The reason why it [fell back](Anchored::fallback) at the anchor of `at`.
     fn refusal(&self, _at: &Sample) -> Option<Refusal> {
         None
     }

@@ -43,7 +43,7 @@ fn lower_coefficients(rates: &[f64]) -> Stack {
 /// Π (D + a_i) e = (D + `last`) Σ_k `weights[k]` e⁽ᵏ⁾.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Split {
-    /// Of n − 1 rates, its leading coefficient 1 among them; zeros above.
+    /// Coefficients for n − 1 rates, the leading 1 among them; zeros above.
     pub(super) weights: Stack,
     /// a_n in 1/s.
     pub(super) last: f64,

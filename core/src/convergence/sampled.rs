@@ -105,7 +105,7 @@ pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation:
     (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
 }
 
-/// Where a profile is steepest.
+/// The panel in which a profile is steepest.
 struct Steepest {
     /// The number of the panel.
     panel: usize,

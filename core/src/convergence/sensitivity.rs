@@ -24,13 +24,13 @@ use crate::MAX_RELATIVE_DEGREE;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BoundDerivative {
-    /// Of the floor under h⁽ⁿ⁾.
+    /// Derivative of the floor under h⁽ⁿ⁾.
     pub floor: f64,
-    /// Of the lower bound on h.
+    /// Derivative of the lower bound on h.
     pub profile: f64,
-    /// Of μ.
+    /// Derivative of μ.
     pub margin: f64,
-    /// Of the sampled form, where a period was given.
+    /// Derivative of the sampled form, where a period was given; else zero.
     pub sampled: PeriodBound,
 }
 

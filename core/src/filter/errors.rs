@@ -43,7 +43,7 @@ impl MeasurementErrors {
         self.directions.is_empty()
     }
 
-    /// How many states have one.
+    /// Number of states that have one.
     pub(super) fn count(&self) -> usize {
         self.directions.len() / self.state_dim
     }

@@ -35,7 +35,7 @@ impl Node {
     const ZERO: Self = Self { at: 0.0, h: 0.0, slope: 0.0 };
 }
 
-/// Where h is lowest.
+/// The instant at which h is lowest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lowest {
     /// A lower bound on h there.
@@ -128,7 +128,7 @@ impl Hold<'_> {
     }
 }
 
-/// Above every other.
+/// A value above every other.
 const LARGEST: Lowest = Lowest { h: f64::INFINITY, at: 0.0 };
 
 /// End number `k` of so many `parts`, whose lengths grow from 0.8 to 1.2 times the mean.

@@ -1,4 +1,4 @@
-//! Dynamic extension inside the filter: a state that is commanded and not measured.
+//! Dynamic extension inside the filter: an integrator whose state is commanded and not measured.
 
 use super::{NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
@@ -9,9 +9,9 @@ use crate::qp::Bounds;
 /// [`KinematicBicycle`](crate::plants::KinematicBicycle); the plant outside takes that state as its input. So
 /// x lacks it, and u and u_ref have it in the place of its rate.
 ///
-/// Over each period the filter's model has it change evenly; what is handed out, to be held, is its mean over the
-/// period. The two differ by O(δ²) in the state at the end. The wish v for it becomes the rate
-/// `gain` (v − value), or what leads there within the period where that is less.
+/// Over each period the filter's model has it change evenly. The plant is given its mean over the period, to be held;
+/// the two differ by O(δ²) in the state at the end. The wish v for it becomes the rate `gain` (v − value), or the rate
+/// that leads there within the period where that is less.
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::SmallSlipBicycle};
@@ -44,8 +44,8 @@ pub struct Integrator {
 }
 
 impl Integrator {
-    /// For a `filter` whose state number `place.0` is the integral of its input number `place.1`, both counted from
-    /// 0; the value stays within `limits` and begins with what is nearest 0 there. `gain` in 1/s, finite, > 0.
+    /// An integrator for a `filter` whose state number `place.0` is the integral of its input number `place.1`, both
+    /// counted from 0. The value stays within `limits` and begins with the one nearest 0. `gain` in 1/s, finite, > 0.
     ///
     /// # Errors
     ///
@@ -65,7 +65,7 @@ impl Integrator {
             }
         }
         let [min, max] = limits;
-        // Not-a-number is no limit either.
+        // Not-a-number fails too.
         if !(min <= max && min < f64::INFINITY && max > f64::NEG_INFINITY) {
             let message = format!("is [{min}, {max}], must be [min, max] with min <= max");
             return Err(Error::new(ErrorKind::Range, "limits", message));
@@ -93,7 +93,7 @@ impl Integrator {
         self.input
     }
 
-    /// What has been integrated: the value at the end of the last step.
+    /// The integral: the value at the end of the last step.
     pub fn value(&self) -> f64 {
         self.value
     }
@@ -107,8 +107,8 @@ impl Integrator {
         value.max(self.limits[0]).min(self.limits[1])
     }
 
-    /// As [`SafetyFilter::step`], for an input that is held for `hold` seconds, finite, > 0. The report's rows are
-    /// those of the filter, on the rate.
+    /// Computes the safe input as [`SafetyFilter::step`] does, for an input that is held for `hold` seconds, finite, > 0.
+    /// The report's rows are those of the filter, on the rate.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl Integrator {
         Ok(report)
     }
 
-    /// What [`Self::step`] would return, and the value after it, without remembering the sample.
+    /// Computes what [`Self::step`] would, and the value after it, without remembering the sample.
     ///
     /// # Errors
     ///
@@ -148,8 +148,8 @@ impl Integrator {
         Ok(self.finish(hold, u))
     }
 
-    /// As [`SafetyFilter::differentiate`], of what [`Self::peek`] gives; the value after the step moves by twice what
-    /// its mean does.
+    /// Computes the derivative of what [`Self::peek`] gives, as [`SafetyFilter::differentiate`] does. The value after the
+    /// step moves by twice what its mean does.
     ///
     /// # Errors
     ///

@@ -39,7 +39,7 @@ use slot::BarrierSlot;
 /// The memory of a filter between samples: one promise per barrier, and the times that [`Sampling`] needs.
 #[derive(Debug, Default, PartialEq)]
 pub struct FilterState {
-    /// In the order of the barriers.
+    /// Promises, in the order of the barriers.
     pub barriers: Vec<FixedTimeState>,
     /// Time of the last sample with valid inputs, in s.
     pub time: Option<f64>,
@@ -67,13 +67,13 @@ const SAME_PERIOD: f64 = 1e-6;
 
 /// Scratch memory of a step; its contents change no bit of the next one.
 struct Workspace {
-    /// Of the QP, each with its enforcement.
+    /// Rows of the QP, each with its enforcement.
     rows: Vec<Row>,
     enforcement: Vec<Enforcement>,
     /// Bounds that the input held over the period has to meet.
     requirements: Vec<Requirement>,
     next: FilterState,
-    /// One state.
+    /// Room for one state.
     scratch: Vec<f64>,
     report: Report,
     qp: qp::Workspace,

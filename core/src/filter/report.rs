@@ -92,8 +92,8 @@ pub struct BarrierReport {
     pub slack: f64,
     /// Steps in a row that have not met the constraint, this one included.
     pub unmet_steps: u32,
-    /// Where the constraint is not met: the number of the barrier whose row is active and points most
-    /// against this one's, if there is one.
+    /// The number of the barrier whose row is active and points most against this one's, if there is one and this
+    /// one's constraint is not met.
     pub blocked_by: Option<usize>,
     /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
     /// been met, and h has not risen by a hundredth of its size. A u_ref that goes around leads out of it

@@ -1,4 +1,4 @@
-//! How long an input is held, and how much of that the constraint accounts for (`docs/theory.md#period`).
+//! The time for which an input is held, and how much of it the constraint accounts for (`docs/theory.md#period`).
 //!
 //! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds the input that meets it.
 

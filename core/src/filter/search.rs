@@ -79,12 +79,12 @@ impl Requirement {
 /// The rows over the period as functions of u, for the search.
 pub(super) struct PeriodProblem<'a> {
     pub(super) slots: &'a [BarrierSlot],
-    /// At most [`MAX_ROWS`]; each has a row.
+    /// Requirements, at most [`MAX_ROWS`]; each has a row.
     pub(super) requirements: &'a [Requirement],
     pub(super) t: f64,
     pub(super) bounds: &'a Bounds,
     pub(super) u_ref: &'a [f64],
-    /// Of each requirement.
+    /// Enforcement of each requirement.
     pub(super) enforcement: &'a [Enforcement],
     pub(super) correction_limit: f64,
     pub(super) errors: &'a MeasurementErrors,
@@ -307,7 +307,7 @@ impl PeriodProblem<'_> {
         row.floor.is_finite().then_some((row, violation))
     }
 
-    /// As [`Self::linearise`] of all rows, where violations that are round-off count as met.
+    /// Linearises all rows at `u`, with violations that are round-off counted as met.
     fn judge(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
         self.linearise(u, RowSet::ALL, at)?;
         for i in 0..at.rows.len() {

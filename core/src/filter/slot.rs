@@ -17,24 +17,24 @@ use crate::{MAX_RELATIVE_DEGREE, reach};
 /// in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Begin {
-    /// At the first sample.
+    /// From the first sample.
     #[default]
     AtOnce,
-    /// This many seconds after it, finite, ≥ 0, less than the deadline.
+    /// From this many seconds after it, finite, ≥ 0, less than the deadline.
     At(f64),
-    /// When the barrier of this number, counted from 0 and added before, has arrived.
+    /// From the arrival of the barrier of this number, counted from 0 and added before.
     AfterArrival(usize),
 }
 
 /// The time until which a barrier is enforced ([`Phase::Released`] from then on).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum End {
-    /// Never.
+    /// For ever.
     #[default]
     Never,
-    /// This many seconds after the filter's first sample, finite, > 0.
+    /// Until this many seconds after the filter's first sample, finite, > 0.
     At(f64),
-    /// As soon as h ≥ 0 has been reached.
+    /// Until h ≥ 0 has been reached.
     OnArrival,
 }
 
@@ -73,9 +73,9 @@ pub(super) struct SlotSample {
     pub(super) in_force: bool,
     /// The state from which the input acts.
     pub(super) from: Vec<f64>,
-    /// Of h there, along the plant.
+    /// Derivatives of h there, along the plant.
     pub(super) derivatives: Derivatives,
-    /// Of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
+    /// Derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
     pub(super) slopes: Vec<ErrorSlopes>,
     /// The least h⁽ⁿ⁾ that keeps the promise.
     pub(super) bound: DerivativeBound,
@@ -230,7 +230,7 @@ impl BarrierSlot {
         errors.of_derivatives(&*self.source, moment.t, moment.x, moment.u_ref.len(), &mut self.now.slopes)
     }
 
-    /// The influence of plant and inputs on h⁽ⁿ⁾. Notes the largest in `promise`.
+    /// The influence of plant and inputs on h⁽ⁿ⁾. Notes the largest ‖L_gL_fⁿ⁻¹h‖ so far in `promise`.
     #[inline]
     fn means(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds) -> Means {
         let Derivatives { drift, row, .. } = &self.now.derivatives;

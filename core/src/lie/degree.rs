@@ -152,7 +152,7 @@ where
     })
 }
 
-/// For each input the first order at which it enters.
+/// The first order at which each input enters.
 type Orders = [Option<usize>; MAX_INPUTS];
 
 /// The orders found on the samples.

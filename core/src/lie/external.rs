@@ -39,7 +39,7 @@ impl DerivativeSource for External {
         duration == 0.0
     }
 
-    /// As [`Self::ahead`]: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
+    /// Knows the present only: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
     fn ahead_along(
         &self,
         t: f64,

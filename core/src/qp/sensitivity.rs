@@ -1,4 +1,4 @@
-//! How the solution of a QP moves: one linear system.
+//! The change of the solution of a QP: one linear system.
 //!
 //! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Let everything they are
 //! made of move along a direction, and let ϑ' be the change of the multipliers. Then
@@ -26,16 +26,16 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// For the gradient u − r, where r moves along `direction`: H is the identity, and nothing is active.
+    /// The equations for the gradient u − r, where r moves along `direction`: N is the identity, and nothing is active.
     pub(crate) fn new(direction: &[f64]) -> Self {
         let mut right = SVector::<f64, SIZE>::zeros();
         right.as_mut_slice()[..direction.len()].copy_from_slice(direction);
-        // What is not used stays the identity.
+        // Unused rows and columns stay those of the identity.
         Self { inputs: direction.len(), rows: 0, matrix: SMatrix::identity(), right }
     }
 
-    /// Adds a part −λ a(u) of the gradient: `change` is how λ a moves at a fixed u, `curvature[i][j]` the
-    /// derivative of its component i by u_j.
+    /// Adds a part −ϑ a(u) of the gradient: `change` is the derivative of ϑ a at a fixed u, `curvature[i][j]` that
+    /// of its component i by u_j.
     pub(crate) fn pull(&mut self, change: &[f64], curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS]) {
         for i in 0..self.inputs {
             self.right[i] += change[i];
