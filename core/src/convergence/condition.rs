@@ -215,8 +215,8 @@ pub trait Condition {
         [0.0; MAX_RELATIVE_DEGREE + 1]
     }
 
-    /// The derivative of what [`anchor`](Self::anchor) chose where h (`h[0]`) moves along `h[1]`; `None` where it is not
-    /// known. `period` is that of the anchor.
+    /// The derivative of what [`anchor`](Self::anchor) chose where h (`h[0]`) moves along `h[1]`; `None` where it is
+    /// not known. `period` is that of the anchor.
     fn anchor_change(&self, _at: &Sample, _h: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
         None
     }

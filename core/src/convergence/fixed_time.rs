@@ -100,9 +100,10 @@ impl FixedTime {
     }
 
     /// A constraint of one's own in place of the settings' method. Of the settings only deadline, margin and
-    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed and
-    /// the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its
-    /// [rates](Condition::rates), it is enforced at the samples only, whatever [`Sampling`](crate::filter::Sampling) says.
+    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed
+    /// and the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its
+    /// [rates](Condition::rates), it is enforced at the samples only, under any
+    /// [`Sampling`](crate::filter::Sampling).
     ///
     /// # Errors
     ///
@@ -176,7 +177,7 @@ impl FixedTime {
         self.advance_by(state, t, h, errors, &Means { hold: state.period, ..Means::UNKNOWN })
     }
 
-    /// As [`Self::advance_within`], with the rate of the stay constraint chosen for what plant and inputs can do (`means`).
+    /// As [`Self::advance_within`], with the stay rate chosen for what plant and inputs can do (`means`).
     pub fn advance_by(
         &self,
         state: &mut FixedTimeState,

@@ -10,9 +10,9 @@
 //! \end{aligned} \tag{H}
 //! ```
 //!
-//! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n. Among all such r it has the least ∫ (r⁽ⁿ⁾)². It exists for every n, every
-//! T > 0 and all initial data, with no root to find (`docs/theory.md#hermite-profile`). The factored form keeps its
-//! relative accuracy near s = 1, where the monomial form cancels.
+//! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n. Among all such r it has the least ∫ (r⁽ⁿ⁾)². It exists for every n,
+//! every T > 0 and all initial data, with no root to find (`docs/theory.md#hermite-profile`). The factored form keeps
+//! its relative accuracy near s = 1, where the monomial form cancels.
 
 use super::profile::{Derivatives, Profile};
 use crate::MAX_RELATIVE_DEGREE;

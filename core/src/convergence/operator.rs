@@ -4,10 +4,11 @@
 //! \prod_{i\le n} (D + a_i)\, e = \sum_{j\le n} \gamma_j\, e^{(j)}, \qquad \gamma_n = 1, \tag{O}
 //! ```
 //!
-//! γ_j the elementary symmetric polynomial of degree n − j of the rates. With ψ_0 = e and ψ_i = (D + a_i) ψ_{i−1}, the
-//! constraint ψ_n ≥ 0 keeps e ≥ 0 for ever if ψ_i(0) ≥ 0 for all i < n (`docs/theory.md#rates-lemma`). That condition
-//! depends on the order of the rates, the constraint does not: one order suffices. From a zero error, as on a reference
-//! profile, it holds in any order. For equal rates ψ_i(0) = i! c_i, the coefficients of [`comparison`](super::comparison).
+//! γ_j the elementary symmetric polynomial of degree n − j of the rates. With ψ_0 = e and ψ_i = (D + a_i) ψ_{i−1},
+//! the constraint ψ_n ≥ 0 keeps e ≥ 0 for ever if ψ_i(0) ≥ 0 for all i < n (`docs/theory.md#rates-lemma`). That
+//! condition depends on the order of the rates, the constraint does not: one order suffices. From a zero error, as on
+//! a reference profile, it holds in any order. For equal rates ψ_i(0) = i! c_i, the coefficients of
+//! [`comparison`](super::comparison).
 //!
 //! # References
 //!

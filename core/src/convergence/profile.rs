@@ -1,7 +1,7 @@
 //! Reference profiles of one's own, checked before they are trusted.
 //!
-//! Let r be n − 1 times continuously differentiable with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and r ≥ 0
-//! from T on. Enforcing
+//! Let r be n − 1 times continuously differentiable with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and
+//! r ≥ 0 from T on. Enforcing
 //!
 //! ```math
 //! \prod_{i\le n} (D + a_i)\, (e - r) \ge 0, \qquad a_i > 0 \tag{P}
@@ -35,8 +35,8 @@ pub trait Profile {
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not
-    /// know it.
+    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for
+    /// [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not know it.
     fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
         None
     }

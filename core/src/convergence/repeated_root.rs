@@ -13,19 +13,20 @@
 //! root. For even n every T > 0 has one. For odd n the deadlines that have one are a ray [T_min, ∞), or there is none
 //! ([`deadlines`]); for n = 1 there is none. `docs/theory.md#admissible-rate` has the proof.
 //!
-//! [`rate`] takes the largest root: the least anti-stable one, and always admissible. [`admissibility`] judges any other.
+//! [`rate`] takes the largest root: the least anti-stable one, and always admissible. [`admissibility`] judges any
+//! other.
 //!
 //! # Requirements
 //!
-//! From rest the rate is negative (ρ = −1, −1.59607, −2.18061 for n = 2, 4, 6): the error dynamics are **anti-stable**.
-//! Sampling errors grow like exp(|a|τ), and the constraint keeps asking e to grow after T. So it overshoots the deadline by
-//! a few samples and must be followed by a stay constraint. It is here as the paper's method; the reference profile has
-//! none of this.
+//! From rest the rate is negative (ρ = −1, −1.59607, −2.18061 for n = 2, 4, 6): the error dynamics are
+//! **anti-stable**. Sampling errors grow like exp(|a|τ), and the constraint keeps asking e to grow after T. So it
+//! overshoots the deadline by a few samples and must be followed by a stay constraint. It is here as the paper's
+//! method; the reference profile has none of this.
 //!
-//! (R) is solved in the dimensionless ρ, its coefficients divided by the largest, so scales of e and T do not matter. What
-//! remains is the condition of the root, [`uncertainty`]: sums y_0 + … + y_k that cancel, or two roots that nearly meet.
-//! With T near T_min the root is as uncertain as the square root of the unit round-off, and round-off decides whether it
-//! exists.
+//! (R) is solved in the dimensionless ρ, its coefficients divided by the largest, so scales of e and T do not matter.
+//! What remains is the condition of the root, [`uncertainty`]: sums y_0 + … + y_k that cancel, or two roots that
+//! nearly meet. With T near T_min the root is as uncertain as the square root of the unit round-off, and round-off
+//! decides whether it exists.
 //!
 //! # References
 //!
@@ -195,8 +196,8 @@ pub fn deadlines(e: &[f64]) -> Deadlines {
     if shortest.is_finite() { Deadlines::From(shortest) } else { Deadlines::None }
 }
 
-/// First-order bound on the error of `rate` that round-off causes, in 1/s:
-/// 4nε Σ |y_j| E_{n−1−j}(|ρ|) / (|Y_n'(ρ)| T), ε the unit round-off. Infinite at a double root; also if the data are not finite.
+/// First-order bound on the error of `rate` that round-off causes, in 1/s: 4nε Σ |y_j| E_{n−1−j}(|ρ|) / (|Y_n'(ρ)|
+/// T), ε the unit round-off. Infinite at a double root; also if the data are not finite.
 ///
 /// The data, y_j, their partial sums and the value of Y_n each contribute up to about n roundings, of
 /// half ε each.

@@ -6,23 +6,24 @@
 //! \psi(t + \delta) \ge \exp(-a_n\delta)\, \psi(t), \tag{S}
 //! ```
 //!
-//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at every
-//! sample; for n = 1 that is e ≥ 0. In between e dips by what is of second order in δ (`docs/theory.md#held-inputs`), where
-//! the pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of (D + a)ⁿ e. With ψ_n⁻ the shortfall of the pointwise constraint at the start of
-//! the period and Λ = a_1 ⋯ a_{n−1}, the dip is about
+//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at
+//! every sample; for n = 1 that is e ≥ 0. In between e dips by what is of second order in δ
+//! (`docs/theory.md#held-inputs`). The pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of
+//! (D + a)ⁿ e. With ψ_n⁻ the shortfall of the pointwise constraint at the start of the period and
+//! Λ = a_1 ⋯ a_{n−1}, the dip is about
 //!
 //! ```math
 //! \psi \ge -\frac{\psi_n^-\,\delta}{4}, \qquad e \ge -\frac{\psi_n^-\,\delta}{4\,\Lambda} \qquad \text{for } n > 1. \tag{5}
 //! ```
 //!
-//! [`PeriodBound::loss`] is (5): an estimate to leading order, not a bound, since the slope is only seen through its mean.
+//! [`PeriodBound::loss`] is (5): an estimate to leading order, not a bound, as only the mean slope is seen.
 //!
-//! [`margin`] is twice (5) for the steepest part of the profile, and a part of its size for round-off: what a promise needs
-//! on top of the margin it is given (`docs/theory.md#sampling-margin`). What the plant adds (its own drift, turning
-//! gradients) is only seen on the way, as [`PeriodBound::loss`].
+//! [`margin`] is twice (5) for the steepest part of the profile, and a part of its size for round-off: what a promise
+//! needs on top of the margin it is given (`docs/theory.md#sampling-margin`). What the plant adds (its own drift,
+//! turning gradients) is only seen on the way, as [`PeriodBound::loss`].
 //!
-//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its samples' average. It
-//! needs no root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is
+//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its samples' average.
+//! It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is
 //! continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
@@ -66,8 +67,8 @@ impl PeriodBound {
         self.weights == [0.0; MAX_RELATIVE_DEGREE]
     }
 
-    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their gradients by
-    /// so many `inputs`.
+    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their
+    /// gradients by so many `inputs`.
     #[inline]
     pub fn weighted(
         &self,
@@ -296,8 +297,8 @@ pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
     if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * rate.powi(power as i32 - 1) }
 }
 
-/// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under disturbances
-/// of h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
+/// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under
+/// disturbances of h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
 fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
     let (n, mut grown, mut sum) = (weights.len(), bound, 0.0);
     for k in (0..n).rev() {

@@ -10,8 +10,9 @@
 //! Y_n'(ρ) = −Σ_j y_j ρ^{n−1−j}/(n−1−j)!   for the root of (R),
 //! ```
 //!
-//! where the prime is the derivative along a direction, but that of Y_n the one by ρ (`docs/theory.md#input-sensitivity`).
-//! Where a phase changes, a maximum has two candidates or a profile a kink, it is the derivative of the piece in force.
+//! where the prime is the derivative along a direction, but that of Y_n the one by ρ
+//! (`docs/theory.md#input-sensitivity`). Where a phase changes, a maximum has two candidates or a profile a kink, it
+//! is the derivative of the piece in force.
 
 use super::condition::AnchorChange;
 use super::fixed_time::FixedTime;
@@ -35,9 +36,9 @@ pub struct BoundDerivative {
 }
 
 impl FixedTime {
-    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give at
-    /// time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether it was
-    /// anchored there, with a deadline that does not depend on h.
+    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give
+    /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether
+    /// it was anchored there, with a deadline that does not depend on h.
     ///
     /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
     /// [derivative](super::profile::Profile::along), and under most [conditions](super::condition) of one's own.

@@ -37,9 +37,10 @@ pub enum Infeasible {
     /// Report it and keep the deadline.
     #[default]
     Report,
-    /// Give up the deadline. The promise starts anew from that sample, with twice the soonest time at which
-    /// h ≥ 0 is not ruled out; the factor grows by half each further time. A deadline that passes outside is
-    /// given up as well. Where no bound is known, the new one has the configured length. Counted in [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
+    /// Give up the deadline. The promise starts anew from that sample, with twice the soonest time at which h ≥ 0 is
+    /// not ruled out; the factor grows by half each further time. A deadline that passes outside is given up as well.
+    /// Where no bound is known, the new one has the configured length. Counted in
+    /// [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
     Soonest,
 }
 

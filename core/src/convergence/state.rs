@@ -15,7 +15,8 @@ pub struct FixedTimeState {
     pub anchor_time: f64,
     /// T in s, counted from the anchor; infinite where there is none.
     pub deadline: f64,
-    /// Number of times that leaving the set has anchored anew ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
+    /// Number of times that leaving the set has anchored anew
+    /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
     /// Number of deadlines given up for a later one, because the input bounds do not allow them
     /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
@@ -42,7 +43,7 @@ pub struct FixedTimeState {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
-    /// Whoever enforces the row clears it where the row is not met, or where the held input breaks the promise on the way.
+    /// Whoever enforces the row clears it where that is not met, or the held input breaks the promise on the way.
     pub guaranteed: bool,
     /// The steps in a row that did not meet the constraint, until now.
     pub unmet: Option<Unmet>,

@@ -1,23 +1,23 @@
 //! Staying inside: (D + a)ⁿ e ≥ 0 with a > 0 from a start with e ≥ 0.
 //!
 //! It keeps e ≥ 0 for ever if all coefficients c_k(a) of the comparison lemma are ≥ 0 at the start
-//! (`docs/theory.md#stay-condition`). For n = 1 that is e ≥ 0; for n = 2 it is e ≥ 0 and a ≥ −ė/e. The k! c_k are an Appell
-//! sequence in a,
+//! (`docs/theory.md#stay-condition`). For n = 1 that is e ≥ 0; for n = 2 it is e ≥ 0 and a ≥ −ė/e. The k! c_k are an
+//! Appell sequence in a,
 //!
 //! ```math
 //! A_k(a) = k!\, c_k(a) = \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}, \qquad \frac{dA_k}{da} = k\, A_{k-1}. \tag{A}
 //! ```
 //!
-//! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if the
-//! first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may be chosen
-//! anew at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
+//! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if
+//! the first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may
+//! be chosen anew at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
 //!
 //! ```math
 //! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
 //! ```
 //!
-//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger one
-//! where the gentle one asks for what the inputs cannot give and nothing is about to be left.
+//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger
+//! one where the gentle one asks for what the inputs cannot give and nothing is about to be left.
 //!
 //! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, [`affordable_margin`], is the
 //! largest margin with which the condition holds.
@@ -120,15 +120,15 @@ const ENOUGH: f64 = 0.5;
 /// Largest rate over the one asked for, where no period limits it.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
-/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 where they will
-/// do, with a smaller margin and a larger rate where they do not.
+/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 where they
+/// will do, with a smaller margin and a larger rate where they do not.
 ///
 /// 1. The rate is `base` where that affords half the margin, with all that it affords.
 /// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
 ///    rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be influenced
-///    (`means.weight`) or comes back by itself, it is raised by as much as the plant itself pulls h⁽ⁿ⁾ down. At the centre
-///    of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be
+///    influenced (`means.weight`) or comes back by itself, it is raised by as much as the plant itself pulls h⁽ⁿ⁾
+///    down. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative: nothing is about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.

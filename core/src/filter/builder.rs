@@ -294,8 +294,8 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u. Default:
-    /// [`Self::DEFAULT_CORRECTION_LIMIT`].
+    /// Sets the ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u.
+    /// Default: [`Self::DEFAULT_CORRECTION_LIMIT`].
     ///
     /// # Errors
     ///
@@ -315,9 +315,9 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any length
-    /// up to it. A longer one withdraws them until the next sample shows that they can be given again. Default: the period
-    /// that [`Sampling`] assumes.
+    /// Sets the longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any
+    /// length up to it. A longer one withdraws them until the next sample shows that they can be given again.
+    /// Default: the period that [`Sampling`] assumes.
     ///
     /// # Errors
     ///
@@ -366,10 +366,10 @@ impl FilterBuilder {
     ///
     /// # Errors
     ///
-    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation delay that
-    /// exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a delay, without a
-    /// prediction over the period, with another method than the reference profile, or with a source that gives no
-    /// derivatives along a direction.
+    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation
+    /// delay that exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a
+    /// delay, without a prediction over the period, with another method than the reference profile, or with a source
+    /// that gives no derivatives along a direction.
     pub fn build(self) -> Result<SafetyFilter, Error> {
         let Self {
             state_dim,

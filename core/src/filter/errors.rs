@@ -1,8 +1,8 @@
 //! Bounded errors of the measured state: what they can do to the derivatives of h and to a row over the period.
 //!
-//! Everything is a smooth function F of the state. To first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the derivatives
-//! at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u, so the row is no
-//! longer affine: it is linearised with the rest.
+//! Everything is a smooth function F of the state. To first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
+//! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u,
+//! so the row is no longer affine: it is linearised with the rest.
 
 use super::slot::BarrierSlot;
 use super::{Method, Sampling};
@@ -72,8 +72,8 @@ impl MeasurementErrors {
         sum
     }
 
-    /// The largest error of the row over the period of `demand`, divided by its divisor, from t, x, u and the time ahead.
-    /// `None` where that is not finite.
+    /// The largest error of the row over the period of `demand`, divided by its divisor, from t, x, u and the time
+    /// ahead. `None` where that is not finite.
     pub(super) fn of_row(
         &self,
         source: &dyn DerivativeSource,

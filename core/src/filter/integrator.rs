@@ -107,8 +107,8 @@ impl Integrator {
         value.max(self.limits[0]).min(self.limits[1])
     }
 
-    /// Computes the safe input as [`SafetyFilter::step`] does, for an input that is held for `hold` seconds, finite, > 0.
-    /// The report's rows are those of the filter, on the rate.
+    /// Computes the safe input as [`SafetyFilter::step`] does, for an input that is held for `hold` seconds, finite,
+    /// above 0. The report's rows are those of the filter, on the rate.
     ///
     /// # Errors
     ///
@@ -148,8 +148,8 @@ impl Integrator {
         Ok(self.finish(hold, u))
     }
 
-    /// Computes the derivative of what [`Self::peek`] gives, as [`SafetyFilter::differentiate`] does. The value after the
-    /// step moves by twice what its mean does.
+    /// Computes the derivative of what [`Self::peek`] gives, as [`SafetyFilter::differentiate`] does. The value after
+    /// the step moves by twice what its mean does.
     ///
     /// # Errors
     ///

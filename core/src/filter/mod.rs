@@ -262,9 +262,9 @@ impl SafetyFilter {
         Ok(())
     }
 
-    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where nobody knows. It
-    /// is for whoever is told, such as a co-simulation slave by the size of its step. [`Sampling::Measured`] then goes by
-    /// it at every sample. It is not part of [`Self::state`].
+    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where nobody
+    /// knows. It is for whoever is told, such as a co-simulation slave by the size of its step.
+    /// [`Sampling::Measured`] then goes by it at every sample. It is not part of [`Self::state`].
     ///
     /// # Errors
     ///

@@ -41,8 +41,8 @@ impl Outlook<'_> {
         Row { normal: *normal, floor }
     }
 
-    /// The instant at which the promise is broken along the model in the `hold` (s) that begins, if it is. In a set that is
-    /// kept, the hold may last as `long` (s).
+    /// The instant at which the promise is broken along the model in the `hold` (s) that begins, if it is. In a set
+    /// that is kept, the hold may last as `long` (s).
     pub(super) fn look(
         &self,
         promise: &FixedTimeState,
@@ -100,8 +100,8 @@ impl Outlook<'_> {
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
-    /// The requirement that keeps the promise of `barrier` at the instant at which it is broken. There is none for the sample
-    /// itself.
+    /// The requirement that keeps the promise of `barrier` at the instant at which it is broken. There is none for
+    /// the sample itself.
     pub(super) fn requirement(
         &self,
         barrier: usize,

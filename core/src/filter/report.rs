@@ -85,8 +85,8 @@ pub struct BarrierReport {
     /// Number of deadlines given up for a later one, because the bounds do not allow them (the settings'
     /// `infeasible`). Time left, profile and guarantee are then about the later one.
     pub postponed: u32,
-    /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. Where the step looked
-    /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
+    /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. Where the step looked over the sampling period
+    /// ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
     pub slack: f64,

@@ -1,6 +1,7 @@
 //! The time for which an input is held, and how much of it the constraint accounts for (`docs/theory.md#period`).
 //!
-//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds the input that meets it.
+//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds
+//! the input that meets it.
 
 use super::FilterState;
 use crate::error::{Error, positive};
@@ -11,10 +12,11 @@ pub enum Sampling {
     /// None: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs,
     /// Mδ/aⁿ.
     Pointwise,
-    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a longer
-    /// one that was seen not long ago. A period is forgotten within a hundred of its length, so a very short step between
-    /// long ones changes nothing. After a gap the period at most doubles from step to step. Where somebody says how long
-    /// the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it is that. The default.
+    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a
+    /// longer one that was seen not long ago. A period is forgotten within a hundred of its length, so a very short
+    /// step between long ones changes nothing. After a gap the period at most doubles from step to step. Where
+    /// somebody says how long the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it
+    /// is that. The default.
     Measured {
         /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth
         /// of the shortest deadline.
@@ -47,8 +49,8 @@ impl Sampling {
         }
     }
 
-    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint. The `expected` one is taken where
-    /// it differs from the measured one by more than round-off.
+    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint. The `expected` one is
+    /// taken where it differs from the measured one by more than round-off.
     pub(super) fn period(
         self,
         state: &FilterState,
@@ -69,7 +71,7 @@ impl Sampling {
         }
     }
 
-    /// The longest time in s that a hold may turn out to last, where `hold` is expected; `told`: somebody gave its length.
+    /// The longest time in s that a hold of `hold` s may turn out to last; `told`: somebody gave its length.
     pub(super) fn longest(self, hold: f64, told: bool) -> f64 {
         /// Longest next step over the measured one, seldom exceeded where steps are drawn at random between half of the
         /// longest and the longest.

@@ -1,26 +1,27 @@
 //! The rows over the sampling period, and the search for an input that meets them.
 //!
-//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`]) is
-//! not, because the state at the end of the period depends on u through the plant. Newton's method on the rows solves it:
-//! linearise at the present candidate, solve the QP, and go towards its answer. Each step goes as far as the violation of
-//! the rows that the QP does not give up decreases, halving the way. Only rows that are active or violated are linearised
-//! anew. The others keep their last linearisation, at first the pointwise row. All are evaluated where the search ends.
+//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`])
+//! is not, because the state at the end of the period depends on u through the plant. Newton's method on the rows
+//! solves it: linearise at the present candidate, solve the QP, and go towards its answer. Each step goes as far as
+//! the violation of the rows that the QP does not give up decreases, halving the way. Only rows that are active or
+//! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
+//! evaluated where the search ends.
 //!
-//! There are two candidates to start from: the answer of the pointwise rows, and the input of the step before. The better
-//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second candidate
-//! matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn that was begun on
-//! through the instants at which the linearisation cannot see it. It is left out where the first has met every row by full
-//! steps that became shorter tenfold each, and is no further from u_ref than the last input is. The rows are all but affine
-//! there, and the answer is the only one near. Answers that differ by round-off count as equal, so a sample taken again
-//! gives the same bits.
+//! There are two candidates to start from: the answer of the pointwise rows, and the input of the step before. The
+//! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
+//! candidate matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
+//! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
+//! has met every row by full steps that became shorter tenfold each, and is no further from u_ref than the last input
+//! is. The rows are all but affine there, and the answer is the only one near. Answers that differ by round-off count
+//! as equal, so a sample taken again gives the same bits.
 //!
 //! An answer is settled where its steps contracted like that, or where both candidates end at it. Two answers are not
-//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside: the row
-//! that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where it could turn
-//! to either side is at rest between two such answers. So a master that takes a step again, or cuts it in two, gets the same
-//! input. From any answer that is not settled, above all from one that does not meet the rows, the module `wide` searches
-//! on. Its answer takes the place only if it meets all hard rows and is nearer, so what is right keeps its bits. Rows that
-//! cannot be met together are given up as the QP says, by priority.
+//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside:
+//! the row that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where
+//! it could turn to either side is at rest between two such answers. So a master that takes a step again, or cuts it
+//! in two, gets the same input. From any answer that is not settled, above all from one that does not meet the rows,
+//! the module `wide` searches on. Its answer takes the place only if it meets all hard rows and is nearer, so what is
+//! right keeps its bits. Rows that cannot be met together are given up as the QP says, by priority.
 //!
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
 //! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
@@ -43,7 +44,7 @@ const MET: f64 = 1e-9;
 const ROUND_OFF: f64 = 1e-12;
 /// Answers that differ by no more than this, as a part of their size, count as one.
 const SAME: f64 = 1e-6;
-/// Distance from u_ref, over the size of u_ref and the last input or 1, beyond which the wide search looks at an answer.
+/// Distance from u_ref beyond which an answer is not settled, over the size of u_ref and the last input, or 1.
 const FAR: f64 = 8.0;
 /// Distance aside of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
 const ASIDE: f64 = 0.5;
@@ -68,8 +69,9 @@ pub(super) struct Requirement {
 }
 
 impl Requirement {
-    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the bound
-    /// weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 the divisor is δ.
+    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
+    /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 the
+    /// divisor is δ.
     fn divisor(&self, n: usize) -> f64 {
         let order = self.bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
         (1..=n - order).fold(1.0, |product, i| product * (self.ahead / i as f64))
@@ -185,8 +187,8 @@ impl PeriodProblem<'_> {
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
     }
 
-    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows. The `doubtful` ones are looked at first, and
-    /// alone if one of them is violated.
+    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows. The `doubtful` ones are looked at
+    /// first, and alone if one of them is violated.
     fn is_met_by_reference(&self, u: &mut [f64], doubtful: RowSet, at: &mut Linearised) -> Option<bool> {
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
@@ -199,8 +201,8 @@ impl PeriodProblem<'_> {
         Some(at.worst(RowSet::EMPTY) <= 0.0)
     }
 
-    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is left out
-    /// where the one before met every row by steps that contracted.
+    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is
+    /// left out where the one before met every row by steps that contracted.
     fn descend(
         &self,
         u: &mut [f64],

@@ -9,9 +9,9 @@
 //! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
 //! ```
 //!
-//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft row at
-//! its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
-//! direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
+//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft
+//! row at its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with
+//! one more direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
 //!
 //! # References

@@ -126,8 +126,8 @@ impl BarrierSlot {
         self.promise.relative_degree()
     }
 
-    /// Evaluates h and its derivatives along the plant where the input begins to act (docs/theory.md, sections 1 and 8).
-    /// Returns h at the sample itself.
+    /// Evaluates h and its derivatives along the plant where the input begins to act
+    /// (docs/theory.md, sections 1 and 8). Returns h at the sample itself.
     #[inline]
     pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64]) -> f64 {
         let Self { source, now, .. } = self;
@@ -141,9 +141,9 @@ impl BarrierSlot {
         h
     }
 
-    /// Moves the promise number `index` of `promises` to the sample, where h is `h`: whether it is in force, its anchor, its
-    /// phase, and the least h⁽ⁿ⁾ that keeps it (docs/theory.md, sections 6 and 8). Returns whether the deadline is
-    /// unreachable.
+    /// Moves the promise number `index` of `promises` to the sample, where h is `h`: whether it is in force, its
+    /// anchor, its phase, and the least h⁽ⁿ⁾ that keeps it (docs/theory.md, sections 6 and 8). Returns whether the
+    /// deadline is unreachable.
     ///
     /// # Errors
     ///
@@ -290,8 +290,8 @@ impl BarrierSlot {
         begun && !ended
     }
 
-    /// Anchors `promise` where it waits for that, from the least derivatives `h`. Where samples turn out to be further apart
-    /// than was thought at the anchor, adapts the margin.
+    /// Anchors `promise` where it waits for that, from the least derivatives `h`. Where samples turn out to be
+    /// further apart than was thought at the anchor, adapts the margin.
     #[inline]
     fn anchor(&self, promise: &mut FixedTimeState, moment: &Moment, h: &[f64]) {
         let covered = moment.covered();

@@ -92,8 +92,8 @@ impl SafetyFilter {
         }
     }
 
-    /// Evaluates every barrier, moves its promise to the sample, and forms its row (docs/theory.md, sections 1 and 6 to 8).
-    /// Returns whether all have a row over the period.
+    /// Evaluates every barrier, moves its promise to the sample, and forms its row
+    /// (docs/theory.md, sections 1 and 6 to 8). Returns whether all have a row over the period.
     ///
     /// # Errors
     ///
@@ -133,7 +133,8 @@ impl SafetyFilter {
         found.map(|()| is_sampled)
     }
 
-    /// Asks for (S) at the end of the longest step too, where that is longer than the period (docs/theory.md, section 7).
+    /// Asks for (S) at the end of the longest step too, where that is longer than the period
+    /// (docs/theory.md, section 7).
     fn require_longest(&mut self, moment: &Moment, is_sampled: bool) {
         let Workspace { next, report, requirements, .. } = &mut self.workspace;
         let period = moment.period.filter(|_| is_sampled);
@@ -296,7 +297,7 @@ impl SafetyFilter {
         }
     }
 
-    /// Enforces nothing and gives the admissible input nearest 0. The promises stay as they were, but lose their guarantee.
+    /// Enforces nothing and gives the admissible input nearest 0. Promises stay as they were, but lose their guarantee.
     fn abstain(&mut self, status: Status, u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = status;

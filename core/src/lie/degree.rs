@@ -6,8 +6,8 @@
 //! first; with the higher n it is wrong.
 //!
 //! The orders are read off the gradients of [`barrier_series`] at sample states. At a sample a gradient may vanish by
-//! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of the
-//! sample are asked as well.
+//! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of
+//! the sample are asked as well.
 
 use std::array::from_fn;
 

@@ -1,14 +1,14 @@
 //! The change of the solution of a QP: one linear system.
 //!
-//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Let everything they are
-//! made of move along a direction, and let ϑ' be the change of the multipliers. Then
+//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Let everything they
+//! are made of move along a direction, and let ϑ' be the change of the multipliers. Then
 //!
 //! ```text
 //! N u' − Aᵀ ϑ' = c,   A u' = d,                                                            (7)
 //! ```
 //!
-//! with the Hessian N of the Lagrangian, the change c of its gradient and the change d of the constraints, both at a fixed u
-//! (`docs/theory.md#input-sensitivity`).
+//! with the Hessian N of the Lagrangian, the change c of its gradient and the change d of the constraints, both at a
+//! fixed u (`docs/theory.md#input-sensitivity`).
 
 use nalgebra::{SMatrix, SVector};
 

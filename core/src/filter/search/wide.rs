@@ -1,7 +1,7 @@
-//! The wide search, for samples at which Newton's method from its two candidates ends at no answer that is surely right.
+//! The wide search, for samples at which Newton's method from its two candidates ends at no settled answer.
 //!
-//! A row is F(u) ≥ 0 with F smooth. It is hard where F turns with some inputs: a unicycle that stands across the line of
-//! sight gains by turning either way and then driving either way. Four parts find the nearest of these answers.
+//! A row is F(u) ≥ 0 with F smooth. It is hard where F turns with some inputs: a unicycle that stands across the line
+//! of sight gains by turning either way and then driving either way. Four parts find the nearest of these answers.
 //!
 //! **Scan.** Move one component of u over a grid around u_ref. For each of its values find another component for which
 //! all rows hold, by Newton's method along that axis. An acceleration enters all but affinely, so one or two steps are
@@ -9,8 +9,8 @@
 //! exceed the distance of an input that is known to meet the rows. Keep the local minima over the grid: of the distance
 //! where the rows hold, of the violation elsewhere.
 //!
-//! **Restoration.** Go from there to the rows by the shortest way: the linearised QP with u in place of u_ref. Go back to
-//! a third of the way as long as the violation does not decrease.
+//! **Restoration.** Go from there to the rows by the shortest way: the linearised QP with u in place of u_ref. Go
+//! back to a third of the way as long as the violation does not decrease.
 //!
 //! **Polishing.** Go from an input that meets the rows towards the answer of the linearised QP. Restore each trial (the
 //! correction of second order), and take it where it is nearer to u_ref by a part of what the QP promises. So every
@@ -282,8 +282,8 @@ impl PeriodProblem<'_> {
         *start = best;
     }
 
-    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of their
-    /// demands where they contradict.
+    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of
+    /// their demands where they contradict.
     fn on_axis(&self, start: &Start, axis: usize, relaxed: RowSet, at: &Linearised) -> f64 {
         let m = self.u_ref.len();
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -342,8 +342,8 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that can be
-    /// nearer than `known`.
+    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that can
+    /// be nearer than `known`.
     fn polish(
         &self,
         start: &mut Start,
@@ -379,12 +379,11 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a polished answer, known to about the root of the tolerance, to where the QP linearised there does not
-    /// move it any more.
+    /// Moves from a polished answer, known to about the root of the tolerance, to where the QP linearised there does
+    /// not move it any more.
     ///
-    /// Where the rows curve, full steps towards the QP's answer overshoot. With the last step Δu and the change ΔR of the
-    /// way that is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the
-    /// row.
+    /// Where the rows curve, full steps towards the QP's answer overshoot. With the last step Δu and the change ΔR of
+    /// the way that is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the row.
     fn sharpen(&self, start: &mut Start, relaxed: RowSet, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         let (mut point, mut least) = (*start, f64::INFINITY);

@@ -1,8 +1,8 @@
 //! Several rows: a dual active-set method of the Goldfarb-Idnani family.
 //!
-//! In the variables δ = √W (u − u_ref) the QP is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active
-//! rows, with normals N = Q R (module `factors`) and multipliers λ ≥ 0, give δ = Nλ. Each round takes
-//! the row p that is violated most by its distance, and raises its multiplier by t:
+//! In the variables δ = √W (u − u_ref) the QP is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active rows, with normals N = Q
+//! R (module `factors`) and multipliers λ ≥ 0, give δ = Nλ. Each round takes the row p that is violated most by its
+//! distance, and raises its multiplier by t:
 //!
 //! ```text
 //! a_p = N r + z, Nᵀz = 0:   δ ← δ + t z,   λ ← λ − t r,   λ_p ← λ_p + t
