@@ -24,7 +24,7 @@ pub struct Loop<'a> {
     pub deadlines: &'a [f64],
     /// Time in s from a sample until its input acts, ≥ 0, at most a step; until the first does, 0 acts.
     pub delay: f64,
-    /// Earliest end of a run in which a promise has been broken, in s after the start.
+    /// Time in s after the start from which a run ends once a promise has been broken.
     pub until: f64,
 }
 

@@ -160,7 +160,7 @@ impl FixedTime {
     ///
     /// The first call anchors, as [`Self::anchor`] with the configured deadline and no period does. Arrival is
     /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
-    /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
+    /// it is invariant from there ([`is_invariant`](super::stay::is_invariant)): at the anchor itself for a start well inside.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> DerivativeBound {
         self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
     }

@@ -126,9 +126,9 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 /// 1. The rate is `base` where that affords half the margin, with all that it affords.
 /// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
 ///    rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be
-///    influenced (`means.weight`) or comes back by itself, it is raised by as much as the plant itself pulls h⁽ⁿ⁾
-///    down. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative: nothing is about to be left.
+/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be influenced
+///    (`means.weight`) or comes back by itself, it is raised until the floor is lower by what the plant itself pulls
+///    h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.
@@ -179,7 +179,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
 }
 
 /// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen anew at every sample
-/// ([`Self::choose`]) and are those of the [`Sample`] then.
+/// ([`keep`]) and are those of the [`Sample`] then.
 #[derive(Clone, Copy, Debug)]
 pub struct Stay<'a>(pub &'a FixedTimeSettings);
 
