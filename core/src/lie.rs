@@ -109,7 +109,7 @@ impl Derivatives {
     }
 }
 
-/// A supplier of the derivatives of one barrier. [`along`] makes one from the traits, [`external`] takes the
+/// A supplier of the derivatives of one barrier. [`along`] makes one from the traits, [`external()`] takes the
 /// derivatives from whoever computes them, and a user's own code can be another.
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].

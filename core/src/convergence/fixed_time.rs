@@ -156,11 +156,11 @@ impl FixedTime {
     }
 
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
-    /// returns what the constraint asks for there.
+    /// returns the floor of the constraint there.
     ///
     /// The first call anchors, as [`Self::anchor`] with the configured deadline and no period does. Arrival is
-    /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
-    /// it is invariant from there ([`is_invariant`](super::stay::is_invariant)): at the anchor itself for a start well inside.
+    /// the first sample with h ≥ 0. The stay constraint takes over at the first sample at which h ≥ μ *and* it is
+    /// invariant from there ([`is_invariant`](super::stay::is_invariant)). A start inside is kept from the anchor on.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> DerivativeBound {
         self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
     }

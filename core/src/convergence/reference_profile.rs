@@ -1,7 +1,7 @@
 //! The condition that follows a reference profile: Π (D + a_i)(h − μ − r) ≥ 0.
 //!
 //! The error starts at zero, so h ≥ μ + r for ever (`docs/theory.md#profile`). The profiles themselves are in
-//! [`profile`](super::profile).
+//! [`profile`].
 
 use std::sync::Arc;
 

@@ -65,7 +65,7 @@ fn dot(row: &[f64], u: &[f64]) -> f64 {
 ///
 /// They are taken as they are: nobody checks `n`. Nothing can be predicted, so steps are those of
 /// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise), and the margin has to cover held inputs. For several
-/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded) picks each.
+/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded()) picks each.
 ///
 /// # Errors
 ///
