@@ -16,7 +16,7 @@ use crate::simulation::Schedule;
 pub struct Loop<'a> {
     /// The plant; its states are the first of the filter's.
     pub plant: &'a dyn DynPlant,
-    /// Time in s and the filter's state: what follows the plant's states in it stays as it is.
+    /// Time in s and the filter's state; the part after the plant's states stays as it is.
     pub start: (f64, &'a [f64]),
     /// h is looked at after each of its substeps, and at the deadlines themselves.
     pub schedule: Schedule,

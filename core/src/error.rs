@@ -20,7 +20,7 @@ pub enum ErrorKind {
     Unsupported,
 }
 
-/// Misuse of the library: which field, what was given, what is allowed.
+/// Misuse of the library: the field, the value given and the range allowed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error {
     kind: ErrorKind,
@@ -39,7 +39,7 @@ impl Error {
         self
     }
 
-    /// The relative degree found, where that is what is wrong.
+    /// The relative degree found, where that is the defect.
     pub fn relative_degree(&self) -> Option<&RelativeDegree> {
         self.degree.as_deref()
     }

@@ -264,7 +264,7 @@ where
     macro_rules! by_degree {
         ($($n:literal => $k:literal),*) => {
             match n {
-                // A constant condition: what cannot be is not compiled.
+                // A constant condition: impossible degrees are not compiled.
                 $($n if const { $n <= P::LARGEST_DEGREE } => {
                     Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
                 })*

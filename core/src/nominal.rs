@@ -1,8 +1,8 @@
 //! Nominal controllers: something sensible for u_ref, without any promise.
 //!
-//! A filter changes u_ref as little as its rows ask, so what a closed loop looks like is decided by the
-//! nominal controller: with u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`]
-//! is the least that belongs into every loop; [`Heading`] drives to a goal.
+//! A filter changes u_ref as little as its rows ask, so the nominal controller decides how a closed loop looks: with
+//! u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs into every
+//! loop; [`Heading`] drives to a goal.
 
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;

@@ -136,7 +136,7 @@ impl Anchoring<'_> {
 /// The choice of a condition at an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchored {
-    /// μ in `[h]`: the settings' margin and what held inputs cost.
+    /// μ in `[h]`: the settings' margin and the expected cost of held inputs.
     pub margin: f64,
     /// a in 1/s.
     pub rate: f64,
@@ -153,7 +153,7 @@ pub struct Abilities {
     /// The stay constraint takes over inside the set. Without it the condition is enforced for ever, and the phases tell
     /// only what is seen.
     pub hands_over: bool,
-    /// Its margin covers what held inputs cost, and changes where samples turn out to be further apart.
+    /// Its margin covers the cost of held inputs, and changes where samples turn out to be further apart.
     pub covers_holds: bool,
     /// It may start anew on the way at any time, and its theorem then applies again.
     pub restarts: bool,

@@ -21,7 +21,7 @@ use super::state::FixedTimeState;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// The derivatives of a [`DerivativeBound`](super::DerivativeBound), of the margin and of a [`PeriodBound`] along one
-/// direction: each in the unit of what it is the derivative of, over that of the direction.
+/// direction: each in the unit of its number, over that of the direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BoundDerivative {

@@ -74,7 +74,7 @@ pub struct FixedTimeSettings {
     /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
     /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
     pub recovery: Option<f64>,
-    /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on what the model does not know of h⁽ⁿ⁾, such as L_wL_f^{n−1}h w for a
+    /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on the part of h⁽ⁿ⁾ that the model lacks, such as L_wL_f^{n−1}h w for a
     /// disturbance w. The constraint asks for as much more, so the promise holds for every disturbance within
     /// the bound. A disturbance must enter h⁽ⁿ⁾ only, and no earlier derivative. Default: 0.
     pub disturbance: f64,

@@ -68,7 +68,7 @@ pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     for k in 1..h.len() {
         power *= rate;
         let margin = scaled_coefficient(rate, h, k) / power;
-        // Not `f64::min`, which would drop what is not a number.
+        // Not `f64::min`, which would drop not-a-number.
         if margin < least || margin.is_nan() {
             least = margin;
         }
@@ -126,9 +126,10 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 /// 1. The rate is `base` where that affords half the margin, with all that it affords.
 /// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
 ///    rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be influenced
-///    (`means.weight`) or comes back by itself, it is raised until the floor is lower by what the plant itself pulls
-///    h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be
+///    influenced (`means.weight`) or comes back by itself, it is raised until the floor is lower by what the plant
+///    itself pulls h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is
+///    about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.
@@ -236,7 +237,7 @@ impl Stay<'_> {
 
     /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
     fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
-        /// The part of what bounds allow that is used where there is time.
+        /// The part of the largest h⁽ⁿ⁾ within the bounds that is used where there is time.
         const COMFORTABLE: f64 = 0.5;
         let settings = self.0;
         if let Some(rate) = settings.stay_rate.or(settings.rate) {
@@ -277,7 +278,7 @@ impl Condition for Stay<'_> {
 /// The part of e that is being lost, for n = 2: 0 where ė ≥ a e, 1 where ė ≤ 0. For other n it is 1.
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
-    // Not `clamp`, which keeps what is not a number: 0/0 at rest on the boundary.
+    // Not `clamp`, which keeps not-a-number: 0/0 at rest on the boundary.
     if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
 }
 

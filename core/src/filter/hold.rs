@@ -46,7 +46,7 @@ pub(super) struct Lowest {
 
 impl Lowest {
     pub(super) fn or(self, other: Self) -> Self {
-        // What is not a number counts as lowest.
+        // Not-a-number counts as lowest.
         if self.h < other.h || self.h.is_nan() { self } else { other }
     }
 }
@@ -70,7 +70,7 @@ impl Hold<'_> {
             self.walk([from, to], scratch, &mut fine[..=2 * parts])?;
             let mut differ = 0.0;
             for (a, b) in coarse[..=parts].iter().zip(fine.iter().step_by(2)) {
-                // Not `max`, which would drop what is not a number.
+                // Not `max`, which would drop not-a-number.
                 let by = (a.h - b.h).abs() + (to - from) / parts as f64 * (a.slope - b.slope).abs();
                 differ = if by <= differ { differ } else { by };
             }

@@ -98,7 +98,7 @@ impl Integrator {
         self.value
     }
 
-    /// Puts back what [`Self::value`] returned; the nearest within the limits.
+    /// Restores a value that [`Self::value`] returned, or the nearest within the limits.
     pub fn set_value(&mut self, value: f64) {
         self.value = self.limited(value);
     }

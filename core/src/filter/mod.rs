@@ -172,7 +172,7 @@ impl SafetyFilter {
         &self.state
     }
 
-    /// Puts back what [`Self::state`] returned: the filter goes on exactly as it would have then.
+    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then.
     ///
     /// # Errors
     ///

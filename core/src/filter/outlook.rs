@@ -87,7 +87,7 @@ impl Outlook<'_> {
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
         let size = promise.anchor[0].abs() + promise.margin + h.abs();
-        // What is not a number is no promise.
+        // Not-a-number keeps no promise.
         (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
     }
 

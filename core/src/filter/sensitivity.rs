@@ -291,7 +291,7 @@ impl SafetyFilter {
             }
         }
 
-        // What follows u in the report: slack and sampling loss.
+        // The numbers of the report that follow u: slack and sampling loss.
         for (i, (b, row_derivative)) in barriers.iter_mut().zip(&row_derivatives).enumerate() {
             b.slack = row_derivative.slack + dot(&rows[i].normal, du);
             let loss = report.barriers[i].sampling_loss;

@@ -41,8 +41,8 @@ pub enum End {
 /// The standing of a barrier's constraint where not all can be met within the input bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Strictness {
-    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: what is safe is kept before
-    /// what is promised is reached.
+    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: keeping safe sets goes before reaching
+    /// promised ones.
     #[default]
     KeepFirst,
     /// Hard: met as far as the bounds and the barriers of smaller numbers allow; of equal ones the one added

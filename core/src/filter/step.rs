@@ -254,7 +254,8 @@ impl SafetyFilter {
         requirements.len() > before
     }
 
-    /// Reports the step, and what becomes of each promise (docs/theory.md, section 7).
+    /// Reports the step, and notes for each promise whether it was met and is still guaranteed
+    /// (docs/theory.md, section 7).
     fn report_on(&mut self, moment: &Moment, solution: Solution, u: &[f64]) {
         let Workspace { next, report, rows, requirements, qp, .. } = &mut self.workspace;
         if moment.measures && self.state.time.is_some_and(|last| moment.t > last) {

@@ -115,7 +115,7 @@ fn affine<const N: usize>(p: &Problem, constraint: Constraint) -> Option<([f64; 
     Some((normal, floor))
 }
 
-/// Whether `u` satisfies the conditions with room to spare, `active` being what holds it.
+/// Whether `u`, held by `active`, satisfies the conditions with room to spare.
 fn is_strict<const N: usize>(
     p: &Problem,
     active: &[Constraint],
