@@ -5,8 +5,8 @@ use std::hint::black_box;
 
 use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
-use punctual_core::plants::{PointMass, Unicycle};
 use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
+use punctual_reference::plants::{PointMass, Unicycle};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
 mod support;

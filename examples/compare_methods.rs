@@ -9,8 +9,8 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{self, Vector2, Vector4, vector};
-use punctual_core::plants::Unicycle;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::Unicycle;
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 const CENTRE: [f64; 2] = [45.0, 45.0]; // m
 const RADIUS: f64 = 2.0; // m

@@ -11,7 +11,7 @@ use punctual_core::filter::{BarrierSettings, SafetyFilter};
 use punctual_core::lie;
 use punctual_core::nalgebra::{self, SMatrix, SVector, Vector4, matrix, vector};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// M. W. Spong's single-link arm, in unit-free numbers of a small robot. State: angle q of the arm
 /// from hanging (rad), its rate, angle of the motor (rad), its rate; input: motor torque in N m.

@@ -10,7 +10,7 @@ use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, SafetyFilter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// State: height in m, speed in m/s, acceleration in m/s²; input: jerk in m/s³.
 #[derive(Clone, Copy)]

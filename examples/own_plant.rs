@@ -9,7 +9,7 @@ use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, SafetyFilter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// State: position in m and velocity in m/s; input: acceleration in m/s².
 struct Cart {

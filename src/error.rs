@@ -125,10 +125,10 @@ impl fmt::Display for CallFailure {
         }
         match self.status {
             None => f.write_str(" returned no instance")?,
-            Some(Status::Discard) => {
+            Some(Status::DISCARD) => {
                 f.write_str(" returned fmi2Discard: it refuses this step, and steps are not retried")?;
             }
-            Some(Status::Pending) => {
+            Some(Status::PENDING) => {
                 f.write_str(" returned fmi2Pending: asynchronous steps are not supported")?;
             }
             Some(status) => write!(f, " returned {status}")?,

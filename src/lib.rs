@@ -13,10 +13,9 @@
 //! plot                 pictures of series; knows no FMU
 //! pictures             from a system file's plots and a recording to pictures
 //! package              from a configuration to an .fmu file, from a system to an .ssp file, FMUs merged
-//! demo                 the demonstration: three plants, two methods
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! output               the one place that prints
-//! reproduce            the study: the paper's tables and figures beside ours and those of the literature
+//! reproduce            the study: the paper's tables and figures beside ours and the literature's; the demonstration
 //! command              one thin function per subcommand
 //! ```
 #![deny(unsafe_code)]
@@ -24,7 +23,6 @@
 pub mod campaign;
 pub mod command;
 pub mod coupling;
-pub mod demo;
 pub mod error;
 #[expect(unsafe_code, reason = "FMUs are shared libraries called through C")]
 pub mod host;

@@ -9,8 +9,8 @@ use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{SMatrix, SVector};
-use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
+use punctual_reference::plants::PointMass;
 
 /// A time and state at which the row is active after anchoring at the origin at time 0.
 pub(crate) const T: f64 = 4.0;

@@ -139,7 +139,7 @@ pub fn chain(from: &[f64], input: [f64; 2], time: [f64; 2]) -> [f64; 2] {
 /// use punctual_core::barriers::DistanceDisc;
 /// use punctual_core::dynamics::IntegratedInput;
 /// use punctual_core::lie::{RelativeDegree, detected};
-/// use punctual_core::plants::SmallSlipBicycle;
+/// use punctual_reference::plants::SmallSlipBicycle;
 ///
 /// let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let bicycle = SmallSlipBicycle::new(10.0)?;
@@ -217,7 +217,7 @@ where
 /// use punctual_core::barriers::{DistanceDisc, Outside};
 /// use punctual_core::dynamics::WithPoint;
 /// use punctual_core::filter::{BarrierSettings, SafetyFilter};
-/// use punctual_core::plants::Unicycle;
+/// use punctual_reference::plants::Unicycle;
 ///
 /// // State (x_p, y_p, θ, v, p_x, p_y, v_x, v_y).
 /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
@@ -323,7 +323,7 @@ where
 }
 
 /// As [`rk4_step`], for any `derivative` of the state.
-pub(crate) fn rk4<const NX: usize>(
+pub fn rk4<const NX: usize>(
     derivative: impl Fn(&SVector<f64, NX>) -> SVector<f64, NX>,
     x: &SVector<f64, NX>,
     dt: f64,

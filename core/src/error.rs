@@ -30,7 +30,8 @@ pub struct Error {
 }
 
 impl Error {
-    pub(crate) fn new(kind: ErrorKind, field: impl Into<String>, message: impl Into<String>) -> Self {
+    /// An error about `field`; `message` says what was found and what is allowed, such as "is -1, must be > 0".
+    pub fn new(kind: ErrorKind, field: impl Into<String>, message: impl Into<String>) -> Self {
         Self { kind, field: field.into(), message: message.into(), degree: None }
     }
 
@@ -76,7 +77,11 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 /// `Ok(value)` if `value` is finite and > 0.
-pub(crate) fn positive(field: &str, value: f64) -> Result<f64, Error> {
+///
+/// # Errors
+///
+/// Otherwise, an error that names `field`.
+pub fn positive(field: &str, value: f64) -> Result<f64, Error> {
     if value.is_finite() && value > 0.0 {
         Ok(value)
     } else {
@@ -85,7 +90,11 @@ pub(crate) fn positive(field: &str, value: f64) -> Result<f64, Error> {
 }
 
 /// `Ok(value)` if `value` is finite and ≥ 0.
-pub(crate) fn non_negative(field: &str, value: f64) -> Result<f64, Error> {
+///
+/// # Errors
+///
+/// Otherwise, an error that names `field`.
+pub fn non_negative(field: &str, value: f64) -> Result<f64, Error> {
     if value.is_finite() && value >= 0.0 {
         Ok(value)
     } else {
@@ -94,7 +103,11 @@ pub(crate) fn non_negative(field: &str, value: f64) -> Result<f64, Error> {
 }
 
 /// `Ok(value)` if `value` is finite.
-pub(crate) fn finite(field: &str, value: f64) -> Result<f64, Error> {
+///
+/// # Errors
+///
+/// Otherwise, an error that names `field`.
+pub fn finite(field: &str, value: f64) -> Result<f64, Error> {
     if value.is_finite() {
         Ok(value)
     } else {
@@ -103,8 +116,12 @@ pub(crate) fn finite(field: &str, value: f64) -> Result<f64, Error> {
 }
 
 /// `Ok(())` if `found` equals `wanted`.
+///
+/// # Errors
+///
+/// Otherwise, an error that names `field`.
 #[inline]
-pub(crate) fn length(field: &str, found: usize, wanted: usize) -> Result<(), Error> {
+pub fn length(field: &str, found: usize, wanted: usize) -> Result<(), Error> {
     #[cold]
     fn wrong(field: &str, found: usize, wanted: usize) -> Error {
         Error::new(ErrorKind::Dimension, field, format!("has {found} components, must have {wanted}"))

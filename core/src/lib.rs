@@ -7,7 +7,7 @@
 //! ```
 //! use punctual_core::barriers::DistanceDisc;
 //! use punctual_core::filter::{BarrierSettings, SafetyFilter};
-//! use punctual_core::plants::PointMass;
+//! use punctual_reference::plants::PointMass;
 //!
 //! // Reach the disc of radius 2 m around (45, 45) within 10 s.
 //! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
@@ -48,9 +48,9 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
-//! bounded inputs can do); [`filter`]; [`plants`], [`barriers`], [`nominal`], [`baselines`] (constraints of the
-//! literature) and [`simulation`] are reference material beside it, [`judge`] says what became of a promise, and
-//! [`effort`] compares what filters need.
+//! bounded inputs can do); [`filter`]. Beside it, [`barriers`] are regions and limits to use, and [`judge`] says what became
+//! of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
+//! `punctual-reference`.
 //!
 //! # References
 //!
@@ -62,21 +62,16 @@
 
 pub mod barrier;
 pub mod barriers;
-pub mod baselines;
 pub mod convergence;
 pub mod dynamics;
-pub mod effort;
-mod error;
+pub mod error;
 pub mod filter;
 pub mod jet;
 pub mod judge;
 pub mod lie;
-pub mod nominal;
-pub mod plants;
 pub mod qp;
 pub mod reach;
 pub mod scalar;
-pub mod simulation;
 
 pub use error::{Error, ErrorKind};
 pub use nalgebra;

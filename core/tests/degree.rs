@@ -8,10 +8,10 @@ use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
 use punctual_core::lie::{self, Derivatives, RelativeDegree, detected, relative_degree};
 use punctual_core::nalgebra::{SMatrix, SVector, Vector4, vector};
-use punctual_core::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Steering, Unicycle};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
 use punctual_core::{Error, ErrorKind};
+use punctual_reference::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Steering, Unicycle};
+use punctual_reference::simulation::{Schedule, closed_loop};
 use support::{
     Cart, Chain4, Chain8, Exponential, Logarithmic, MovingDisc, Powers, SecondState, SpeedLimit, Uncoupled,
     bicycle, distance_disc, quadratic_disc,

@@ -11,9 +11,9 @@ use punctual_core::filter::{
 };
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
-use punctual_core::plants::{PointMass, Unicycle};
 use punctual_core::qp::Solver;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, goal, one, quadratic_disc, speed_damping};
 
 /// One step; returns the input with the report's status.

@@ -5,16 +5,16 @@ mod draw;
 
 use punctual_core::barriers::{DistanceDisc, HalfPlane, Rectangle};
 use punctual_core::dynamics::{ControlAffine, chain, rk4_step};
-use punctual_core::effort::smallest;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Infeasible, Phase, ProfileKind, SafetyFilter};
 use punctual_core::nalgebra::{SMatrix, SVector};
-use punctual_core::plants::{
-    Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, SmallSlipBicycleWithRate, Unicycle,
-};
 use punctual_core::qp::Bounds;
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
 use punctual_core::{barrier::Barrier, lie, reach};
+use punctual_reference::effort::smallest;
+use punctual_reference::plants::{
+    Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, SmallSlipBicycleWithRate, Unicycle,
+};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// A point whose velocity is the input.
 #[derive(Clone, Copy)]

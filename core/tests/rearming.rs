@@ -9,8 +9,8 @@ use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, Phase, SafetyFilter, Sampling};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
-use punctual_core::plants::Unicycle;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::Unicycle;
+use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, distance_disc, goal, speed_damping};
 
 /// A gust throws the vehicle out of the disc: with a recovery time it is back within that time, each
@@ -37,7 +37,7 @@ fn leaving_rearms_with_the_recovery_time() {
             assert!((b.time_left - (recovery - since)).abs() < 1e-9, "at {t}");
         }
         assert!(gusts == 0 || since < recovery || b.h >= 0.0, "h = {} at {t}", b.h);
-        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+        x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
     }
 }
 
@@ -179,7 +179,7 @@ fn a_new_deadline_on_the_way() {
                 assert!((b.time_left - (end - t)).abs() < 1e-9, "at {t}");
             }
             assert!(t < end || b.h >= 0.0, "{deadline}: h = {} at {t}", b.h);
-            x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+            x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
         }
     }
     let mut filter = goal(BarrierSettings::within(5.0));
@@ -198,7 +198,7 @@ fn a_moved_set_on_the_way() {
         let t = f64::from(k) * step;
         if (t - moved_at).abs() < 1e-9 {
             let disc = DistanceDisc::new([20.0, 60.0], 2.0, 2.0).expect("valid disc");
-            let source = lie::along(punctual_core::plants::PointMass, disc, 2).expect("in range");
+            let source = lie::along(punctual_reference::plants::PointMass, disc, 2).expect("in range");
             filter.set_source(0, source).expect("the same dimensions");
         }
         let u_ref = [-x[2], -x[3]];
@@ -206,12 +206,12 @@ fn a_moved_set_on_the_way() {
         assert!(b.guaranteed, "at {t}: {b:?}");
         let promised = (5.0..moved_at - 1e-9).contains(&t) || t >= moved_at + 5.0;
         assert!(!promised || b.h >= 0.0, "h = {} at {t}", b.h);
-        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
+        x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
     }
     let other = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.x: has 2 components, must have 4");
-    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 1).expect("in range");
+    let other = lie::along(punctual_reference::plants::PointMass, distance_disc(), 1).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.relative_degree: is 1, must stay 2");
 }

@@ -9,8 +9,8 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SVector, vector};
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, speed_damping};
 
 const DEADLINE: f64 = 5.0;

@@ -18,8 +18,8 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SMatrix, SVector};
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
 /// xorshift64*: the same everywhere.
 struct Random(u64);

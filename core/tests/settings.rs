@@ -5,9 +5,9 @@ mod scenario;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, FilterState, Method, SafetyFilter};
 use punctual_core::lie;
-use punctual_core::plants::{Bicycle, PointMass};
-use punctual_core::simulation::{Schedule, closed_loop};
 use punctual_core::{Error, ErrorKind};
+use punctual_reference::plants::{Bicycle, PointMass};
+use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, goal};
 
 /// A filter with these settings and bounds, valid if they are.

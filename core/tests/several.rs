@@ -6,7 +6,7 @@ use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, State
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, Begin, End, FilterBuilder, Phase, SafetyFilter, Status};
 use punctual_core::nalgebra::SVector;
-use punctual_core::plants::PointMass;
+use punctual_reference::plants::PointMass;
 
 fn disc(x: f64, y: f64) -> DistanceDisc {
     DistanceDisc::new([x, y], 2.0, 2.0).expect("valid disc")

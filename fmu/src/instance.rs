@@ -11,7 +11,7 @@
 mod access;
 mod derivative;
 
-use punctual_modeldescription::{BaseType, Causality, VariableKind};
+use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
 use crate::configuration::{Configuration, ConfigurationError};
@@ -548,10 +548,12 @@ impl Instance {
     fn start_values(&mut self) {
         for (i, variable) in self.product.variables.iter().enumerate() {
             match &variable.kind {
-                VariableKind::Real { start: Some(start), .. } => self.values.reals[i] = *start,
-                VariableKind::Boolean { start: Some(start) } => self.values.booleans[i] = *start,
-                VariableKind::Integer { start: Some(start), .. }
-                | VariableKind::Enumeration { start: Some(start), .. } => self.values.integers[i] = *start,
+                VariableKind::Real(Real { start: Some(start), .. }) => self.values.reals[i] = *start,
+                VariableKind::Boolean(Plain { start: Some(start), .. }) => self.values.booleans[i] = *start,
+                VariableKind::Integer(Integer { start: Some(start), .. })
+                | VariableKind::Enumeration(Integer { start: Some(start), .. }) => {
+                    self.values.integers[i] = *start;
+                }
                 _ => {}
             }
         }

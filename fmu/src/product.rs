@@ -3,17 +3,20 @@
 //! The table built here is the only place that knows value references; the XML file and the accessors
 //! of the running instance are both read from it.
 
+mod outputs;
+
+pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
+
 use punctual_core::filter::{Phase, Status};
 use punctual_modeldescription::{
-    Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory,
-    ModelDescription, NamingConvention, Unit, Variability, Variable, VariableKind,
+    Causality, CoSimulation, DefaultExperiment, EnumerationItem, Integer, LogCategory, ModelDescription,
+    NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
 };
 use uuid::Uuid;
 
 use crate::configuration::{
     BarrierInput, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
-    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, over_seconds,
-    quantity,
+    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, quantity,
 };
 
 /// Log categories: name and meaning.
@@ -51,9 +54,6 @@ pub struct Layout {
     /// One past the last parameter.
     pub end: usize,
 }
-
-/// Outputs of one barrier, in the order of the table.
-pub const BARRIER_OUTPUTS: usize = 13;
 
 impl Product {
     /// Derives everything from a completed configuration.
@@ -107,7 +107,7 @@ impl Product {
                 ..CoSimulation::default()
             },
             units: units(&self.variables),
-            enumerations: match &self.configuration {
+            types: match &self.configuration {
                 Configuration::Filter(_) => vec![status_type(), phase_type()],
                 Configuration::Plant(_) | Configuration::Controller(_) => Vec::new(),
             },
@@ -115,7 +115,7 @@ impl Product {
                 .map(|(name, description)| LogCategory { name: name.into(), description: description.into() })
                 .into(),
             default_experiment: Some(DefaultExperiment {
-                start_time: experiment.start_time,
+                start_time: Some(experiment.start_time),
                 stop_time: Some(experiment.stop_time),
                 step_size: Some(experiment.step_size),
                 tolerance: None,
@@ -139,18 +139,14 @@ fn guid(canonical: &str, variables: &[Variable]) -> String {
 
 /// The units used. One that [`base_unit`] cannot read is left out, and the XML is then refused.
 fn units(variables: &[Variable]) -> Vec<Unit> {
-    let mut names: Vec<&str> = variables
-        .iter()
-        .filter_map(|v| match &v.kind {
-            VariableKind::Real { unit, .. } => unit.as_deref(),
-            _ => None,
-        })
-        .collect();
+    let mut names: Vec<&str> = variables.iter().filter_map(|v| v.kind.unit()).collect();
     names.sort_unstable();
     names.dedup();
     names
         .into_iter()
-        .filter_map(|name| Some(Unit { name: name.to_owned(), base: base_unit(name)? }))
+        .filter_map(|name| {
+            Some(Unit { name: name.to_owned(), base: Some(base_unit(name)?), ..Unit::default() })
+        })
         .collect()
 }
 
@@ -160,50 +156,22 @@ const STATUS: &str = "Status";
 /// The enumeration type of `<barrier>.phase`.
 const PHASE: &str = "Phase";
 
-fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> EnumerationType {
+fn enumeration(name: &str, description: &str, items: &[(&str, i32, &str)]) -> SimpleType {
     let item = |&(name, value, description): &(&str, i32, &str)| EnumerationItem {
         name: name.into(),
         value,
         description: description.into(),
     };
-    EnumerationType {
-        name: name.into(),
-        description: description.into(),
-        items: items.iter().map(item).collect(),
-    }
+    SimpleType::enumeration(name, description, items.iter().map(item).collect())
 }
 
-/// The name and meaning of a status, as importers see them.
-pub fn describe(status: Status) -> (&'static str, &'static str) {
-    match status {
-        Status::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
-        Status::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
-        Status::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
-        Status::NoAuthority => ("no_authority", "the barrier cannot be influenced at this state"),
-        Status::InvalidInput => ("invalid_input", "an input is not a number or infinite: u nearest 0"),
-        Status::Singular => ("singular", "the model is not finite at this state: u nearest 0"),
-        Status::WrongRelativeDegree => {
-            ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
-        }
-        Status::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
-    }
-}
-
-fn status_type() -> EnumerationType {
-    let items = Status::ALL.map(|s| (describe(s).0, s as i32, describe(s).1));
+fn status_type() -> SimpleType {
+    let items = Status::ALL.map(|status| (status.name(), status as i32, status.meaning()));
     enumeration(STATUS, "What the filter's input means", &items)
 }
 
-fn phase_type() -> EnumerationType {
-    let items = [
-        ("waiting", Phase::Waiting, "no step with valid inputs yet"),
-        ("approach", Phase::Approach, "on the way, before the deadline"),
-        ("late", Phase::Late, "the deadline passed outside; the approach goes on"),
-        ("stay", Phase::Stay, "inside, and kept there"),
-        ("left", Phase::Left, "outside again; pulled back without a deadline"),
-        ("released", Phase::Released, "let go: nothing is asked any more"),
-    ]
-    .map(|(name, phase, description)| (name, phase as i32, description));
+fn phase_type() -> SimpleType {
+    let items = Phase::ALL.map(|phase| (phase.name(), phase as i32, phase.meaning()));
     enumeration(PHASE, "Where a barrier stands with its promise", &items)
 }
 
@@ -225,7 +193,7 @@ impl Table {
         let value_reference = self.variables.len() as u32;
         let variability = match (causality, &kind) {
             (Causality::Parameter, _) => Variability::Fixed,
-            (_, VariableKind::Real { .. }) => Variability::Continuous,
+            (_, VariableKind::Real(_)) => Variability::Continuous,
             _ => Variability::Discrete,
         };
         self.variables.push(Variable {
@@ -261,14 +229,14 @@ impl Table {
     }
 
     fn parameter<C>(&mut self, row: &Parameter<C>, configuration: &mut C) {
-        let kind = VariableKind::Real {
+        let kind = VariableKind::Real(Real {
             start: Some(row.get(configuration)),
             min: row.range.min,
             max: row.range.max,
-            nominal: None,
             quantity: quantity(&row.unit),
             unit: Some(row.unit.clone().into_owned()),
-        };
+            ..Real::default()
+        });
         self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
         self.ranges.push(row.range);
     }
@@ -291,14 +259,12 @@ impl Table {
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
-    VariableKind::Real {
+    VariableKind::Real(Real {
         start,
-        min: None,
-        max: None,
-        nominal: None,
         quantity: quantity(unit),
         unit: Some(unit.to_owned()),
-    }
+        ..Real::default()
+    })
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
@@ -306,7 +272,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     let mut table = Table::default();
     for state in states {
         let measured = table.signal("x", state, "measured ", Causality::Input);
-        if let VariableKind::Real { start, min, max, .. } = &mut measured.kind {
+        if let VariableKind::Real(Real { start, min, max, .. }) = &mut measured.kind {
             (*start, *min, *max) = (Some(state.range().nearest(0.0)), state.min, state.max);
         }
     }
@@ -317,7 +283,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     for input in inputs {
         table.signal("u_ref", input, "wanted ", Causality::Input);
     }
-    let rearm = VariableKind::Boolean { start: Some(false) };
+    let rearm = VariableKind::Boolean(Plain { start: Some(false), declared_type: None });
     table.add("rearm".into(), "a rising edge starts every deadline anew", Causality::Input, rearm);
 
     let outputs = table.variables.len();
@@ -325,37 +291,19 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     for input in inputs {
         table.signal("u", input, "safe ", output);
     }
-    let enumerated = |t: &str| VariableKind::Enumeration { declared_type: t.into(), start: None };
+    let enumerated = |t: &str| VariableKind::enumeration(t);
     table.add("status".into(), "what u means", output, enumerated(STATUS));
     for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
         let unit = &barrier.unit(&c.plant);
-        let rate_unit = &over_seconds(unit, degree);
-        let name = |field: &str| format!("{}.{field}", barrier.name);
-        let flag = || VariableKind::Boolean { start: None };
-        let count = || VariableKind::Integer { start: None, min: Some(0), max: None };
-        let first = table.variables.len();
-        table.add(name("h"), "barrier; the state is safe where it is >= 0", output, real(None, unit));
-        table.add(name("profile"), "lower bound on h that is promised now", output, real(None, unit));
-        table.add(name("time_left"), "time to the deadline, 0 from then on", output, real(None, "s"));
-        let slack = "row times u minus its floor; < 0: the constraint is violated by that much";
-        table.add(name("slack"), slack, output, real(None, rate_unit));
-        let margin = "h to arrive and stay above: the parameter, and what held inputs are expected to cost";
-        table.add(name("margin_used"), margin, output, real(None, unit));
-        let loss = "how far below its promise h may fall within the step because u is held";
-        table.add(name("sampling_loss"), loss, output, real(None, unit));
-        let unmet = "steps in a row that did not meet the constraint, this one included";
-        table.add(name("unmet_steps"), unmet, output, count());
-        let postponed = "how often a deadline that is lost was given up for a later one";
-        table.add(name("postponed"), postponed, output, count());
-        table.add(name("arrived"), "h >= 0 has been reached", output, flag());
-        let guaranteed = "the theorem behind the phase applies: conditions met, every step since satisfied";
-        table.add(name("guaranteed"), guaranteed, output, flag());
-        let late = "no input within the bounds is inside at the deadline, or it passed outside";
-        table.add(name("deadline_unreachable"), late, output, flag());
-        let deadlocked = "other barriers block the way, and h does not rise: needs another u_ref";
-        table.add(name("deadlocked"), deadlocked, output, flag());
-        table.add(name("phase"), "where the barrier stands", output, enumerated(PHASE));
-        debug_assert_eq!(table.variables.len() - first, BARRIER_OUTPUTS);
+        for row in &BARRIER_OUTPUTS {
+            let kind = match row.reading {
+                Reading::Real(own, ..) => real(None, &own.of_barrier(unit, degree)),
+                Reading::Count(_) => VariableKind::Integer(Integer { min: Some(0), ..Integer::default() }),
+                Reading::Flag(_) => VariableKind::Boolean(Plain::default()),
+                Reading::Phase => enumerated(PHASE),
+            };
+            table.add(format!("{}.{}", barrier.name, row.name), row.description, output, kind);
+        }
     }
     if let Some(integrator) = &c.integrator {
         let (name, inputs) = (&integrator.state, c.commanded());
@@ -419,8 +367,8 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
         table.signal("u_ref", &input.into(), "wanted ", Causality::Output).dependencies = Some(dependencies);
     }
     if c.controller == ControllerName::Waypoints {
-        let kind =
-            VariableKind::Integer { start: None, min: Some(1), max: i32::try_from(c.points.len()).ok() };
+        let max = i32::try_from(c.points.len()).ok();
+        let kind = VariableKind::Integer(Integer { min: Some(1), max, ..Integer::default() });
         let waypoint = "which of the points is the goal, from 1";
         let position = if c.direct_feedthrough { vec![0, 1] } else { Vec::new() };
         table.add("waypoint".into(), waypoint, Causality::Output, kind).dependencies = Some(position);

@@ -282,27 +282,20 @@ impl Field for bool {
     }
 }
 
-/// Enumerations in one byte: a value that is missing here does not compile.
-macro_rules! enumeration {
-    ($kind:ident { $($value:ident = $byte:literal),* $(,)? }) => {
-        impl Field for $kind {
-            const SIZE: usize = 1;
+/// Its number, in one byte.
+impl Field for Phase {
+    const SIZE: usize = 1;
 
-            fn write(&self, out: &mut Vec<u8>) {
-                out.push(match self { $(Self::$value => $byte),* });
-            }
+    fn write(&self, out: &mut Vec<u8>) {
+        out.push(*self as u8);
+    }
 
-            fn read(input: &mut Reader) -> Result<Self, Failure> {
-                match u8::read(input)? {
-                    $($byte => Ok(Self::$value),)*
-                    other => Err(format!("is {other}, which is no {}", stringify!($kind))),
-                }
-            }
-        }
-    };
+    fn read(input: &mut Reader) -> Result<Self, Failure> {
+        let number = u8::read(input)?;
+        let known = Self::ALL.into_iter().find(|phase| *phase as u8 == number);
+        known.ok_or_else(|| format!("is {number}, which is no Phase"))
+    }
 }
-
-enumeration!(Phase { Waiting = 0, Approach = 1, Late = 2, Stay = 3, Left = 4, Released = 5 });
 
 impl Field for Mode {
     const SIZE: usize = 1;

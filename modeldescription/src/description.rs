@@ -1,6 +1,8 @@
 //! The model description as plain data.
 
-use crate::{Unit, Variable};
+use crate::words::words;
+use crate::{Integer, ScalarType, Unit, Variable, VariableKind, xsd};
+use serde::Serialize;
 
 /// How variable names are built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -12,75 +14,128 @@ pub enum NamingConvention {
     Structured,
 }
 
-/// An enumeration type that variables can refer to by name.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct EnumerationType {
+words!(NamingConvention: Flat "flat", Structured "structured");
+
+/// A type that variables can refer to by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimpleType {
     /// The name; not empty, unique among the types, not the name of a variable, one line.
     pub name: String,
     /// Meaning for a human; empty: the attribute is absent.
     pub description: String,
-    /// The items; at least one, names and values unique.
+    /// What it gives to variables that do not say it themselves.
+    pub kind: VariableKind,
+    /// The items of an enumeration; at least one, names and values unique. Of other types none.
     pub items: Vec<EnumerationItem>,
 }
 
+impl SimpleType {
+    /// An enumeration.
+    pub fn enumeration(
+        name: impl Into<String>,
+        description: impl Into<String>,
+        items: Vec<EnumerationItem>,
+    ) -> Self {
+        let kind = VariableKind::Enumeration(Integer::default());
+        Self { name: name.into(), description: description.into(), kind, items }
+    }
+}
+
 /// One value of an enumeration type.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename = "Item")]
 pub struct EnumerationItem {
     /// The name; not empty, one line.
+    #[serde(rename = "@name")]
     pub name: String,
     /// The number that stands for it in the C interface, dimensionless.
+    #[serde(rename = "@value")]
     pub value: i32,
     /// Meaning for a human; empty: the attribute is absent.
+    #[serde(rename = "@description", skip_serializing_if = "String::is_empty")]
     pub description: String,
 }
 
 /// When and how finely to simulate unless the user says otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DefaultExperiment {
     /// Start time in seconds; finite, default 0.
-    pub start_time: f64,
+    #[serde(
+        rename = "@startTime",
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "xsd::optional"
+    )]
+    pub start_time: Option<f64>,
     /// Stop time in seconds; finite and greater than the start time.
+    #[serde(rename = "@stopTime", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub stop_time: Option<f64>,
-    /// Communication step in seconds; finite and greater than 0.
-    pub step_size: Option<f64>,
     /// Relative tolerance, dimensionless; finite and greater than 0.
+    #[serde(
+        rename = "@tolerance",
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "xsd::optional"
+    )]
     pub tolerance: Option<f64>,
+    /// Communication step in seconds; finite and greater than 0.
+    #[serde(rename = "@stepSize", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
+    pub step_size: Option<f64>,
 }
 
 /// A category of log messages that the importer can switch on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LogCategory {
     /// The name as passed to the logger; not empty, unique, one line.
+    #[serde(rename = "@name")]
     pub name: String,
     /// Meaning for a human; empty: the attribute is absent.
+    #[serde(rename = "@description", skip_serializing_if = "String::is_empty")]
     pub description: String,
 }
 
 /// Identity and capabilities of the slave (FMI 2.0.4, section 4.3.1). All flags are false by default.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CoSimulation {
     /// The name of the shared library without its ending: a C identifier in ASCII.
+    #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,
     /// The slave needs another program to run.
+    #[serde(rename = "@needsExecutionTool", skip_serializing_if = "xsd::is_default")]
     pub needs_execution_tool: bool,
     /// The step size may differ from call to call.
+    #[serde(rename = "@canHandleVariableCommunicationStepSize", skip_serializing_if = "xsd::is_default")]
     pub can_handle_variable_step: bool,
     /// The slave uses `fmi2SetRealInputDerivatives`.
+    #[serde(rename = "@canInterpolateInputs", skip_serializing_if = "xsd::is_default")]
     pub can_interpolate_inputs: bool,
     /// Highest derivative that `fmi2GetRealOutputDerivatives` gives, dimensionless; 0: none.
+    #[serde(rename = "@maxOutputDerivativeOrder", skip_serializing_if = "xsd::is_default")]
     pub max_output_derivative_order: u32,
     /// `fmi2DoStep` may return before the step is done.
+    // The schema spells it so.
+    #[serde(rename = "@canRunAsynchronuously", skip_serializing_if = "xsd::is_default")]
     pub can_run_asynchronously: bool,
     /// Only one instance can exist in one process.
+    #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess", skip_serializing_if = "xsd::is_default")]
     pub can_be_instantiated_only_once_per_process: bool,
     /// The slave does not use the memory functions of the importer.
+    #[serde(rename = "@canNotUseMemoryManagementFunctions", skip_serializing_if = "xsd::is_default")]
     pub can_not_use_memory_management_functions: bool,
     /// `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
+    #[serde(rename = "@canGetAndSetFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_get_and_set_state: bool,
     /// The state can be turned to bytes and back; needs `can_get_and_set_state`.
+    #[serde(rename = "@canSerializeFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_serialize_state: bool,
     /// `fmi2GetDirectionalDerivative` works.
+    #[serde(rename = "@providesDirectionalDerivative", skip_serializing_if = "xsd::is_default")]
     pub provides_directional_derivative: bool,
+    /// Names of the files of its source code, relative to `sources/`; none: it comes without.
+    #[serde(
+        rename = "SourceFiles",
+        skip_serializing_if = "Vec::is_empty",
+        serialize_with = "crate::xml::source_files"
+    )]
+    pub source_files: Vec<String>,
 }
 
 /// Everything that `modelDescription.xml` of an FMI 2.0 co-simulation slave says.
@@ -115,12 +170,29 @@ pub struct ModelDescription {
     pub co_simulation: CoSimulation,
     /// The units that variables use; names unique.
     pub units: Vec<Unit>,
-    /// The enumeration types that variables use; names unique.
-    pub enumerations: Vec<EnumerationType>,
+    /// The types that variables declare to have; names unique.
+    pub types: Vec<SimpleType>,
     /// The categories of log messages; names unique.
     pub log_categories: Vec<LogCategory>,
     /// When and how finely to simulate; `None`: nothing is said.
     pub default_experiment: Option<DefaultExperiment>,
     /// The variables, at least one. Their order is that of the file.
     pub variables: Vec<Variable>,
+}
+
+impl ModelDescription {
+    /// The variable of an index of [`ModelStructure`](crate::ModelStructure), counted from 1.
+    pub fn at(&self, index: u32) -> Option<&Variable> {
+        self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
+    }
+
+    /// The items of the declared type of an enumeration; of other variables none.
+    pub fn items(&self, variable: &Variable) -> &[EnumerationItem] {
+        let name = variable.kind.declared_type();
+        let declared = self.types.iter().find(|declared| Some(declared.name.as_str()) == name);
+        match declared {
+            Some(declared) if variable.kind.scalar_type() == ScalarType::Enumeration => &declared.items,
+            _ => &[],
+        }
+    }
 }

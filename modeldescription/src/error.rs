@@ -19,6 +19,11 @@ enum Kind {
         value: String,
         allowed: String,
     },
+    Rule {
+        rule: &'static str,
+        path: String,
+        message: String,
+    },
     Xml {
         reason: String,
     },
@@ -42,6 +47,11 @@ impl Error {
         Self { kind: Box::new(Kind::Invalid { path, value, allowed }) }
     }
 
+    /// A rule of [`RULES`](crate::RULES) that is broken.
+    pub(crate) fn rule(rule: &'static str, path: String, message: String) -> Self {
+        Self { kind: Box::new(Kind::Rule { rule, path, message }) }
+    }
+
     pub(crate) fn xml(reason: impl fmt::Display) -> Self {
         Self { kind: Box::new(Kind::Xml { reason: reason.to_string() }) }
     }
@@ -52,9 +62,18 @@ impl Error {
     }
 
     /// True if a field of the description or a path in the archive has a value that is not allowed.
-    /// [`path`](Self::path), [`value`](Self::value) and [`allowed`](Self::allowed) then say more.
+    /// [`path`](Self::path) and, if a rule of the standard is broken, [`broken_rule`](Self::broken_rule), else
+    /// [`value`](Self::value) and [`allowed`](Self::allowed) then say more.
     pub fn is_invalid(&self) -> bool {
-        matches!(*self.kind, Kind::Invalid { .. })
+        matches!(*self.kind, Kind::Invalid { .. } | Kind::Rule { .. })
+    }
+
+    /// The name of the rule of [`RULES`](crate::RULES) that is broken.
+    pub fn broken_rule(&self) -> Option<&'static str> {
+        match *self.kind {
+            Kind::Rule { rule, .. } => Some(rule),
+            _ => None,
+        }
     }
 
     /// True if the archive could not be written to its destination.
@@ -65,7 +84,7 @@ impl Error {
     /// The field that is invalid, for example `variables["x.v"].start`.
     pub fn path(&self) -> Option<&str> {
         match &*self.kind {
-            Kind::Invalid { path, .. } => Some(path),
+            Kind::Invalid { path, .. } | Kind::Rule { path, .. } => Some(path),
             _ => None,
         }
     }
@@ -91,6 +110,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &*self.kind {
             Kind::Invalid { path, value, allowed } => write!(f, "{path} is {value}; allowed: {allowed}"),
+            Kind::Rule { path, message, .. } => write!(f, "{path}: {message}"),
             Kind::Xml { reason } => write!(f, "cannot write the model description: {reason}"),
             Kind::Io { doing, .. } => write!(f, "cannot {doing}"),
         }

@@ -1,24 +1,29 @@
 //! FMI 2.0 co-simulation model descriptions from typed variables, SSP 1.0 system structures, and
 //! reproducible `.fmu` and `.ssp` archives.
 //!
-//! This crate owns the file `modelDescription.xml` and the zip container around it. It knows nothing
-//! of what the slave computes, reads no file and no environment variable, parses no XML and prints nothing.
+//! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
+//! of what the slave computes, reads no file and no environment variable and prints nothing.
 //!
-//! A [`ModelDescription`] is plain data with public fields. [`ModelDescription::to_xml`] checks it
-//! against the rules of FMI 2.0.x that an XML schema cannot express, then writes it. With the feature
-//! `archive` (on by default) `Archive` collects the files of an FMU and writes them so that the same
-//! entries always give the same bytes.
+//! A [`ModelDescription`] is plain data with public fields: one model for whoever writes a description, reads one
+//! or looks for what is wrong with one. [`ModelDescription::to_xml`] checks it
+//! against the rules of FMI 2.0.x that an XML schema cannot express ([`RULES`]), then writes it. With the feature
+//! `read` `Located` takes it from a file, however broken, with where everything stands, and tells what breaks
+//! the same rules. With the feature `archive` (on by default) `Archive` collects the files of an FMU and writes them
+//! so that the same entries always give the same bytes.
 //!
 //! | module | owns |
 //! |---|---|
 //! | `variable` | variables, and the table of legal causality, variability and initial |
 //! | `unit` | units in terms of SI base units |
 //! | `description` | the whole description, its types, log categories and experiment |
-//! | `names` | what a text, a C identifier and a structured name may contain |
-//! | `calendar`, `number` | valid dates; doubles that read back exactly |
 //! | `structure` | outputs, initial unknowns and their dependencies as variable indices |
-//! | `validate` | every other rule |
-//! | `xml` | the elements and their order |
+//! | `rules` | what the standard says beyond the schema, for what is written and what was read |
+//! | `validate` | what else a description must be to be written |
+//! | `xml` | the file, written |
+//! | `read` | the file, read |
+//! | `names` | what a text, a C identifier and a structured name may contain |
+//! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
+//! | `fmi2` | the C interface: types, and one table of the functions |
 //! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and what they may say |
 //! | `archive` | the zip file |
 //!
@@ -26,7 +31,7 @@
 //!
 //! ```
 //! use punctual_modeldescription::{
-//!     Causality, CoSimulation, ModelDescription, Variability, Variable, VariableKind,
+//!     Causality, CoSimulation, ModelDescription, Real, Variability, Variable, VariableKind,
 //! };
 //!
 //! let gain = Variable {
@@ -36,14 +41,12 @@
 //!     causality: Causality::Parameter,
 //!     variability: Variability::Fixed,
 //!     initial: None,
-//!     kind: VariableKind::Real {
+//!     kind: VariableKind::Real(Real {
 //!         start: Some(2.0),
 //!         min: Some(0.0),
 //!         max: Some(10.0),
-//!         nominal: None,
-//!         quantity: None,
-//!         unit: None,
-//!     },
+//!         ..Default::default()
+//!     }),
 //!     dependencies: None,
 //!     initial_dependencies: None,
 //! };
@@ -58,7 +61,7 @@
 //!
 //! description.guid.clear();
 //! let error = description.to_xml().unwrap_err();
-//! assert_eq!(error.to_string(), r#"guid is ""; allowed: a non-empty text"#);
+//! assert_eq!(error.to_string(), "description: guid is empty; must be a text that no other FMU has");
 //! # Ok::<(), punctual_modeldescription::Error>(())
 //! ```
 //!
@@ -74,26 +77,37 @@ mod archive;
 mod calendar;
 mod description;
 mod error;
+pub mod fmi2;
 mod names;
-mod number;
+#[cfg(feature = "read")]
+mod read;
+mod rules;
 mod structure;
 mod system_structure;
 mod unit;
 mod validate;
 mod variable;
+mod words;
 mod xml;
+pub mod xsd;
 
 #[cfg(feature = "archive")]
 pub use archive::{Archive, Timestamp};
 pub use description::{
-    CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, LogCategory, ModelDescription,
-    NamingConvention,
+    CoSimulation, DefaultExperiment, EnumerationItem, LogCategory, ModelDescription, NamingConvention,
+    SimpleType,
 };
 pub use error::Error;
 pub use names::{PLATFORM, is_c_identifier, is_structured_name};
+#[cfg(feature = "read")]
+pub use read::Located;
+pub use rules::{Place, RULES, Severity, UnknownList, Violation, brief};
+pub use structure::{ModelStructure, Unknown};
 pub use system_structure::{
-    Connector, ConnectorKind, ParameterSet, ParameterValue, SystemComponent, SystemConnection,
-    SystemStructure,
+    Connector, ParameterSet, ParameterValue, SystemComponent, SystemConnection, SystemStructure,
 };
-pub use unit::{BaseUnit, Unit};
-pub use variable::{BaseType, Causality, Initial, InitialRule, Variability, Variable, VariableKind};
+pub use unit::{BaseUnit, DisplayUnit, Unit};
+pub use variable::{
+    BaseType, Causality, Initial, InitialRule, Integer, Plain, Real, ScalarType, Variability, Variable,
+    VariableKind,
+};

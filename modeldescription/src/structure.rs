@@ -7,47 +7,65 @@
 
 use crate::validate::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variable};
+use serde::Serialize;
 use std::collections::{BTreeSet, HashMap};
 
-/// The content of `ModelStructure`, both lists in ascending order of index.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Structure {
+/// The content of `ModelStructure`.
+///
+/// Whoever writes a description gives dependencies with its variables, and the lists follow from them
+/// ([`ModelDescription::structure`]). A description that was read has the lists of its file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ModelStructure {
     /// All outputs.
-    pub(crate) outputs: Vec<Unknown>,
-    /// Outputs that are not exact, and calculated parameters.
-    pub(crate) initial_unknowns: Vec<Unknown>,
+    pub outputs: Vec<Unknown>,
+    /// The derivatives of continuous states.
+    pub derivatives: Vec<Unknown>,
+    /// What is computed in initialization: outputs that are not exact, calculated parameters, and such
+    /// states and derivatives. In ascending order of index.
+    pub initial_unknowns: Vec<Unknown>,
 }
 
-/// A variable, and what it depends on, as 1-based positions in the list of variables.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Unknown {
-    pub(crate) index: usize,
-    /// Ascending, without repetition; `None` means everything.
-    pub(crate) dependencies: Option<BTreeSet<usize>>,
+/// A variable that is computed, and what it depends on, as indices of variables, from 1.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Unknown {
+    /// The index of the variable.
+    #[serde(rename = "@index")]
+    pub index: u32,
+    /// The indices of what it depends on; `None` (the attribute is absent) means everything, empty nothing.
+    #[serde(rename = "@dependencies", skip_serializing_if = "Option::is_none")]
+    pub dependencies: Option<Vec<u32>>,
+    /// How it depends on each, in the words of the standard; `None`: nothing is said.
+    #[serde(rename = "@dependenciesKind", skip_serializing_if = "Option::is_none")]
+    pub dependency_kinds: Option<Vec<String>>,
 }
 
-impl Structure {
-    /// Collects the unknowns and translates their dependencies.
+/// The index, from 1, of the variable at a position, from 0.
+pub(crate) fn index(position: usize) -> u32 {
+    u32::try_from(position + 1).unwrap_or(u32::MAX)
+}
+
+impl ModelDescription {
+    /// The lists of `ModelStructure` that follow from the variables and their dependencies.
     ///
     /// # Errors
     ///
     /// - A variable that is not an output has dependencies, or one that is not an initial unknown has
     ///   initial dependencies.
     /// - A dependency is not the value reference of exactly one known.
-    pub(crate) fn of(description: &ModelDescription) -> Result<Self, Error> {
-        let knowns = Knowns::new(&description.variables, is_known);
-        let initial_knowns = Knowns::new(&description.variables, |v| {
-            is_known(v) || v.effective_initial() == Some(Initial::Exact)
-        });
-        let mut structure = Self { outputs: Vec::new(), initial_unknowns: Vec::new() };
-        for (position, variable) in description.variables.iter().enumerate() {
-            let index = position + 1;
+    pub fn structure(&self) -> Result<ModelStructure, Error> {
+        let knowns = Knowns::new(&self.variables, is_known);
+        let initial_knowns =
+            Knowns::new(&self.variables, |v| is_known(v) || v.effective_initial() == Some(Initial::Exact));
+        let mut structure = ModelStructure::default();
+        let unknown = |index, dependencies| Unknown { index, dependencies, dependency_kinds: None };
+        for (position, variable) in self.variables.iter().enumerate() {
+            let index = index(position);
             let path = |field| variable_path(variable, field);
             if variable.causality == Causality::Output {
                 let path = path("dependencies");
                 let allowed = "value references of inputs, parameters or the independent variable";
                 let dependencies = knowns.translate(&path, variable.dependencies.as_deref(), allowed)?;
-                structure.outputs.push(Unknown { index, dependencies });
+                structure.outputs.push(unknown(index, dependencies));
             } else if variable.dependencies.is_some() {
                 return Err(Error::invalid(
                     path("dependencies"),
@@ -61,7 +79,7 @@ impl Structure {
                                with initial exact";
                 let dependencies =
                     initial_knowns.translate(&path, variable.initial_dependencies.as_deref(), allowed)?;
-                structure.initial_unknowns.push(Unknown { index, dependencies });
+                structure.initial_unknowns.push(unknown(index, dependencies));
             } else if variable.initial_dependencies.is_some() {
                 let allowed = "nothing, as this is neither an output with initial approx or calculated nor a \
                                calculated parameter";
@@ -96,13 +114,13 @@ impl<'a> Knowns<'a> {
         path: &str,
         value_references: Option<&[u32]>,
         allowed: &str,
-    ) -> Result<Option<BTreeSet<usize>>, Error> {
+    ) -> Result<Option<Vec<u32>>, Error> {
         let Some(value_references) = value_references else { return Ok(None) };
         let mut indices = BTreeSet::new();
         for value_reference in value_references {
             match self.positions.get(value_reference).map(Vec::as_slice) {
                 Some([position]) => {
-                    indices.insert(position + 1);
+                    indices.insert(index(*position));
                 }
                 Some(positions) => {
                     let names: Vec<_> =
@@ -113,6 +131,6 @@ impl<'a> Knowns<'a> {
                 None => return Err(Error::invalid(path, value_reference, allowed)),
             }
         }
-        Ok(Some(indices))
+        Ok(Some(indices.into_iter().collect()))
     }
 }

@@ -2,8 +2,9 @@
 //! `SystemStructure.ssd`, start values as an `.ssv` parameter set.
 
 use crate::names::forbidden_character;
-use crate::number::Number;
-use crate::{Causality, DefaultExperiment, EnumerationType, Error};
+use crate::xml::{container, text};
+use crate::xsd::Number;
+use crate::{Causality, DefaultExperiment, Error, SimpleType, VariableKind};
 use serde::Serialize;
 
 const SSD: &str = "http://ssp-standard.org/SSP1/SystemStructureDescription";
@@ -27,8 +28,8 @@ pub struct SystemStructure {
     /// The connections.
     pub connections: Vec<SystemConnection>,
     /// The enumerations that connectors refer to.
-    pub enumerations: Vec<EnumerationType>,
-    /// When to start and stop; the step size has no place in the format.
+    pub enumerations: Vec<SimpleType>,
+    /// When to start (without it at 0) and stop; the step size has no place in the format.
     pub default_experiment: Option<DefaultExperiment>,
 }
 
@@ -50,23 +51,9 @@ pub struct Connector {
     pub name: String,
     /// Input, output, parameter or calculated parameter; others cannot be connectors.
     pub causality: Causality,
-    /// Its type.
-    pub kind: ConnectorKind,
-}
-
-/// The type of a [`Connector`].
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ConnectorKind {
-    /// A double.
-    Real,
-    /// A 32-bit integer.
-    Integer,
-    /// A truth value.
-    Boolean,
-    /// Text.
-    String,
-    /// The name of an enumeration of the system.
-    Enumeration(String),
+    /// Its type, an enumeration with the name of one of the system as its declared type. Start value, range and
+    /// unit are not written.
+    pub kind: VariableKind,
 }
 
 /// A signal from an output to an input: `end = factor · start + offset`, without conversion of units.
@@ -132,10 +119,11 @@ impl SystemStructure {
                     let allowed = "input, output, parameter or calculatedParameter";
                     return Err(Error::invalid(path(), connector.causality.as_str(), allowed));
                 }
-                if let ConnectorKind::Enumeration(name) = &connector.kind
-                    && self.enumerations.iter().all(|e| e.name != *name)
+                if let VariableKind::Enumeration(of) = &connector.kind
+                    && !self.enumerations.iter().any(|e| Some(&e.name) == of.declared_type.as_ref())
                 {
-                    return Err(Error::invalid(path(), format!("{name:?}"), "an enumeration of the system"));
+                    let value = format!("{:?}", of.declared_type.as_deref().unwrap_or_default());
+                    return Err(Error::invalid(path(), value, "an enumeration of the system"));
                 }
             }
         }
@@ -211,15 +199,6 @@ fn kind(causality: Causality) -> Option<&'static str> {
         }
         _ => None,
     }
-}
-
-fn text<T: Serialize>(root: &T) -> Result<String, Error> {
-    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-    let mut serializer = quick_xml::se::Serializer::new(&mut text);
-    serializer.indent(' ', 2);
-    root.serialize(serializer).map_err(Error::xml)?;
-    text.push('\n');
-    Ok(text)
 }
 
 /// An element of a type, as both files have it; the empty ones have no attributes at all.
@@ -375,6 +354,7 @@ struct EnumerationElement<'a> {
     items: Vec<ItemElement<'a>>,
 }
 
+// Not the model's own item: the format gives it no description.
 #[derive(Serialize)]
 struct ItemElement<'a> {
     #[serde(rename = "@name")]
@@ -450,16 +430,11 @@ impl<'a> Parameter<'a> {
     }
 }
 
-/// A container with its children, or none at all: the schema allows no empty ones.
-fn container<C, T>(children: Vec<T>, container: impl FnOnce(Vec<T>) -> C) -> Option<C> {
-    (!children.is_empty()).then(|| container(children))
-}
-
 impl<'a> SsdRoot<'a> {
     fn new(s: &'a SystemStructure) -> Self {
         let components = s.components.iter().map(ComponentElement::new).collect();
         let connections = s.connections.iter().map(ConnectionElement::new).collect();
-        let enumeration = |e: &'a EnumerationType| EnumerationElement {
+        let enumeration = |e: &'a SimpleType| EnumerationElement {
             name: &e.name,
             items: e.items.iter().map(|i| ItemElement { name: &i.name, value: i.value }).collect(),
         };
@@ -482,9 +457,10 @@ impl<'a> SsdRoot<'a> {
             enumerations: container(s.enumerations.iter().map(enumeration).collect(), |enumerations| {
                 Enumerations { enumerations }
             }),
-            default_experiment: s
-                .default_experiment
-                .map(|e| Experiment { start_time: Number(e.start_time), stop_time: e.stop_time.map(Number) }),
+            default_experiment: s.default_experiment.map(|e| Experiment {
+                start_time: Number(e.start_time.unwrap_or(0.0)),
+                stop_time: e.stop_time.map(Number),
+            }),
         }
     }
 }
@@ -495,11 +471,13 @@ impl<'a> ComponentElement<'a> {
             name: &c.name,
             kind: kind(c.causality).unwrap_or_default(),
             of_type: match &c.kind {
-                ConnectorKind::Real => TypeElement::Real(Empty {}),
-                ConnectorKind::Integer => TypeElement::Integer(Empty {}),
-                ConnectorKind::Boolean => TypeElement::Boolean(Empty {}),
-                ConnectorKind::String => TypeElement::String(Empty {}),
-                ConnectorKind::Enumeration(name) => TypeElement::Enumeration(Named { name }),
+                VariableKind::Real(_) => TypeElement::Real(Empty {}),
+                VariableKind::Integer(_) => TypeElement::Integer(Empty {}),
+                VariableKind::Boolean(_) => TypeElement::Boolean(Empty {}),
+                VariableKind::String(_) => TypeElement::String(Empty {}),
+                VariableKind::Enumeration(of) => {
+                    TypeElement::Enumeration(Named { name: of.declared_type.as_deref().unwrap_or_default() })
+                }
             },
         };
         Self {

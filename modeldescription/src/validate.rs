@@ -1,48 +1,51 @@
-//! The rules of FMI 2.0.4 for a model description that the types do not enforce.
+//! What a description must be to be written: the rules of the standard ([`rules`](crate::rules)), what the XML
+//! schema asks for, and a few rules of our own, such as that no two variables are the same memory.
 //!
 //! The first violation found is reported. Dependencies are checked where they are translated, in
 //! `structure`.
 
 use crate::calendar::is_utc_instant;
-use crate::names::{forbidden_character, is_c_identifier, is_one_line, is_structured_name};
-use crate::number::Number;
-use crate::structure::Structure;
-use crate::{
-    BaseType, Causality, DefaultExperiment, EnumerationType, Error, InitialRule, ModelDescription,
-    NamingConvention, Variability, Variable, VariableKind,
-};
-use std::collections::{HashMap, HashSet};
-use std::fmt::Display;
+use crate::names::{forbidden_character, is_one_line};
+use crate::rules::{Check, Place, Unread, Violation};
+use crate::xsd::Number;
+use crate::{BaseType, Error, ModelDescription, Real, ScalarType, SimpleType, Variable, VariableKind};
+use std::collections::HashMap;
 
 impl ModelDescription {
     /// Checks every rule that [`to_xml`](Self::to_xml) checks.
     ///
     /// # Errors
     ///
+    /// - A rule of [`RULES`](crate::RULES) on descriptions is broken.
     /// - A required text is empty, a text has a character that XML 1.0 cannot carry, or a text of one
     ///   line has a line break or tab.
-    /// - A model identifier is not a C identifier, a date not in UTC, a name not of the convention.
-    /// - Names of variables, types, items, units or log categories, or value references of one base
-    ///   type, are not unique; a variable is named like a type.
-    /// - Causality, variability, initial and type do not go together.
-    /// - A start value is missing, superfluous, out of range or not finite; a range is empty.
-    /// - A unit, a type or a dependency does not exist.
-    /// - A state can be serialised but not got and set.
-    /// - An experiment has a stop before its start, or a step or tolerance that is not positive.
+    /// - A date is not in UTC, a factor of a unit or a nominal value not positive, a bound NaN or infinite on the
+    ///   wrong side, a start value infinite without such a bound.
+    /// - Names of log categories, or value references of one base type, are not unique.
+    /// - There is no variable, or an enumeration has no items or no type.
+    /// - A dependency does not exist.
     pub fn validate(&self) -> Result<(), Error> {
+        let mut broken = None;
+        let mut report = |violation: Violation| {
+            // Aliases are refused altogether, below.
+            if !violation.rule.starts_with("variable.alias") {
+                broken.get_or_insert(violation);
+            }
+        };
+        Check { description: self, unread: &Unread::new(), report: &mut report }.description();
+        if let Some(Violation { rule, place, message }) = broken {
+            return Err(Error::rule(rule, path(self, place), message));
+        }
         header(self)?;
         units(self)?;
-        enumerations(self)?;
+        types(self)?;
         let categories: Vec<_> = self.log_categories.iter().map(|c| c.name.as_str()).collect();
         unique_names("log_categories", &categories)?;
         for category in &self.log_categories {
             text(format!("log_categories[{:?}].description", category.name), &category.description)?;
         }
-        if let Some(experiment) = &self.default_experiment {
-            default_experiment(experiment)?;
-        }
         variables(self)?;
-        Structure::of(self).map(drop)
+        self.structure().map(drop)
     }
 }
 
@@ -51,9 +54,25 @@ pub(crate) fn variable_path(variable: &Variable, field: &str) -> String {
     format!("variables[{:?}].{field}", variable.name)
 }
 
+/// The path of a place in an error.
+fn path(description: &ModelDescription, place: Place) -> String {
+    let of_unit = |u: usize| format!("units[{:?}]", description.units[u].name);
+    let of_type = |t: usize| format!("types[{:?}]", description.types[t].name);
+    match place {
+        Place::Interface(_) => "co_simulation".to_owned(),
+        Place::Experiment => "default_experiment".to_owned(),
+        Place::Unit(u) => of_unit(u),
+        Place::DisplayUnit(u, d) => format!("{}.display_units[{d}]", of_unit(u)),
+        Place::Type(t) => of_type(t),
+        Place::Item(t, i) => format!("{}.items[{i}]", of_type(t)),
+        Place::Variable(v) => format!("variables[{:?}]", description.variables[v].name),
+        Place::Start(v) => variable_path(&description.variables[v], "start"),
+        Place::Root | Place::Unknowns(_) | Place::Unknown(..) => "description".to_owned(),
+    }
+}
+
 fn header(description: &ModelDescription) -> Result<(), Error> {
     required("model_name", &description.model_name)?;
-    required("guid", &description.guid)?;
     line("guid", &description.guid)?;
     text("model_name", &description.model_name)?;
     text("description", &description.description)?;
@@ -62,162 +81,102 @@ fn header(description: &ModelDescription) -> Result<(), Error> {
     text("copyright", &description.copyright)?;
     text("license", &description.license)?;
     line("generation_tool", &description.generation_tool)?;
-    if let Some(instant) = &description.generation_date_and_time
-        && !is_utc_instant(instant)
-    {
-        let allowed = "an instant in UTC as YYYY-MM-DDThh:mm:ssZ";
-        return Err(Error::invalid("generation_date_and_time", format!("{instant:?}"), allowed));
+    for name in &description.co_simulation.source_files {
+        required("co_simulation.source_files", name)?;
+        line("co_simulation.source_files", name)?;
     }
-    let slave = &description.co_simulation;
-    if !is_c_identifier(&slave.model_identifier) {
-        let value = format!("{:?}", slave.model_identifier);
-        let allowed = "a C identifier: ASCII letters, digits and underscores, no digit first";
-        return Err(Error::invalid("co_simulation.model_identifier", value, allowed));
+    match &description.generation_date_and_time {
+        Some(instant) if !is_utc_instant(instant) => {
+            let allowed = "an instant in UTC as YYYY-MM-DDThh:mm:ssZ";
+            Err(Error::invalid("generation_date_and_time", format!("{instant:?}"), allowed))
+        }
+        _ => Ok(()),
     }
-    if slave.can_serialize_state && !slave.can_get_and_set_state {
-        let allowed = "false unless can_get_and_set_state is true";
-        return Err(Error::invalid("co_simulation.can_serialize_state", true, allowed));
-    }
-    Ok(())
 }
 
 fn units(description: &ModelDescription) -> Result<(), Error> {
-    let names: Vec<_> = description.units.iter().map(|unit| unit.name.as_str()).collect();
-    unique_names("units", &names)?;
-    for unit in &description.units {
-        let path = |field: &str| format!("units[{:?}].base.{field}", unit.name);
-        positive(path("factor"), unit.base.factor)?;
-        finite(path("offset"), unit.base.offset)?;
-    }
-    Ok(())
-}
-
-fn enumerations(description: &ModelDescription) -> Result<(), Error> {
-    let names: Vec<_> = description.enumerations.iter().map(|e| e.name.as_str()).collect();
-    unique_names("enumerations", &names)?;
-    for enumeration in &description.enumerations {
-        let path = |field: &str| format!("enumerations[{:?}].{field}", enumeration.name);
-        text(path("description"), &enumeration.description)?;
-        if enumeration.items.is_empty() {
-            return Err(Error::invalid(path("items"), "empty", "at least one item"));
+    for (u, unit) in description.units.iter().enumerate() {
+        name(format!("units[{u}].name"), &unit.name)?;
+        let path = |field: &str| format!("units[{:?}].{field}", unit.name);
+        if let Some(base) = unit.base {
+            positive(path("base.factor"), base.factor)?;
+            finite(path("base.offset"), base.offset)?;
         }
-        let items: Vec<_> = enumeration.items.iter().map(|item| item.name.as_str()).collect();
-        unique_names(&path("items"), &items)?;
-        let mut values = HashMap::new();
-        for item in &enumeration.items {
-            let path = |field: &str| path(&format!("items[{:?}].{field}", item.name));
-            text(path("description"), &item.description)?;
-            if let Some(other) = values.insert(item.value, &item.name) {
-                return Err(Error::invalid(path("value"), item.value, format!("not the one of {other:?}")));
+        for display in &unit.display_units {
+            name(path("display_units.name"), &display.name)?;
+            if display.factor == 0.0 {
+                return Err(Error::invalid(path("display_units.factor"), "0", "not 0"));
             }
+            finite(path("display_units.factor"), display.factor)?;
+            finite(path("display_units.offset"), display.offset)?;
         }
     }
     Ok(())
 }
 
-fn default_experiment(experiment: &DefaultExperiment) -> Result<(), Error> {
-    finite("default_experiment.start_time", experiment.start_time)?;
-    if let Some(stop) = experiment.stop_time
-        && !(stop.is_finite() && stop > experiment.start_time)
-    {
-        let allowed = format!("finite and greater than {}", Number(experiment.start_time));
-        return Err(Error::invalid("default_experiment.stop_time", Number(stop), allowed));
+fn types(description: &ModelDescription) -> Result<(), Error> {
+    for (t, declared) in description.types.iter().enumerate() {
+        name(format!("types[{t}].name"), &declared.name)?;
+        let path = |field: &str| format!("types[{:?}].{field}", declared.name);
+        text(path("description"), &declared.description)?;
+        kind(&path, &declared.kind)?;
+        if declared.kind.declared_type().is_some() || declared.kind.has_start() {
+            return Err(Error::invalid(
+                path("kind"),
+                "that of a variable",
+                "no declared type, no start value",
+            ));
+        }
+        items(&path, declared)?;
     }
-    experiment.step_size.map_or(Ok(()), |h| positive("default_experiment.step_size", h))?;
-    experiment.tolerance.map_or(Ok(()), |t| positive("default_experiment.tolerance", t))
+    Ok(())
+}
+
+fn items(path: &impl Fn(&str) -> String, declared: &SimpleType) -> Result<(), Error> {
+    let enumeration = declared.kind.scalar_type() == ScalarType::Enumeration;
+    match (enumeration, declared.items.is_empty()) {
+        (true, true) => return Err(Error::invalid(path("items"), "empty", "at least one item")),
+        (false, false) => {
+            return Err(Error::invalid(path("items"), "given", "nothing, as this is no enumeration"));
+        }
+        _ => {}
+    }
+    for (i, item) in declared.items.iter().enumerate() {
+        name(path(&format!("items[{i}].name")), &item.name)?;
+        text(path(&format!("items[{:?}].description", item.name)), &item.description)?;
+    }
+    Ok(())
 }
 
 fn variables(description: &ModelDescription) -> Result<(), Error> {
     if description.variables.is_empty() {
         return Err(Error::invalid("variables", "empty", "at least one variable"));
     }
-    let names: Vec<_> = description.variables.iter().map(|v| v.name.as_str()).collect();
-    unique_names("variables", &names)?;
-    let types: HashSet<_> = description.enumerations.iter().map(|e| e.name.as_str()).collect();
     let mut references = HashMap::<(BaseType, u32), &str>::new();
-    let mut independent = None;
-    for (position, variable) in description.variables.iter().enumerate() {
-        let name = variable.name.as_str();
-        let path = |field| variable_path(variable, field);
-        let name_path = || format!("variables[{position}].name");
-        if types.contains(name) {
-            return Err(Error::invalid(name_path(), format!("{name:?}"), "not the name of a type"));
-        }
-        if description.variable_naming_convention == NamingConvention::Structured && !is_structured_name(name)
-        {
-            let allowed = "a structured name such as a, a.b[1] or der(a)";
-            return Err(Error::invalid(name_path(), format!("{name:?}"), allowed));
-        }
+    for (v, variable) in description.variables.iter().enumerate() {
+        name(format!("variables[{v}].name"), &variable.name)?;
+        let path = |field: &str| variable_path(variable, field);
         let base_type = variable.kind.base_type();
-        if let Some(other) = references.insert((base_type, variable.value_reference), name) {
+        if let Some(other) = references.insert((base_type, variable.value_reference), &variable.name) {
             let value = format!("{} ({base_type:?})", variable.value_reference);
             return Err(Error::invalid(path("value_reference"), value, format!("not the one of {other:?}")));
         }
-        if variable.causality == Causality::Independent
-            && let Some(other) = independent.replace(name)
-        {
-            let allowed = format!("not independent, as {other:?} already is");
-            return Err(Error::invalid(path("causality"), "independent", allowed));
-        }
         text(path("description"), &variable.description)?;
-        combination(variable)?;
-        start_presence(variable)?;
-        kind(description, variable)?;
+        kind(&path, &variable.kind)?;
+        if matches!(&variable.kind, VariableKind::Enumeration(of) if of.declared_type.is_none()) {
+            let allowed = "the name of one of the description's types";
+            return Err(Error::invalid(path("declared_type"), "missing", allowed));
+        }
     }
     Ok(())
 }
 
-/// Causality, variability, initial and type go together.
-fn combination(variable: &Variable) -> Result<(), Error> {
-    let (causality, variability) = (variable.causality, variable.variability);
-    let path = |field| variable_path(variable, field);
-    let Some(rule) = InitialRule::of(causality, variability) else {
-        use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
-        let legal: Vec<_> = [Constant, Fixed, Tunable, Discrete, Continuous]
-            .into_iter()
-            .filter(|v| InitialRule::of(causality, *v).is_some())
-            .map(Variability::as_str)
-            .collect();
-        let allowed = format!("{} for causality {}", legal.join(" or "), causality.as_str());
-        return Err(Error::invalid(path("variability"), variability.as_str(), allowed));
-    };
-    if let Some(initial) = variable.initial
-        && !rule.allowed.contains(&initial)
-    {
-        let legal: Vec<_> = rule.allowed.iter().map(|i| i.as_str()).collect();
-        let legal = if legal.is_empty() { "nothing".to_owned() } else { legal.join(" or ") };
-        let allowed = format!("{legal} for {} {}", variability.as_str(), causality.as_str());
-        return Err(Error::invalid(path("initial"), initial.as_str(), allowed));
-    }
-    if variability == Variability::Continuous && variable.kind.base_type() != BaseType::Real {
-        let allowed = "not continuous, as the variable is not Real";
-        return Err(Error::invalid(path("variability"), variability.as_str(), allowed));
-    }
-    Ok(())
-}
-
-/// A start value is there exactly if causality and initial ask for one.
-fn start_presence(variable: &Variable) -> Result<(), Error> {
-    let path = || variable_path(variable, "start");
-    let why = match variable.effective_initial() {
-        Some(initial) => format!("initial is {}", initial.as_str()),
-        None => format!("causality is {}", variable.causality.as_str()),
-    };
-    match (variable.needs_start(), variable.kind.has_start()) {
-        (true, false) => Err(Error::invalid(path(), "missing", format!("a value, as {why}"))),
-        (false, true) => Err(Error::invalid(path(), "given", format!("nothing, as {why}"))),
-        _ => Ok(()),
-    }
-}
-
-/// What depends on the type: range, start value, unit, declared type.
-fn kind(description: &ModelDescription, variable: &Variable) -> Result<(), Error> {
-    let path = |field| variable_path(variable, field);
-    match &variable.kind {
-        VariableKind::Real { start, min, max, nominal, quantity, unit } => {
+/// What depends on the type: bounds, start value, texts.
+fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error> {
+    match kind {
+        VariableKind::Real(Real { quantity, min, max, nominal, start, .. }) => {
             bound(path("min"), *min, f64::NEG_INFINITY)?;
             bound(path("max"), *max, f64::INFINITY)?;
-            range(variable, start.map(Number), min.map(Number), max.map(Number))?;
             if let Some(start) = start
                 && !(start.is_finite() || (start.is_infinite() && [*min, *max].contains(&Some(*start))))
             {
@@ -225,60 +184,14 @@ fn kind(description: &ModelDescription, variable: &Variable) -> Result<(), Error
                 return Err(Error::invalid(path("start"), Number(*start), allowed));
             }
             nominal.map_or(Ok(()), |nominal| positive(path("nominal"), nominal))?;
-            quantity.as_deref().map_or(Ok(()), |quantity| line(path("quantity"), quantity))?;
-            match unit {
-                Some(name) if !description.units.iter().any(|unit| unit.name == *name) => {
-                    let value = format!("{name:?}");
-                    Err(Error::invalid(path("unit"), value, "the name of one of the description's units"))
-                }
-                _ => Ok(()),
-            }
+            quantity.as_deref().map_or(Ok(()), |quantity| line(path("quantity"), quantity))
         }
-        VariableKind::Integer { start, min, max } => range(variable, *start, *min, *max),
-        VariableKind::Boolean { .. } => Ok(()),
-        VariableKind::String { start } => start.as_deref().map_or(Ok(()), |start| text(path("start"), start)),
-        VariableKind::Enumeration { declared_type, start } => {
-            let Some(declared) = description.enumerations.iter().find(|e| e.name == *declared_type) else {
-                let allowed = "the name of one of the description's enumerations";
-                return Err(Error::invalid(path("declared_type"), format!("{declared_type:?}"), allowed));
-            };
-            start.map_or(Ok(()), |start| item(path("start"), start, declared))
+        VariableKind::Integer(of) | VariableKind::Enumeration(of) => {
+            of.quantity.as_deref().map_or(Ok(()), |quantity| line(path("quantity"), quantity))
         }
+        VariableKind::Boolean(_) => Ok(()),
+        VariableKind::String(of) => of.start.as_deref().map_or(Ok(()), |start| text(path("start"), start)),
     }
-}
-
-fn item(path: String, start: i32, declared: &EnumerationType) -> Result<(), Error> {
-    if declared.items.iter().any(|item| item.value == start) {
-        return Ok(());
-    }
-    let values: Vec<_> = declared.items.iter().map(|item| item.value.to_string()).collect();
-    Err(Error::invalid(path, start, format!("one of {} (items of {:?})", values.join(", "), declared.name)))
-}
-
-/// `min <= max`, and `start` between them; NaN is between nothing.
-fn range<T: PartialOrd + Display + Copy>(
-    variable: &Variable,
-    start: Option<T>,
-    min: Option<T>,
-    max: Option<T>,
-) -> Result<(), Error> {
-    let path = |field| variable_path(variable, field);
-    if let (Some(min), Some(max)) = (min, max)
-        && min > max
-    {
-        return Err(Error::invalid(path("max"), max, format!("at least {min}, the min")));
-    }
-    let Some(start) = start else { return Ok(()) };
-    if min.is_none_or(|min| min <= start) && max.is_none_or(|max| start <= max) {
-        return Ok(());
-    }
-    let allowed = match (min, max) {
-        (Some(min), Some(max)) => format!("{min} to {max}"),
-        (Some(min), None) => format!("at least {min}"),
-        (None, Some(max)) => format!("at most {max}"),
-        (None, None) => return Ok(()),
-    };
-    Err(Error::invalid(path("start"), start, allowed))
 }
 
 fn bound(path: String, value: Option<f64>, infinity: f64) -> Result<(), Error> {
@@ -306,14 +219,19 @@ fn unique_names(list: &str, names: &[&str]) -> Result<(), Error> {
     let mut positions = HashMap::new();
     for (position, name) in names.iter().enumerate() {
         let path = || format!("{list}[{position}].name");
-        required(path(), name)?;
-        line(path(), name)?;
+        self::name(path(), name)?;
         if let Some(first) = positions.insert(name, position) {
             let allowed = format!("unique, but {list}[{first}] has the same");
             return Err(Error::invalid(path(), format!("{name:?}"), allowed));
         }
     }
     Ok(())
+}
+
+/// Not empty, one line.
+fn name(path: String, name: &str) -> Result<(), Error> {
+    required(path.as_str(), name)?;
+    line(path, name)
 }
 
 fn required(path: impl Into<String>, value: &str) -> Result<(), Error> {

@@ -1,5 +1,9 @@
 //! Variables and the legal combinations of their attributes (FMI 2.0.4, section 2.2.7).
 
+use crate::words::words;
+use crate::xsd;
+use serde::Serialize;
+
 /// What a variable is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Causality {
@@ -17,19 +21,8 @@ pub enum Causality {
     Independent,
 }
 
-impl Causality {
-    /// The spelling in the XML file.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Parameter => "parameter",
-            Self::CalculatedParameter => "calculatedParameter",
-            Self::Input => "input",
-            Self::Output => "output",
-            Self::Local => "local",
-            Self::Independent => "independent",
-        }
-    }
-}
+words!(Causality: Parameter "parameter", CalculatedParameter "calculatedParameter", Input "input", Output "output",
+    Local "local", Independent "independent");
 
 /// When a variable may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,18 +39,8 @@ pub enum Variability {
     Continuous,
 }
 
-impl Variability {
-    /// The spelling in the XML file.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Constant => "constant",
-            Self::Fixed => "fixed",
-            Self::Tunable => "tunable",
-            Self::Discrete => "discrete",
-            Self::Continuous => "continuous",
-        }
-    }
-}
+words!(Variability: Constant "constant", Fixed "fixed", Tunable "tunable", Discrete "discrete",
+    Continuous "continuous");
 
 /// How a variable gets its first value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,16 +53,7 @@ pub enum Initial {
     Calculated,
 }
 
-impl Initial {
-    /// The spelling in the XML file.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Approx => "approx",
-            Self::Calculated => "calculated",
-        }
-    }
-}
+words!(Initial: Exact "exact", Approx "approx", Calculated "calculated");
 
 /// What the standard says of [`Initial`] for one pair of causality and variability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,6 +99,36 @@ impl InitialRule {
     }
 }
 
+/// The type of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ScalarType {
+    /// A double.
+    Real,
+    /// A 32-bit integer.
+    Integer,
+    /// A truth value.
+    Boolean,
+    /// A text, UTF-8.
+    String,
+    /// A 32-bit integer with named values.
+    Enumeration,
+}
+
+words!(ScalarType: Real "Real", Integer "Integer", Boolean "Boolean", String "String",
+    Enumeration "Enumeration");
+
+impl ScalarType {
+    /// The functions that read and write variables of this type.
+    pub const fn base_type(self) -> BaseType {
+        match self {
+            Self::Real => BaseType::Real,
+            Self::Integer | Self::Enumeration => BaseType::Integer,
+            Self::Boolean => BaseType::Boolean,
+            Self::String => BaseType::String,
+        }
+    }
+}
+
 /// The functions that read and write a variable: `fmi2GetReal`, `fmi2GetInteger`, ...
 ///
 /// Value references are unique within one base type.
@@ -140,73 +144,156 @@ pub enum BaseType {
     String,
 }
 
-/// The type of a variable, with the attributes that depend on it.
+/// The attributes of a Real. Of a declared type those of the variable alone (`declared_type`, `start`,
+/// `derivative`) stay `None`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Real {
+    /// The name of the type that gives the attributes that are not given here; absent: none.
+    #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
+    pub declared_type: Option<String>,
+    /// The physical quantity, for example `Acceleration`; one line.
+    #[serde(rename = "@quantity", skip_serializing_if = "Option::is_none")]
+    pub quantity: Option<String>,
+    /// The name of one of [`ModelDescription::units`](crate::ModelDescription::units).
+    #[serde(rename = "@unit", skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// The name of one of the display units of `unit`.
+    #[serde(rename = "@displayUnit", skip_serializing_if = "Option::is_none")]
+    pub display_unit: Option<String>,
+    /// Smallest allowed value, in `unit`; not NaN and not `INF`; absent: no limit.
+    #[serde(rename = "@min", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
+    pub min: Option<f64>,
+    /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; absent: no limit.
+    #[serde(rename = "@max", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
+    pub max: Option<f64>,
+    /// Typical magnitude, in `unit`; finite and greater than 0.
+    #[serde(rename = "@nominal", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
+    pub nominal: Option<f64>,
+    /// First value or first guess, in `unit`; within `min` and `max`. Finite, except that it may
+    /// be infinite where the bound on that side is given as infinite.
+    #[serde(rename = "@start", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
+    pub start: Option<f64>,
+    /// The index, from 1, of the continuous variable that this is the time derivative of.
+    #[serde(rename = "@derivative", skip_serializing_if = "Option::is_none")]
+    pub derivative: Option<u32>,
+}
+
+/// The attributes of an Integer or an enumeration. Of a declared type those of the variable alone
+/// (`declared_type`, `start`) stay `None`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Integer {
+    /// The name of the type that gives the attributes that are not given here. An enumeration must have
+    /// one; for an Integer absent: none.
+    #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
+    pub declared_type: Option<String>,
+    /// The physical quantity; one line.
+    #[serde(rename = "@quantity", skip_serializing_if = "Option::is_none")]
+    pub quantity: Option<String>,
+    /// Smallest allowed value, dimensionless; absent: no limit.
+    #[serde(rename = "@min", skip_serializing_if = "Option::is_none")]
+    pub min: Option<i32>,
+    /// Largest allowed value, at least `min`; absent: no limit.
+    #[serde(rename = "@max", skip_serializing_if = "Option::is_none")]
+    pub max: Option<i32>,
+    /// First value or first guess; within `min` and `max`; of an enumeration the value of one of its items.
+    #[serde(rename = "@start", skip_serializing_if = "Option::is_none")]
+    pub start: Option<i32>,
+}
+
+/// The attributes of a Boolean or a text. Of a declared type both stay `None`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Plain<T> {
+    /// The name of the declared type; absent: none.
+    #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
+    pub declared_type: Option<String>,
+    /// First value or first guess; a text has characters that XML 1.0 allows.
+    #[serde(rename = "@start", skip_serializing_if = "Option::is_none")]
+    pub start: Option<T>,
+}
+
+/// The type of a variable, or a declared type, with the attributes that depend on it.
 ///
 /// `start` is required for inputs and for initial exact or approx, and forbidden otherwise.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum VariableKind {
-    /// A double in `unit`.
-    Real {
-        /// First value or first guess, in `unit`; within `min` and `max`. Finite, except that it may
-        /// be infinite where the bound on that side is given as infinite.
-        start: Option<f64>,
-        /// Smallest allowed value, in `unit`; not NaN and not `INF`; absent: no limit.
-        min: Option<f64>,
-        /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; absent: no limit.
-        max: Option<f64>,
-        /// Typical magnitude, in `unit`; finite and greater than 0.
-        nominal: Option<f64>,
-        /// The physical quantity, for example `Acceleration`; one line.
-        quantity: Option<String>,
-        /// The name of one of [`ModelDescription::units`](crate::ModelDescription::units).
-        unit: Option<String>,
-    },
+    /// A double in its unit.
+    Real(Real),
     /// A 32-bit integer, dimensionless.
-    Integer {
-        /// First value or first guess; within `min` and `max`.
-        start: Option<i32>,
-        /// Smallest allowed value; absent: no limit.
-        min: Option<i32>,
-        /// Largest allowed value, at least `min`; absent: no limit.
-        max: Option<i32>,
-    },
+    Integer(Integer),
     /// A truth value.
-    Boolean {
-        /// First value or first guess.
-        start: Option<bool>,
-    },
+    Boolean(Plain<bool>),
     /// A text.
-    String {
-        /// First value or first guess; characters that XML 1.0 allows.
-        start: Option<String>,
-    },
-    /// One of the items of an enumeration type.
-    Enumeration {
-        /// The name of one of [`ModelDescription::enumerations`](crate::ModelDescription::enumerations).
-        declared_type: String,
-        /// First value or first guess: the value of one of the items.
-        start: Option<i32>,
-    },
+    String(Plain<String>),
+    /// One of the items of its declared type.
+    Enumeration(Integer),
 }
 
 impl VariableKind {
+    /// An enumeration of this declared type, without start value.
+    pub fn enumeration(declared_type: impl Into<String>) -> Self {
+        Self::Enumeration(Integer { declared_type: Some(declared_type.into()), ..Integer::default() })
+    }
+
+    /// The type alone.
+    pub fn scalar_type(&self) -> ScalarType {
+        match self {
+            Self::Real(_) => ScalarType::Real,
+            Self::Integer(_) => ScalarType::Integer,
+            Self::Boolean(_) => ScalarType::Boolean,
+            Self::String(_) => ScalarType::String,
+            Self::Enumeration(_) => ScalarType::Enumeration,
+        }
+    }
+
     /// The functions that read and write variables of this kind.
     pub fn base_type(&self) -> BaseType {
+        self.scalar_type().base_type()
+    }
+
+    /// The name of the declared type.
+    pub fn declared_type(&self) -> Option<&str> {
+        let (Self::Real(Real { declared_type, .. })
+        | Self::Integer(Integer { declared_type, .. })
+        | Self::Enumeration(Integer { declared_type, .. })
+        | Self::Boolean(Plain { declared_type, .. })
+        | Self::String(Plain { declared_type, .. })) = self;
+        declared_type.as_deref()
+    }
+
+    /// The unit; of a Real only.
+    pub fn unit(&self) -> Option<&str> {
+        if let Self::Real(real) = self { real.unit.as_deref() } else { None }
+    }
+
+    /// The display unit; of a Real only.
+    pub fn display_unit(&self) -> Option<&str> {
+        if let Self::Real(real) = self { real.display_unit.as_deref() } else { None }
+    }
+
+    /// `min` and `max` as numbers; of a Boolean or a text none.
+    pub fn range(&self) -> (Option<f64>, Option<f64>) {
         match self {
-            Self::Real { .. } => BaseType::Real,
-            Self::Integer { .. } | Self::Enumeration { .. } => BaseType::Integer,
-            Self::Boolean { .. } => BaseType::Boolean,
-            Self::String { .. } => BaseType::String,
+            Self::Real(real) => (real.min, real.max),
+            Self::Integer(of) | Self::Enumeration(of) => (of.min.map(f64::from), of.max.map(f64::from)),
+            Self::Boolean(_) | Self::String(_) => (None, None),
         }
     }
 
     /// Whether a start value is given.
     pub fn has_start(&self) -> bool {
         match self {
-            Self::Real { start, .. } => start.is_some(),
-            Self::Integer { start, .. } | Self::Enumeration { start, .. } => start.is_some(),
-            Self::Boolean { start } => start.is_some(),
-            Self::String { start } => start.is_some(),
+            Self::String(text) => text.start.is_some(),
+            _ => self.start_number().is_some(),
+        }
+    }
+
+    /// The start value as a number, of a Boolean 0 or 1; of a text none.
+    pub fn start_number(&self) -> Option<f64> {
+        match self {
+            Self::Real(real) => real.start,
+            Self::Integer(of) | Self::Enumeration(of) => of.start.map(f64::from),
+            Self::Boolean(of) => of.start.map(|start| f64::from(u8::from(start))),
+            Self::String(_) => None,
         }
     }
 }
@@ -273,12 +360,9 @@ mod tests {
     fn table_has_the_fifteen_legal_pairs() {
         use Causality as C;
         use Variability as V;
-        let causalities =
-            [C::Parameter, C::CalculatedParameter, C::Input, C::Output, C::Local, C::Independent];
-        let variabilities = [V::Constant, V::Fixed, V::Tunable, V::Discrete, V::Continuous];
         let mut legal = 0;
-        for causality in causalities {
-            for variability in variabilities {
+        for &causality in C::ALL {
+            for &variability in V::ALL {
                 let Some(rule) = InitialRule::of(causality, variability) else { continue };
                 legal += 1;
                 assert_eq!(rule.default, rule.allowed.first().copied(), "{causality:?} {variability:?}");

@@ -1,21 +1,15 @@
-//! From the public types to the elements of `modelDescription.xml`, their private twins with the fields
-//! in the order of the XML schema.
+//! The file `modelDescription.xml`. The model's own types say how each element is written; here stand
+//! what is not a type of its own: the root, the containers, and what is derived.
 //!
 //! Attributes at the default of the schema are left out, except causality, variability and initial: a reader of
 //! the file should not have to know the table of defaults.
 
-mod element;
-
-use crate::number::Number;
-use crate::structure::{Structure, Unknown};
-use crate::{BaseUnit, Error, ModelDescription, NamingConvention, Variable, VariableKind};
-use element::{
-    Base, Category, CoSimulation, DefaultExperiment, IndexedUnknown, Item, Items, Kind, LogCategories,
-    ModelStructure, ModelVariables, Root, ScalarVariable, SimpleType, TypeDefinitions, Unit, UnitDefinitions,
-    Unknowns,
+use crate::{
+    CoSimulation, DefaultExperiment, EnumerationItem, Error, LogCategory, ModelDescription, ModelStructure,
+    SimpleType, Unit, Unknown, Variable, VariableKind,
 };
-use serde::Serialize;
-use std::collections::BTreeSet;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 impl ModelDescription {
     /// The content of `modelDescription.xml`: UTF-8 without byte order mark, two blanks of indentation.
@@ -27,27 +21,109 @@ impl ModelDescription {
     /// Those of [`validate`](Self::validate).
     pub fn to_xml(&self) -> Result<String, Error> {
         self.validate()?;
-        let structure = Structure::of(self)?;
-        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-        let mut serializer = quick_xml::se::Serializer::new(&mut text);
-        serializer.indent(' ', 2);
-        Root::new(self, &structure).serialize(serializer).map_err(Error::xml)?;
-        text.push('\n');
-        Ok(text)
+        text(&Root::new(self, &self.structure()?))
     }
 }
 
-/// A container with its children, or none at all, since the schema allows no empty containers.
-fn container<C, T>(children: Vec<T>, container: impl FnOnce(Vec<T>) -> C) -> Option<C> {
-    (!children.is_empty()).then(|| container(children))
+/// A document with this root: UTF-8 without byte order mark, two blanks of indentation.
+pub(crate) fn text<T: Serialize>(root: &T) -> Result<String, Error> {
+    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    let mut serializer = quick_xml::se::Serializer::new(&mut text);
+    serializer.indent(' ', 2);
+    root.serialize(serializer).map_err(Error::xml)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// A container with its children, or none at all, since the schemas allow no empty containers.
+pub(crate) fn container<T, L: AsRef<[T]>, C>(children: L, container: impl FnOnce(L) -> C) -> Option<C> {
+    (!children.as_ref().is_empty()).then(|| container(children))
+}
+
+#[derive(Serialize)]
+#[serde(rename = "fmiModelDescription")]
+struct Root<'a> {
+    #[serde(rename = "@fmiVersion")]
+    fmi_version: &'static str,
+    #[serde(rename = "@modelName")]
+    model_name: &'a str,
+    #[serde(rename = "@guid")]
+    guid: &'a str,
+    #[serde(rename = "@description", skip_serializing_if = "str::is_empty")]
+    description: &'a str,
+    #[serde(rename = "@author", skip_serializing_if = "str::is_empty")]
+    author: &'a str,
+    #[serde(rename = "@version", skip_serializing_if = "str::is_empty")]
+    version: &'a str,
+    #[serde(rename = "@copyright", skip_serializing_if = "str::is_empty")]
+    copyright: &'a str,
+    #[serde(rename = "@license", skip_serializing_if = "str::is_empty")]
+    license: &'a str,
+    #[serde(rename = "@generationTool", skip_serializing_if = "str::is_empty")]
+    generation_tool: &'a str,
+    #[serde(rename = "@generationDateAndTime", skip_serializing_if = "Option::is_none")]
+    generation_date_and_time: Option<&'a str>,
+    #[serde(rename = "@variableNamingConvention")]
+    variable_naming_convention: &'static str,
+    #[serde(rename = "CoSimulation")]
+    co_simulation: &'a CoSimulation,
+    #[serde(rename = "UnitDefinitions", skip_serializing_if = "Option::is_none")]
+    units: Option<UnitDefinitions<'a>>,
+    #[serde(rename = "TypeDefinitions", skip_serializing_if = "Option::is_none")]
+    types: Option<TypeDefinitions<'a>>,
+    #[serde(rename = "LogCategories", skip_serializing_if = "Option::is_none")]
+    log_categories: Option<LogCategories<'a>>,
+    #[serde(rename = "DefaultExperiment", skip_serializing_if = "Option::is_none")]
+    default_experiment: Option<DefaultExperiment>,
+    #[serde(rename = "ModelVariables")]
+    variables: ModelVariables<'a>,
+    #[serde(rename = "ModelStructure")]
+    structure: Structure<'a>,
+}
+
+#[derive(Serialize)]
+struct UnitDefinitions<'a> {
+    #[serde(rename = "Unit")]
+    units: &'a [Unit],
+}
+
+#[derive(Serialize)]
+struct TypeDefinitions<'a> {
+    #[serde(rename = "SimpleType")]
+    types: &'a [SimpleType],
+}
+
+#[derive(Serialize)]
+struct LogCategories<'a> {
+    #[serde(rename = "Category")]
+    categories: &'a [LogCategory],
+}
+
+#[derive(Serialize)]
+struct ModelVariables<'a> {
+    #[serde(rename = "ScalarVariable")]
+    variables: &'a [Variable],
+}
+
+#[derive(Serialize)]
+struct Structure<'a> {
+    #[serde(rename = "Outputs", skip_serializing_if = "Option::is_none")]
+    outputs: Option<Unknowns<'a>>,
+    #[serde(rename = "Derivatives", skip_serializing_if = "Option::is_none")]
+    derivatives: Option<Unknowns<'a>>,
+    #[serde(rename = "InitialUnknowns", skip_serializing_if = "Option::is_none")]
+    initial_unknowns: Option<Unknowns<'a>>,
+}
+
+#[derive(Serialize)]
+struct Unknowns<'a> {
+    #[serde(rename = "Unknown")]
+    unknowns: &'a [Unknown],
 }
 
 impl<'a> Root<'a> {
-    fn new(d: &'a ModelDescription, structure: &Structure) -> Self {
-        let units = d.units.iter().map(|unit| Unit { name: &unit.name, base: Base::new(&unit.base) });
-        let types = d.enumerations.iter().map(SimpleType::new);
-        let categories =
-            d.log_categories.iter().map(|c| Category { name: &c.name, description: &c.description });
+    fn new(d: &'a ModelDescription, structure: &'a ModelStructure) -> Self {
+        let unknowns = |list: &'a Vec<Unknown>| container(list.as_slice(), |unknowns| Unknowns { unknowns });
         Self {
             fmi_version: "2.0",
             model_name: &d.model_name,
@@ -59,118 +135,74 @@ impl<'a> Root<'a> {
             license: &d.license,
             generation_tool: &d.generation_tool,
             generation_date_and_time: d.generation_date_and_time.as_deref(),
-            variable_naming_convention: match d.variable_naming_convention {
-                NamingConvention::Flat => "flat",
-                NamingConvention::Structured => "structured",
-            },
-            co_simulation: CoSimulation::new(&d.co_simulation),
-            units: container(units.collect(), |units| UnitDefinitions { units }),
-            types: container(types.collect(), |types| TypeDefinitions { types }),
-            log_categories: container(categories.collect(), |categories| LogCategories { categories }),
-            default_experiment: d.default_experiment.as_ref().map(DefaultExperiment::new),
-            variables: ModelVariables { variables: d.variables.iter().map(ScalarVariable::new).collect() },
-            structure: ModelStructure {
-                outputs: Unknowns::new(&structure.outputs),
-                initial_unknowns: Unknowns::new(&structure.initial_unknowns),
+            variable_naming_convention: d.variable_naming_convention.as_str(),
+            co_simulation: &d.co_simulation,
+            units: container(d.units.as_slice(), |units| UnitDefinitions { units }),
+            types: container(d.types.as_slice(), |types| TypeDefinitions { types }),
+            log_categories: container(d.log_categories.as_slice(), |categories| LogCategories { categories }),
+            default_experiment: d.default_experiment,
+            variables: ModelVariables { variables: &d.variables },
+            structure: Structure {
+                outputs: unknowns(&structure.outputs),
+                derivatives: unknowns(&structure.derivatives),
+                initial_unknowns: unknowns(&structure.initial_unknowns),
             },
         }
     }
 }
 
-impl<'a> CoSimulation<'a> {
-    fn new(slave: &'a crate::CoSimulation) -> Self {
-        Self {
-            model_identifier: &slave.model_identifier,
-            needs_execution_tool: slave.needs_execution_tool,
-            can_handle_variable_step: slave.can_handle_variable_step,
-            can_interpolate_inputs: slave.can_interpolate_inputs,
-            max_output_derivative_order: slave.max_output_derivative_order,
-            can_run_asynchronously: slave.can_run_asynchronously,
-            can_be_instantiated_only_once_per_process: slave.can_be_instantiated_only_once_per_process,
-            can_not_use_memory_management_functions: slave.can_not_use_memory_management_functions,
-            can_get_and_set_state: slave.can_get_and_set_state,
-            can_serialize_state: slave.can_serialize_state,
-            provides_directional_derivative: slave.provides_directional_derivative,
+/// Serialises the names of source files.
+pub(crate) fn source_files<S: Serializer>(names: &[String], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct File<'a> {
+        #[serde(rename = "@name")]
+        name: &'a str,
+    }
+    let mut element = serializer.serialize_struct("SourceFiles", 1)?;
+    let files: Vec<_> = names.iter().map(|name| File { name }).collect();
+    element.serialize_field("File", &files)?;
+    element.end()
+}
+
+impl Serialize for Variable {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut element = serializer.serialize_struct("ScalarVariable", 7)?;
+        element.serialize_field("@name", &self.name)?;
+        element.serialize_field("@valueReference", &self.value_reference)?;
+        if !self.description.is_empty() {
+            element.serialize_field("@description", &self.description)?;
         }
-    }
-}
-
-impl Base {
-    fn new(base: &BaseUnit) -> Self {
-        let BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset } = *base;
-        let factor = (factor != 1.0).then_some(Number(factor));
-        let offset = (offset != 0.0).then_some(Number(offset));
-        Self { kg, m, s, a, k, mol, cd, rad, factor, offset }
-    }
-}
-
-impl<'a> SimpleType<'a> {
-    fn new(declared: &'a crate::EnumerationType) -> Self {
-        let item = |item: &'a crate::EnumerationItem| Item {
-            name: &item.name,
-            value: item.value,
-            description: &item.description,
-        };
-        let enumeration = Items { items: declared.items.iter().map(item).collect() };
-        Self { name: &declared.name, description: &declared.description, enumeration }
-    }
-}
-
-impl DefaultExperiment {
-    fn new(experiment: &crate::DefaultExperiment) -> Self {
-        Self {
-            start_time: Number(experiment.start_time),
-            stop_time: experiment.stop_time.map(Number),
-            tolerance: experiment.tolerance.map(Number),
-            step_size: experiment.step_size.map(Number),
+        element.serialize_field("@causality", self.causality.as_str())?;
+        element.serialize_field("@variability", self.variability.as_str())?;
+        if let Some(initial) = self.effective_initial() {
+            element.serialize_field("@initial", initial.as_str())?;
         }
+        element.serialize_field("$value", &self.kind)?;
+        element.end()
     }
 }
 
-impl<'a> ScalarVariable<'a> {
-    fn new(variable: &'a Variable) -> Self {
-        Self {
-            name: &variable.name,
-            value_reference: variable.value_reference,
-            description: &variable.description,
-            causality: variable.causality.as_str(),
-            variability: variable.variability.as_str(),
-            initial: variable.effective_initial().map(crate::Initial::as_str),
-            kind: Kind::new(&variable.kind),
+impl Serialize for SimpleType {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Enumeration<'a> {
+            #[serde(rename = "@quantity", skip_serializing_if = "Option::is_none")]
+            quantity: Option<&'a str>,
+            #[serde(rename = "Item")]
+            items: &'a [EnumerationItem],
         }
-    }
-}
-
-impl<'a> Kind<'a> {
-    fn new(kind: &'a VariableKind) -> Self {
-        match kind {
-            VariableKind::Real { start, min, max, nominal, quantity, unit } => Self::Real {
-                quantity: quantity.as_deref(),
-                unit: unit.as_deref(),
-                min: min.map(Number),
-                max: max.map(Number),
-                nominal: nominal.map(Number),
-                start: start.map(Number),
-            },
-            VariableKind::Integer { start, min, max } => {
-                Self::Integer { min: *min, max: *max, start: *start }
+        let mut element = serializer.serialize_struct("SimpleType", 3)?;
+        element.serialize_field("@name", &self.name)?;
+        if !self.description.is_empty() {
+            element.serialize_field("@description", &self.description)?;
+        }
+        match &self.kind {
+            VariableKind::Enumeration(of) => {
+                let of = Enumeration { quantity: of.quantity.as_deref(), items: &self.items };
+                element.serialize_field("Enumeration", &of)?;
             }
-            VariableKind::Boolean { start } => Self::Boolean { start: *start },
-            VariableKind::String { start } => Self::String { start: start.as_deref() },
-            VariableKind::Enumeration { declared_type, start } => {
-                Self::Enumeration { declared_type, start: *start }
-            }
+            kind => element.serialize_field("$value", kind)?,
         }
-    }
-}
-
-impl Unknowns {
-    fn new(unknowns: &[Unknown]) -> Option<Self> {
-        let list =
-            |indices: &BTreeSet<usize>| indices.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-        let unknowns = unknowns
-            .iter()
-            .map(|u| IndexedUnknown { index: u.index, dependencies: u.dependencies.as_ref().map(list) });
-        container(unknowns.collect(), |unknowns| Self { unknowns })
+        element.end()
     }
 }

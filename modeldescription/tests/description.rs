@@ -15,7 +15,7 @@ fn empty_lists_give_no_elements() {
     let mut description = small();
     description.variables.retain(|v| v.name == "count");
     description.units.clear();
-    description.enumerations.clear();
+    description.types.clear();
     description.log_categories.clear();
     description.default_experiment = None;
     let xml = description.to_xml().expect("valid");
@@ -36,10 +36,10 @@ fn empty_lists_give_no_elements() {
 fn start_values_read_back_exactly() {
     for start in [1.0 / 3.0, -2.5e-7, 5e-324, f64::MAX, -0.0] {
         let mut description = small();
-        let VariableKind::Real { start: field, .. } = &mut description.variables[2].kind else {
+        let VariableKind::Real(input) = &mut description.variables[2].kind else {
             panic!("a real input is expected");
         };
-        *field = Some(start);
+        input.start = Some(start);
         let xml = description.to_xml().expect("valid");
         let line = xml.lines().skip_while(|line| !line.contains("u[1]")).nth(1).expect("the Real element");
         let text = line.split("start=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("a start");
@@ -50,10 +50,10 @@ fn start_values_read_back_exactly() {
 #[test]
 fn infinite_start_goes_with_an_infinite_bound() {
     let mut description = small();
-    let VariableKind::Real { start, .. } = &mut description.variables[0].kind else {
+    let VariableKind::Real(parameter) = &mut description.variables[0].kind else {
         panic!("a real parameter is expected");
     };
-    *start = Some(f64::INFINITY);
+    parameter.start = Some(f64::INFINITY);
     assert!(description.to_xml().expect("valid").contains(r#"max="INF" nominal="1e-7" start="INF"/>"#));
 }
 

@@ -1,12 +1,16 @@
 //! SSP 1.0: the files of a small system, and one defect at a time.
 
 use punctual_modeldescription::{
-    Causality, Connector, ConnectorKind, EnumerationItem, EnumerationType, ParameterSet, ParameterValue,
-    SystemComponent, SystemConnection, SystemStructure,
+    Causality, Connector, EnumerationItem, ParameterSet, ParameterValue, Real, SimpleType, SystemComponent,
+    SystemConnection, SystemStructure, VariableKind,
 };
 
-fn connector(name: &str, causality: Causality, kind: ConnectorKind) -> Connector {
+fn connector(name: &str, causality: Causality, kind: VariableKind) -> Connector {
     Connector { name: name.into(), causality, kind }
+}
+
+fn real() -> VariableKind {
+    VariableKind::Real(Real::default())
 }
 
 fn system() -> SystemStructure {
@@ -18,14 +22,14 @@ fn system() -> SystemStructure {
                 name: "a".into(),
                 source: "resources/a.fmu".into(),
                 connectors: vec![
-                    connector("y", Causality::Output, ConnectorKind::Real),
-                    connector("s", Causality::Output, ConnectorKind::Enumeration("Status".into())),
+                    connector("y", Causality::Output, real()),
+                    connector("s", Causality::Output, VariableKind::enumeration("Status")),
                 ],
             },
             SystemComponent {
                 name: "b & c".into(),
                 source: "resources/b.fmu".into(),
-                connectors: vec![connector("u", Causality::Input, ConnectorKind::Real)],
+                connectors: vec![connector("u", Causality::Input, real())],
             },
         ],
         connections: vec![SystemConnection {
@@ -34,11 +38,11 @@ fn system() -> SystemStructure {
             factor: -1.0,
             offset: 0.0,
         }],
-        enumerations: vec![EnumerationType {
-            name: "Status".into(),
-            description: String::new(),
-            items: vec![EnumerationItem { name: "good".into(), value: 1, description: String::new() }],
-        }],
+        enumerations: vec![SimpleType::enumeration(
+            "Status",
+            "",
+            vec![EnumerationItem { name: "good".into(), value: 1, description: String::new() }],
+        )],
         ..SystemStructure::default()
     }
 }

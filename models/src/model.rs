@@ -131,9 +131,7 @@ impl Model {
 }
 
 fn check_name<'a>(name: &'a str, seen: &mut BTreeSet<&'a str>) -> Result<(), String> {
-    let mut chars = name.chars();
-    let head = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
-    if !head || !chars.all(|c| c.is_ascii_alphanumeric() || c == '_') {
+    if !syntax::is_identifier(name) {
         return Err(format!(
             "is {name:?}, must be letters, digits and underscores, not starting with a digit"
         ));

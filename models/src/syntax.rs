@@ -71,6 +71,21 @@ pub(crate) const TIME: &str = "t";
 /// π.
 pub(crate) const PI: &str = "pi";
 
+/// Whether a name may begin with `character`.
+fn is_first_in_name(character: char) -> bool {
+    character.is_ascii_alphabetic() || character == '_'
+}
+
+/// Whether `character` may stand in a name.
+pub fn is_in_name(character: char) -> bool {
+    character.is_ascii_alphanumeric() || character == '_'
+}
+
+/// Whether `name` is a C identifier: ASCII letters, digits and underscores, not starting with a digit.
+pub fn is_identifier(name: &str) -> bool {
+    name.starts_with(is_first_in_name) && name.chars().all(is_in_name)
+}
+
 /// Whether `name` means something in every expression and so cannot name a variable.
 pub fn is_reserved(name: &str) -> bool {
     name == TIME || name == PI || FUNCTIONS.iter().any(|f| f.0 == name)
@@ -212,8 +227,8 @@ fn number(input: &mut Input<'_>) -> ModalResult<Node> {
 
 /// A name, or the call of a function.
 fn named(input: &mut Input<'_>) -> ModalResult<Node> {
-    let head = one_of(|c: char| c.is_ascii_alphabetic() || c == '_');
-    let tail = take_while(0.., |c: char| c.is_ascii_alphanumeric() || c == '_');
+    let head = one_of(is_first_in_name);
+    let tail = take_while(0.., is_in_name);
     let name: &str = (head, tail).take().parse_next(input)?;
     let open = opt(preceded(multispace0, '(')).parse_next(input)?;
     if open.is_none() {

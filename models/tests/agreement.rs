@@ -8,9 +8,9 @@ use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, RelativeDegree};
 use punctual_core::nalgebra::{SMatrix, SVector};
-use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
+use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 /// A random expression: text for the one side, a tree for the other.
 #[derive(Clone, Debug)]

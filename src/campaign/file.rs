@@ -16,7 +16,7 @@ use super::in_process::InProcess;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
 use crate::coupling::{Simulation, System, links, port};
 use crate::error::Error;
-use crate::host::{Causality, Description, Fmu, Kind};
+use crate::host::{Causality, Description, Fmu, ScalarType};
 use crate::package;
 
 /// A campaign file as it is written.
@@ -227,8 +227,9 @@ impl Campaign {
             let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
             let variable = &descriptions[port.component].variables[port.variable];
             let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
-            if !settable || variable.kind != Kind::Real {
-                let (causality, kind) = (variable.causality.as_str(), variable.kind.name());
+            let of = variable.kind.scalar_type();
+            if !settable || of != ScalarType::Real {
+                let (causality, kind) = (variable.causality.as_str(), of.as_str());
                 let message =
                     format!("is a {kind} {causality}; only Real parameters and inputs can be varied");
                 return Err(in_file(ConfigurationError::new(field, message)));
@@ -237,11 +238,12 @@ impl Campaign {
                 let message = "is a connected input, whose values come from there";
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
-            let range = Range { min: variable.min, max: variable.max };
+            let (min, max) = variable.kind.range();
+            let range = Range { min, max };
             varied.push(Varied {
                 name: name.clone(),
-                unit: variable.unit.clone(),
-                description: variable.description.clone().unwrap_or_default(),
+                unit: variable.kind.unit().map(str::to_owned),
+                description: variable.description.clone(),
                 component: port.component,
                 reference: variable.value_reference,
                 distribution: section.checked(&field, range).map_err(in_file)?,

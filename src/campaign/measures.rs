@@ -2,7 +2,6 @@
 
 use punctual_core::filter::Status;
 use punctual_fmu::configuration::Configuration;
-use punctual_fmu::product::describe;
 
 use super::file::{Campaign, Choice, Success};
 use super::in_process::InProcess;
@@ -50,7 +49,7 @@ impl Measures {
             let description = &campaign.descriptions()[c];
             let unit = |variable: &str| {
                 let found = description.index_of(variable).map(|i| &description.variables[i]);
-                found.and_then(|v| v.unit.clone()).unwrap_or_default()
+                found.and_then(|v| v.kind.unit()).unwrap_or_default().to_owned()
             };
             filters.push(FilterPlan {
                 component: component.name.clone(),
@@ -206,7 +205,7 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
     add("failure".into(), Kind::Text, "", "the call that ended the run before its stop time");
     for filter in filters {
         for status in Status::ALL {
-            let (name, _) = describe(status);
+            let name = status.name();
             let meaning = format!("communication points with status {name}");
             add(format!("{}.status.{name}", filter.component), Kind::Count, "", &meaning);
         }

@@ -36,7 +36,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     output::result(&format!(
         "{}: {} with {} variables, guid {}",
         arguments.output.display(),
-        description.description.as_deref().unwrap_or(&description.model_name),
+        if description.description.is_empty() { &description.model_name } else { &description.description },
         description.variables.len(),
         description.guid,
     ));

@@ -8,7 +8,6 @@ use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
     VariableSection,
 };
-use punctual_fmu::product::describe;
 use serde::Serialize;
 
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
@@ -317,6 +316,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
             Method::ReferenceProfile => ("reference profile", settings.rate.or(default_rate)),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
             Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(deadline))),
+            _ => ("another method", None),
         };
         let chosen = promise.filter(|_| deadline.is_infinite()).map(|p| p.stay_rate);
         let stay_rate = settings.stay_rate.or(settings.rate).or(default_rate).or(chosen);
@@ -347,6 +347,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
                     format!("{reason}; the stay rate is used instead, without a promise")
                 }
                 Refusal::Profile(_) => format!("{reason}; the Hermite profile is used instead"),
+                _ => reason.to_string(),
             });
         }
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
@@ -431,7 +432,7 @@ fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) ->
     let mut u = u_ref.clone();
     let report = filter.step(t, x0, &u_ref, &mut u);
     let status = report.map_err(|e| Error::configuration(e.field(), e.message()))?.status;
-    Ok(describe(status).0)
+    Ok(status.name())
 }
 
 fn plant(c: &PlantConfiguration) -> PlantReport {

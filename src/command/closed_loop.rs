@@ -1,11 +1,11 @@
 //! What `check` finds by running the filter it checks in a closed loop, on the filter's own model and with the
 //! u_ref that is asked for: whether each promise is kept, the soonest deadline, the smallest bounds.
 
-use punctual_core::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_core::filter::{ProfileKind, SafetyFilter};
-use punctual_core::nominal::damping;
-use punctual_core::simulation::Schedule;
-use punctual_fmu::configuration::{FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
+use punctual_fmu::configuration::{Automatic, FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
+use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
+use punctual_reference::nominal::damping;
+use punctual_reference::simulation::Schedule;
 use serde::Serialize;
 
 use crate::coupling::Kept;
@@ -214,8 +214,8 @@ impl LoopReport {
 
 /// The experiment's length in s, or well past every deadline.
 fn watched(c: &FilterConfiguration) -> f64 {
-    let ends = c.barrier.iter().flat_map(|b| [b.deadline.unwrap_or(0.0), b.begin, b.end]);
-    let longest = ends.fold(0.0, f64::max);
+    let ends = c.barrier.iter().flat_map(|b| [b.deadline, b.begin, b.end]);
+    let longest = ends.flatten().fold(0.0, f64::max);
     (WATCHED * longest).max(c.experiment.stop_time - c.experiment.start_time)
 }
 
@@ -414,7 +414,7 @@ pub(super) fn ratings(
         for section in &mut tried.barrier {
             let Some(deadline) = section.deadline else { continue };
             section.rates.clear();
-            section.rate = candidate.rate_times_deadline / deadline;
+            section.rate = Automatic(candidate.rate_times_deadline / deadline);
             section.profile = match candidate.profile {
                 ProfileKind::Hermite => ProfileName::Hermite,
                 ProfileKind::LowPeak => ProfileName::LowPeak,

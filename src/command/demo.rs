@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use crate::demo::{self, DEADLINE, Method, Run, STOP, Summary};
 use crate::error::Error;
 use crate::output::{self, Progress};
+use crate::reproduce::cases::{self, DEADLINE};
+use crate::reproduce::demo::{self, Run, Summary};
 
 /// Arguments of `punctual demo`.
 #[derive(Debug, clap::Args)]
@@ -30,7 +31,7 @@ struct Entry<'a> {
     method: &'a str,
     deadline: f64,
     kept: bool,
-    inputs: [&'a str; 2],
+    inputs: Vec<&'a str>,
     #[serde(flatten)]
     summary: &'a Summary,
 }
@@ -46,7 +47,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let runs = demo::run(&arguments.out, arguments.library.as_deref(), |fraction| progress.update(fraction))?;
     drop(progress);
     if arguments.json {
-        output::json(&runs.iter().map(entry).collect::<Vec<_>>());
+        output::json(&runs.iter().flatten().map(entry).collect::<Vec<_>>());
     } else {
         output::result(&text(&runs));
         output::note(&format!(
@@ -54,22 +55,22 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             arguments.out.display()
         ));
     }
-    let kept = runs.iter().filter(|run| run.method == Method::ReferenceProfile).all(|run| run.summary.kept());
+    let kept = runs.iter().all(|[_, ours]| ours.summary.kept(DEADLINE));
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 fn entry(run: &Run) -> Entry<'_> {
     Entry {
-        model: run.model.key,
-        method: run.method.key(),
+        model: run.case.vehicle.key(),
+        method: run.case.method,
         deadline: DEADLINE,
-        kept: run.summary.kept(),
-        inputs: run.model.inputs.map(|(name, _)| name),
+        kept: run.summary.kept(DEADLINE),
+        inputs: run.case.vehicle.inputs().iter().map(|signal| signal.name).collect(),
         summary: &run.summary,
     }
 }
 
-fn text(runs: &[Run]) -> String {
+fn text(runs: &[[Run; 2]]) -> String {
     let header = [
         "model",
         "method",
@@ -82,14 +83,14 @@ fn text(runs: &[Run]) -> String {
         "steps/s",
     ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
-    for run in runs {
+    for run in runs.iter().flatten() {
         let s = &run.summary;
         rows.push(vec![
-            run.model.title.to_owned(),
-            run.method.title().to_owned(),
+            run.case.vehicle.title().to_owned(),
+            run.case.title.to_owned(),
             format!("{DEADLINE:.3} s"),
             s.arrival.map_or("never".to_owned(), |t| format!("{t:.3} s")),
-            format!("{:.3} {}", s.min_h_after_deadline, run.method.unit()),
+            format!("{:.3} {}", s.min_h_after_deadline, run.case.setup.shape.unit()),
             if s.farthest_outside > 0.0 {
                 format!("{:.2} m", s.farthest_outside)
             } else {
@@ -101,19 +102,22 @@ fn text(runs: &[Run]) -> String {
         ]);
     }
     format!(
-        "From rest at the origin into a disc of radius 2 m at (45, 45) m within {DEADLINE} s, 1 ms steps, to {STOP} s.\n\
+        "From rest at the origin into a disc of radius 2 m at (45, 45) m within {DEADLINE} s, 1 ms steps, to {} s.\n\
          Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\"after\": from the deadline to the end of the run.\n\n{}",
+        2.0 * DEADLINE,
         output::table(&rows, &[false, false, true, true, true, true, true, true, true])
     )
 }
 
 /// The length of the input vector where its components share a unit, else both components.
 fn peaks(run: &Run, values: [f64; 2], norm: f64) -> String {
-    let [(_, first), (_, second)] = run.model.inputs;
-    if first == second {
-        return format!("{} {first}", short(norm));
+    match run.case.vehicle.inputs() {
+        [first, second] if first.unit == second.unit => format!("{} {}", short(norm), cases::unit(first)),
+        inputs => {
+            let each = inputs.iter().zip(values).map(|(input, value)| (cases::unit(input), short(value)));
+            each.map(|(unit, value)| format!("{value} {unit}")).collect::<Vec<_>>().join(", ")
+        }
     }
-    format!("{} {first}, {} {second}", short(values[0]), short(values[1]))
 }
 
 fn short(value: f64) -> String {

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_modeldescription::CoSimulation;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::host::{Capabilities, DefaultExperiment, Description, Fmu, Kind, Output, Variable};
+use crate::host::{DefaultExperiment, Description, Fmu, Output, Variable};
 use crate::output;
 
 /// Arguments of `punctual inspect`.
@@ -33,11 +34,30 @@ struct Report<'a> {
     generation_time: Option<&'a str>,
     platforms: &'a [String],
     capabilities: Capabilities,
-    default_experiment: Option<DefaultExperiment>,
+    default_experiment: Option<Experiment>,
     variables: Vec<VariableReport<'a>>,
     /// For each output the inputs it depends on directly; `null` where the FMU does not say.
     dependencies: Vec<DependencyReport<'a>>,
     problems: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Capabilities {
+    can_handle_variable_communication_step_size: bool,
+    can_interpolate_inputs: bool,
+    can_get_and_set_fmu_state: bool,
+    can_serialize_fmu_state: bool,
+    provides_directional_derivative: bool,
+    can_be_instantiated_only_once_per_process: bool,
+    needs_execution_tool: bool,
+}
+
+#[derive(Serialize)]
+struct Experiment {
+    start_time: Option<f64>,
+    stop_time: Option<f64>,
+    step_size: Option<f64>,
+    tolerance: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -82,20 +102,32 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
 fn report(fmu: &Fmu) -> Report<'_> {
     let d = fmu.description();
+    let can = &d.co_simulation;
     Report {
         file: fmu.path().display().to_string(),
         model_name: &d.model_name,
         guid: &d.guid,
-        model_identifier: &d.model_identifier,
-        description: d.description.as_deref(),
-        author: d.author.as_deref(),
-        version: d.version.as_deref(),
-        generation_tool: d.generation_tool.as_deref(),
-        generation_time: d.generation_time.as_deref(),
+        model_identifier: &d.co_simulation.model_identifier,
+        description: given(&d.description),
+        author: given(&d.author),
+        version: given(&d.version),
+        generation_tool: given(&d.generation_tool),
+        generation_time: d.generation_date_and_time.as_deref(),
         platforms: fmu.platforms(),
-        capabilities: d.capabilities,
-        default_experiment: d.default_experiment,
-        variables: d.variables.iter().map(variable_report).collect(),
+        capabilities: Capabilities {
+            can_handle_variable_communication_step_size: can.can_handle_variable_step,
+            can_interpolate_inputs: can.can_interpolate_inputs,
+            can_get_and_set_fmu_state: can.can_get_and_set_state,
+            can_serialize_fmu_state: can.can_serialize_state,
+            provides_directional_derivative: can.provides_directional_derivative,
+            can_be_instantiated_only_once_per_process: can.can_be_instantiated_only_once_per_process,
+            needs_execution_tool: can.needs_execution_tool,
+        },
+        default_experiment: d.default_experiment.map(|e| {
+            let DefaultExperiment { start_time, stop_time, step_size, tolerance } = e;
+            Experiment { start_time, stop_time, step_size, tolerance }
+        }),
+        variables: d.variables.iter().zip(&d.starts).map(|(v, start)| variable_report(d, v, start)).collect(),
         dependencies: d
             .outputs
             .iter()
@@ -108,19 +140,25 @@ fn report(fmu: &Fmu) -> Report<'_> {
     }
 }
 
-fn variable_report(v: &Variable) -> VariableReport<'_> {
+/// A text, if there is one.
+fn given(text: &str) -> Option<&str> {
+    (!text.is_empty()).then_some(text)
+}
+
+fn variable_report<'a>(d: &'a Description, v: &'a Variable, start: &'a Option<String>) -> VariableReport<'a> {
+    let (min, max) = v.kind.range();
     VariableReport {
         name: &v.name,
         value_reference: v.value_reference,
-        r#type: v.kind.name(),
+        r#type: v.kind.scalar_type().as_str(),
         causality: v.causality.as_str(),
         variability: v.variability.as_str(),
-        unit: v.unit.as_deref(),
-        start: v.start.as_deref(),
-        min: v.min,
-        max: v.max,
-        description: v.description.as_deref(),
-        items: v.items.iter().map(|item| (item.name.as_str(), item.value)).collect(),
+        unit: v.kind.unit(),
+        start: start.as_deref(),
+        min,
+        max,
+        description: given(&v.description),
+        items: d.items(v).iter().map(|item| (item.name.as_str(), item.value)).collect(),
     }
 }
 
@@ -132,17 +170,20 @@ fn text(fmu: &Fmu) -> String {
     let d = fmu.description();
     let mut facts = vec![
         ("model", d.model_name.clone()),
-        ("description", d.description.clone().unwrap_or_default()),
+        ("description", d.description.clone()),
         ("guid", d.guid.clone()),
-        ("identifier", d.model_identifier.clone()),
-        ("version", d.version.clone().unwrap_or_default()),
-        ("author", d.author.clone().unwrap_or_default()),
-        ("tool", join(" of ", [d.generation_tool.clone(), d.generation_time.clone()])),
+        ("identifier", d.co_simulation.model_identifier.clone()),
+        ("version", d.version.clone()),
+        ("author", d.author.clone()),
+        (
+            "tool",
+            join(" of ", [given(&d.generation_tool).map(str::to_owned), d.generation_date_and_time.clone()]),
+        ),
         (
             "platforms",
             if fmu.platforms().is_empty() { "none".to_owned() } else { fmu.platforms().join(", ") },
         ),
-        ("can", capabilities(d.capabilities)),
+        ("can", capabilities(&d.co_simulation)),
     ];
     if let Some(e) = d.default_experiment {
         let part = |name: &str, value: Option<f64>, unit: &str| value.map(|v| format!("{name} {v}{unit}"));
@@ -163,12 +204,12 @@ fn join<const N: usize>(separator: &str, parts: [Option<String>; N]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(separator)
 }
 
-fn capabilities(c: Capabilities) -> String {
+fn capabilities(c: &CoSimulation) -> String {
     let named = [
-        (c.can_handle_variable_communication_step_size, "take steps of any length"),
+        (c.can_handle_variable_step, "take steps of any length"),
         (c.can_interpolate_inputs, "interpolate inputs"),
-        (c.can_get_and_set_fmu_state, "save and restore its state"),
-        (c.can_serialize_fmu_state, "serialise its state"),
+        (c.can_get_and_set_state, "save and restore its state"),
+        (c.can_serialize_state, "serialise its state"),
         (c.provides_directional_derivative, "give directional derivatives"),
         (c.can_be_instantiated_only_once_per_process, "only be instantiated once per process"),
         (c.needs_execution_tool, "only run with its tool"),
@@ -179,21 +220,23 @@ fn capabilities(c: Capabilities) -> String {
 fn variables(d: &Description) -> String {
     let header = ["name", "vr", "type", "causality", "unit", "start", "min", "max", "description"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
-    for v in &d.variables {
-        let mut description = v.description.clone().unwrap_or_default();
-        if v.kind == Kind::Enumeration && !v.items.is_empty() {
-            let items: Vec<_> = v.items.iter().map(|i| format!("{} {}", i.value, i.name)).collect();
+    for (v, start) in d.variables.iter().zip(&d.starts) {
+        let mut description = v.description.clone();
+        let items = d.items(v);
+        if !items.is_empty() {
+            let items: Vec<_> = items.iter().map(|i| format!("{} {}", i.value, i.name)).collect();
             description = format!("{description} [{}]", items.join(", "));
         }
+        let (min, max) = v.kind.range();
         rows.push(vec![
             v.name.clone(),
             v.value_reference.to_string(),
-            v.kind.name().to_owned(),
+            v.kind.scalar_type().as_str().to_owned(),
             v.causality.as_str().to_owned(),
-            v.unit.clone().unwrap_or_default(),
-            v.start.clone().unwrap_or_default(),
-            v.min.map(output::number).unwrap_or_default(),
-            v.max.map(output::number).unwrap_or_default(),
+            v.kind.unit().unwrap_or_default().to_owned(),
+            start.clone().unwrap_or_default(),
+            min.map(output::number).unwrap_or_default(),
+            max.map(output::number).unwrap_or_default(),
             description.trim().to_owned(),
         ]);
     }

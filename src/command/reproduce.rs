@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use crate::error::Error;
 use crate::output::{self, Progress};
-use crate::reproduce::{self, Options, Report, guide};
+use crate::reproduce::{self, Options, Report, bicycles, guide};
 
 /// Arguments of `punctual reproduce`.
 #[derive(Debug, clap::Args)]
@@ -27,9 +27,13 @@ pub struct Arguments {
     /// Only renew the pictures and numbers of guide.md in this folder, such as docs
     #[arg(long, value_name = "DIR")]
     guide: Option<PathBuf>,
+    /// Only print the table of docs/bicycle.md: filters on bicycles that they do not know
+    #[arg(long, conflicts_with = "guide")]
+    bicycles: bool,
 }
 
-/// Runs the study. The exit code is 1 if our method misses a deadline or leaves the disc.
+/// Runs the study. The exit code is 1 if our method misses a deadline or leaves the disc; among the bicycles, with the
+/// car.
 ///
 /// # Errors
 ///
@@ -44,12 +48,23 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let chosen = if arguments.quick { Options::QUICK } else { Options::FULL };
     let options = Options { timed: !arguments.untimed, ..chosen };
     let progress = Mutex::new(Progress::new("reproduce"));
-    let report = reproduce::run(options, &|fraction| {
+    let tell = |fraction| {
         // Whoever comes while another one draws has nothing to add.
         if let Ok(mut progress) = progress.try_lock() {
             progress.show(fraction);
         }
-    })?;
+    };
+    if arguments.bicycles {
+        let (table, kept) = bicycles::table(&options, &tell)?;
+        drop(progress);
+        if arguments.json {
+            output::json(&table);
+        } else {
+            output::result(&table.text());
+        }
+        return Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) });
+    }
+    let report = reproduce::run(options, &tell)?;
     drop(progress);
     reproduce::save(&report, &arguments.out)?;
     if arguments.json {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::output;
-use crate::validate::{self, Finding, RULES, Severity, trial};
+use crate::validate::{self, Finding, Severity, trial};
 
 /// Arguments of `punctual validate`.
 #[derive(Debug, clap::Args)]
@@ -110,14 +110,13 @@ fn text(report: &Report) -> String {
 fn rules(json: bool) {
     if json {
         let list: Vec<_> =
-            RULES.iter().map(|&(rule, severity, asks)| Rule { rule, severity, asks }).collect();
+            validate::rules().map(|&(rule, severity, asks)| Rule { rule, severity, asks }).collect();
         output::json(&list);
         return;
     }
     let mut rows = vec![["rule", "severity", "asks that"].map(str::to_owned).to_vec()];
     rows.extend(
-        RULES
-            .iter()
+        validate::rules()
             .map(|(rule, severity, asks)| vec![(*rule).to_owned(), severity.to_string(), (*asks).to_owned()]),
     );
     output::result(&output::table(&rows, &[]));

@@ -3,7 +3,7 @@
 use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
 use super::system::System;
-use crate::host::{Causality, Description, Kind};
+use crate::host::{Causality, Description, ScalarType};
 use crate::recording::{Column, Recording};
 
 /// Rows for which room is made before a run; longer recordings grow while running.
@@ -31,10 +31,10 @@ impl Layout {
         links: &[Link],
         read: &[Port],
     ) -> [Group; 3] {
-        let mut parts: [Vec<(usize, u32, Kind)>; 3] = Default::default();
+        let mut parts: [Vec<(usize, u32, ScalarType)>; 3] = Default::default();
         for (position, variable) in description.variables.iter().enumerate() {
             let port = Port { component, variable: position };
-            let entry = (position, variable.value_reference, variable.kind);
+            let entry = (position, variable.value_reference, variable.kind.scalar_type());
             if variable.causality == Causality::Output {
                 if read.contains(&port) || links.iter().any(|link| link.from == port) {
                     parts[usize::from(network::has_feedthrough(

@@ -125,7 +125,7 @@ impl Simulation<Slave> {
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
             let shared = opened.iter().find(|(other, fmu)| {
-                *other == path && !fmu.description().capabilities.can_be_instantiated_only_once_per_process
+                *other == path && !fmu.description().co_simulation.can_be_instantiated_only_once_per_process
             });
             let fmu = match shared {
                 Some((_, fmu)) => Rc::clone(fmu),
@@ -188,7 +188,10 @@ impl<P: Participant> Simulation<P> {
             .map(|port| {
                 let variable = &descriptions[port.component].variables[port.variable];
                 let component = &system.components()[port.component].name;
-                Column { name: format!("{component}.{}", variable.name), unit: variable.unit.clone() }
+                Column {
+                    name: format!("{component}.{}", variable.name),
+                    unit: variable.kind.unit().map(str::to_owned),
+                }
             })
             .collect();
         let mut members = Vec::new();
@@ -468,7 +471,7 @@ impl<P: Participant> Simulation<P> {
     fn note_shortened_step(&mut self, descriptions: &[&Description]) {
         let Some(last) = self.grid.shortened() else { return };
         for (member, description) in self.members.iter().zip(descriptions) {
-            if !description.capabilities.can_handle_variable_communication_step_size {
+            if !description.co_simulation.can_handle_variable_step {
                 let name = member.participant.name();
                 self.notes.push(format!(
                     "the last step is {last} s long, but the FMU of {name} does not say that it can handle steps \

@@ -4,7 +4,7 @@
 use super::graph::{self, Edge};
 use super::system::{Component, Picture, StartValue, System};
 use crate::error::Error;
-use crate::host::{Causality, Description, Kind, Output, Variable};
+use crate::host::{Causality, Description, Output, ScalarType, Variable};
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +109,10 @@ impl<'a> Resolver<'a> {
         &self.descriptions[port.component].variables[port.variable]
     }
 
+    fn scalar_type(&self, port: Port) -> ScalarType {
+        self.variable(port).kind.scalar_type()
+    }
+
     fn component_name(&self, component: usize) -> &'a str {
         &self.system.components()[component].name
     }
@@ -179,8 +183,9 @@ impl<'a> Resolver<'a> {
             self.expect_causality(&format!("{field}.to"), to, Causality::Input)?;
             let (factor, offset) = (connection.factor, connection.offset);
             self.check_types(&field, from, to)?;
-            if self.variable(to).kind != Kind::Real && (factor != 1.0 || offset != 0.0) {
-                let kind = self.variable(to).kind.name();
+            let of = self.scalar_type(to);
+            if of != ScalarType::Real && (factor != 1.0 || offset != 0.0) {
+                let kind = of.as_str();
                 let message = format!("factor and offset are for Real signals; {} is {kind}", self.name(to));
                 return Err(Error::configuration(field, message));
             }
@@ -245,13 +250,13 @@ impl<'a> Resolver<'a> {
     }
 
     fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
-        let (given, taken) = (self.variable(from).kind, self.variable(to).kind);
+        let (given, taken) = (self.scalar_type(from), self.scalar_type(to));
         if given != taken {
-            let (from, to, given, taken) = (self.name(from), self.name(to), given.name(), taken.name());
+            let (from, to, given, taken) = (self.name(from), self.name(to), given.as_str(), taken.as_str());
             let message = format!("{from} is {given}, but {to} is {taken}; types must be equal");
             return Err(Error::configuration(field, message));
         }
-        if given == Kind::String {
+        if given == ScalarType::String {
             let message = format!("{} is String; text cannot be connected", self.name(from));
             return Err(Error::configuration(field, message));
         }
@@ -280,30 +285,29 @@ impl<'a> Resolver<'a> {
             )));
         }
         let reference = variable.value_reference;
-        let (start, number) = match (variable.kind, value) {
-            (Kind::Real, StartValue::Real(x)) => (Start::Real(reference, x), x),
+        let (start, number) = match (variable.kind.scalar_type(), value) {
+            (ScalarType::Real, StartValue::Real(x)) => (Start::Real(reference, x), x),
             // Beyond 2⁵³ the nearest double is taken, as for any decimal number.
-            (Kind::Real, StartValue::Integer(i)) => (Start::Real(reference, i as f64), i as f64),
-            (Kind::Integer | Kind::Enumeration, StartValue::Integer(i)) => {
+            (ScalarType::Real, StartValue::Integer(i)) => (Start::Real(reference, i as f64), i as f64),
+            (ScalarType::Integer | ScalarType::Enumeration, StartValue::Integer(i)) => {
                 let i = i32::try_from(i)
                     .map_err(|_| wrong(format!("is {i}; must be from {} to {}", i32::MIN, i32::MAX)))?;
                 (Start::Integer(reference, i), f64::from(i))
             }
-            (Kind::Boolean, StartValue::Boolean(b)) => {
+            (ScalarType::Boolean, StartValue::Boolean(b)) => {
                 (Start::Boolean(reference, i32::from(b)), f64::from(u8::from(b)))
             }
-            (kind, _) => return Err(wrong(format!("is of type {}; the value given is not", kind.name()))),
+            (of, _) => return Err(wrong(format!("is of type {}; the value given is not", of.as_str()))),
         };
-        let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
+        let (min, max) = variable.kind.range();
+        let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
         if number < min || number > max {
-            let unit = variable.unit.as_deref().map(|unit| format!(" {unit}")).unwrap_or_default();
+            let unit = variable.kind.unit().map(|unit| format!(" {unit}")).unwrap_or_default();
             return Err(wrong(format!("is {number}{unit}; must be {}", range(min, max, &unit))));
         }
-        if variable.kind == Kind::Enumeration
-            && !variable.items.is_empty()
-            && !variable.items.iter().any(|item| f64::from(item.value) == number)
-        {
-            let items: Vec<_> = variable.items.iter().map(|i| format!("{} ({})", i.value, i.name)).collect();
+        let items = self.descriptions[component].items(variable);
+        if !items.is_empty() && !items.iter().any(|item| f64::from(item.value) == number) {
+            let items: Vec<_> = items.iter().map(|i| format!("{} ({})", i.value, i.name)).collect();
             return Err(wrong(format!("is {number}; must be one of {}", items.join(", "))));
         }
         Ok(start)
@@ -318,7 +322,7 @@ impl<'a> Resolver<'a> {
             let field = format!("record.signals[{i}]");
             let port = self.port(&field, signal)?;
             let variable = self.variable(port);
-            if variable.kind == Kind::String {
+            if self.scalar_type(port) == ScalarType::String {
                 return Err(Error::configuration(field, format!("{signal} is String; text is not recorded")));
             }
             if variable.causality != Causality::Output && !links.iter().any(|link| link.to == port) {
@@ -340,7 +344,7 @@ impl<'a> Resolver<'a> {
                 .map(move |variable| Port { component, variable })
         };
         let outputs = ports().filter(|&p| {
-            self.variable(p).causality == Causality::Output && self.variable(p).kind != Kind::String
+            self.variable(p).causality == Causality::Output && self.scalar_type(p) != ScalarType::String
         });
         let inputs = ports().filter(|p| links.iter().any(|link| link.to == *p));
         outputs.chain(inputs).collect()

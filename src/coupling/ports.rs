@@ -3,7 +3,7 @@
 
 use super::participant::Participant;
 use crate::error::Error;
-use crate::host::Kind;
+use crate::host::ScalarType;
 
 /// Variables of one component that are read or written together, real ones first, then integers
 /// and enumerations, then Booleans; their slots follow one another in this order.
@@ -22,10 +22,15 @@ pub(super) type Position = usize;
 impl Group {
     /// Lays out `variables` (position, value reference, type) from slot `first` on. Returns the
     /// group and the positions in slot order. Strings are left out.
-    pub(super) fn new(first: usize, variables: &[(Position, u32, Kind)]) -> (Self, Vec<Position>) {
-        let of =
-            |wanted: &[Kind]| variables.iter().copied().filter(|v| wanted.contains(&v.2)).collect::<Vec<_>>();
-        let parts = [of(&[Kind::Real]), of(&[Kind::Integer, Kind::Enumeration]), of(&[Kind::Boolean])];
+    pub(super) fn new(first: usize, variables: &[(Position, u32, ScalarType)]) -> (Self, Vec<Position>) {
+        let of = |wanted: &[ScalarType]| {
+            variables.iter().copied().filter(|v| wanted.contains(&v.2)).collect::<Vec<_>>()
+        };
+        let parts = [
+            of(&[ScalarType::Real]),
+            of(&[ScalarType::Integer, ScalarType::Enumeration]),
+            of(&[ScalarType::Boolean]),
+        ];
         let positions = parts.iter().flatten().map(|v| v.0).collect();
         let [real, integer, boolean] = parts.map(|part| part.into_iter().map(|v| v.1).collect::<Vec<_>>());
         let scratch = vec![0; integer.len().max(boolean.len())];
@@ -116,11 +121,11 @@ mod tests {
     #[test]
     fn slots_are_laid_out_by_type() {
         let variables = [
-            (0, 10, Kind::Boolean),
-            (1, 11, Kind::Real),
-            (2, 12, Kind::String),
-            (3, 13, Kind::Enumeration),
-            (4, 14, Kind::Real),
+            (0, 10, ScalarType::Boolean),
+            (1, 11, ScalarType::Real),
+            (2, 12, ScalarType::String),
+            (3, 13, ScalarType::Enumeration),
+            (4, 14, ScalarType::Real),
         ];
         let (group, positions) = Group::new(5, &variables);
         assert_eq!(positions, [1, 4, 3, 0]);

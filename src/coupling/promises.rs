@@ -179,7 +179,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
             let Some(barrier) = variable.name.strip_suffix(".unmet_steps") else { continue };
             let ports = FIELDS.map(|field| output(&format!("{barrier}.{field}")));
             let [Some(unmet), Some(slack), Some(h), Some(late), Some(phase)] = ports else { continue };
-            let unit = |port: Port| description.variables[port.variable].unit.as_deref().unwrap_or("1");
+            let unit = |port: Port| description.variables[port.variable].kind.unit().unwrap_or("1");
             let straight = over_seconds(unit(h), 1) == unit(slack);
             let parameter = description.index_of(&format!("{barrier}.deadline"));
             let parameter = parameter.map(|i| &description.variables[i]);
@@ -189,8 +189,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
                 status,
                 fields: [unmet, slack, h, late, phase],
                 rearm: description.index_of("rearm").map(|variable| Port { component, variable }),
-                deadline: parameter
-                    .and_then(|v| Some((v.value_reference, v.start.as_deref()?.parse().ok()?))),
+                deadline: parameter.and_then(|v| Some((v.value_reference, v.kind.start_number()?))),
                 course: if straight { Course::Straight } else { Course::Smooth },
                 prompt: system.experiment().order == Order::GaussSeidel
                     && network::has_feedthrough(owner, description, h.variable),

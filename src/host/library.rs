@@ -1,26 +1,13 @@
 //! A loaded shared library and the FMI 2.0 functions the host uses, all resolved when loading.
-//! Signatures stand in section 2.1 and 4.2 of the standard; this file trusts libraries to follow them.
+//! This file trusts libraries to follow the signatures of the standard.
 
-use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
 
+use punctual_modeldescription::fmi2;
+
 use super::archive::chain;
-use super::logging::{CallbackFunctions, owned};
+use super::logging::owned;
 use crate::error::FmuProblem;
-
-pub(super) type Component = *mut c_void;
-pub(super) type ValueReference = u32;
-type Get<T> = unsafe extern "C" fn(Component, *const ValueReference, usize, *mut T) -> c_int;
-type Set<T> = unsafe extern "C" fn(Component, *const ValueReference, usize, *const T) -> c_int;
-type Plain = unsafe extern "C" fn(Component) -> c_int;
-type Text = unsafe extern "C" fn() -> *const c_char;
-
-/// `fmi2CoSimulation` of `fmi2Type`.
-pub(super) const CO_SIMULATION: c_int = 1;
-/// `fmi2True`.
-pub(super) const TRUE: c_int = 1;
-/// `fmi2False`.
-pub(super) const FALSE: c_int = 0;
 
 macro_rules! functions {
     ($($(#[$doc:meta])* $field:ident: $name:literal, $type:ty;)*) => {
@@ -40,33 +27,29 @@ macro_rules! functions {
 }
 
 functions! {
-    get_types_platform: "fmi2GetTypesPlatform", Text;
-    get_version: "fmi2GetVersion", Text;
-    instantiate: "fmi2Instantiate", unsafe extern "C" fn(
-        *const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int,
-    ) -> Component;
-    free_instance: "fmi2FreeInstance", unsafe extern "C" fn(Component);
-    setup_experiment: "fmi2SetupExperiment", unsafe extern "C" fn(
-        Component, c_int, f64, f64, c_int, f64,
-    ) -> c_int;
-    enter_initialization_mode: "fmi2EnterInitializationMode", Plain;
-    exit_initialization_mode: "fmi2ExitInitializationMode", Plain;
-    terminate: "fmi2Terminate", Plain;
-    reset: "fmi2Reset", Plain;
-    get_real: "fmi2GetReal", Get<f64>;
-    get_integer: "fmi2GetInteger", Get<c_int>;
-    get_boolean: "fmi2GetBoolean", Get<c_int>;
-    set_real: "fmi2SetReal", Set<f64>;
-    set_integer: "fmi2SetInteger", Set<c_int>;
-    set_boolean: "fmi2SetBoolean", Set<c_int>;
-    do_step: "fmi2DoStep", unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
+    get_types_platform: "fmi2GetTypesPlatform", fmi2::GetTypesPlatform;
+    get_version: "fmi2GetVersion", fmi2::GetVersion;
+    instantiate: "fmi2Instantiate", fmi2::Instantiate;
+    free_instance: "fmi2FreeInstance", fmi2::FreeInstance;
+    setup_experiment: "fmi2SetupExperiment", fmi2::SetupExperiment;
+    enter_initialization_mode: "fmi2EnterInitializationMode", fmi2::EnterInitializationMode;
+    exit_initialization_mode: "fmi2ExitInitializationMode", fmi2::ExitInitializationMode;
+    terminate: "fmi2Terminate", fmi2::Terminate;
+    reset: "fmi2Reset", fmi2::Reset;
+    get_real: "fmi2GetReal", fmi2::GetReal;
+    get_integer: "fmi2GetInteger", fmi2::GetInteger;
+    get_boolean: "fmi2GetBoolean", fmi2::GetBoolean;
+    set_real: "fmi2SetReal", fmi2::SetReal;
+    set_integer: "fmi2SetInteger", fmi2::SetInteger;
+    set_boolean: "fmi2SetBoolean", fmi2::SetBoolean;
+    do_step: "fmi2DoStep", fmi2::DoStep;
 }
 
 /// A loaded library. The functions are valid while it lives.
 pub(super) struct Library {
     pub(super) functions: Functions,
     /// `fmi2GetString`, which couplings do without.
-    pub(super) get_string: Option<Get<*const c_char>>,
+    pub(super) get_string: Option<fmi2::GetString>,
     /// What `fmi2GetVersion` answered.
     pub(super) version: String,
     /// What `fmi2GetTypesPlatform` answered.
@@ -103,7 +86,7 @@ impl Library {
         }
         let [version, types_platform] = <[String; 2]>::try_from(answers).unwrap_or_default();
         // SAFETY: the type is the one the standard gives the function of this name.
-        let get_string = unsafe { library.get::<Get<*const c_char>>("fmi2GetString") };
+        let get_string = unsafe { library.get::<fmi2::GetString>("fmi2GetString") };
         let get_string = get_string.ok().map(|symbol| *symbol);
         Ok(Self { functions, get_string, version, types_platform, _library: library })
     }

@@ -2,12 +2,12 @@
 //! messages kept for error texts. Knows nothing of calls and their order.
 
 use std::collections::VecDeque;
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::fmt;
 use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
 
-use super::Status;
+use punctual_modeldescription::fmi2::{self, CallbackFunctions, Status, Text};
 
 /// Messages kept per instance; older ones are dropped.
 const KEPT: usize = 8;
@@ -36,7 +36,7 @@ impl fmt::Display for LogMessage {
     }
 }
 
-type Receive = unsafe extern "C" fn(*const Environment, *const c_char, c_int, *const c_char, *const c_char);
+type Receive = unsafe extern "C" fn(*const Environment, Text, Status, Text, Text);
 
 /// What `componentEnvironment` points to. `logger.c` reads the first member.
 #[repr(C)]
@@ -46,19 +46,16 @@ pub(super) struct Environment {
     messages: Mutex<VecDeque<LogMessage>>,
 }
 
-/// `fmi2CallbackFunctions` of the standard, section 2.1.5.
-#[repr(C)]
-pub(super) struct CallbackFunctions {
-    logger: *const c_void,
-    allocate_memory: unsafe extern "C" fn(usize, usize) -> *mut c_void,
-    free_memory: unsafe extern "C" fn(*mut c_void),
-    step_finished: *const c_void,
-    component_environment: *const Environment,
-}
-
 unsafe extern "C" {
-    /// Defined in `logger.c`; only its address is used here.
-    fn punctual_host_logger();
+    /// Defined in `logger.c`: a [`fmi2::Logger`].
+    fn punctual_host_logger(
+        environment: fmi2::Environment,
+        instance: Text,
+        status: Status,
+        category: Text,
+        message: Text,
+        ...
+    );
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(pointer: *mut c_void);
 }
@@ -74,11 +71,11 @@ impl Logging {
         let environment =
             Rc::new(Environment { receive, messages: Mutex::new(VecDeque::with_capacity(KEPT)) });
         let callbacks = Rc::new(CallbackFunctions {
-            logger: punctual_host_logger as *const c_void,
-            allocate_memory: calloc,
-            free_memory: free,
-            step_finished: std::ptr::null(),
-            component_environment: Rc::as_ptr(&environment),
+            logger: Some(punctual_host_logger),
+            allocate_memory: Some(calloc),
+            free_memory: Some(free),
+            step_finished: None,
+            environment: Rc::as_ptr(&environment).cast_mut().cast(),
         });
         Self { environment, callbacks }
     }
@@ -107,10 +104,10 @@ impl Logging {
 /// `environment` is one that [`Logging`] made and still holds; every text is NULL or ends in a zero byte.
 unsafe extern "C" fn receive(
     environment: *const Environment,
-    _instance: *const c_char,
-    status: c_int,
-    category: *const c_char,
-    text: *const c_char,
+    _instance: Text,
+    status: Status,
+    category: Text,
+    text: Text,
 ) {
     // SAFETY: by contract the environment lives; it is only ever shared.
     let Some(environment) = (unsafe { environment.as_ref() }) else { return };
@@ -123,7 +120,7 @@ unsafe extern "C" fn receive(
         messages.pop_front();
     }
     messages.push_back(LogMessage {
-        status: Status::from_code(status),
+        status,
         category: printable(&category).chars().take(CATEGORY).collect(),
         text: printable(text.trim_end()),
     });
@@ -152,28 +149,22 @@ pub(super) unsafe fn owned(text: *const c_char) -> String {
 mod tests {
     use super::*;
 
-    type Logger =
-        unsafe extern "C" fn(*const Environment, *const c_char, c_int, *const c_char, *const c_char, ...);
-
-    fn logger() -> Logger {
-        // SAFETY: the C function has this signature.
-        unsafe { std::mem::transmute::<*const c_void, Logger>(punctual_host_logger as *const c_void) }
-    }
-
     #[test]
     fn formats_and_tolerates_null_and_strange_statuses() {
         let logging = Logging::new();
-        let environment = Rc::as_ptr(&logging.environment);
+        let environment: fmi2::Environment = Rc::as_ptr(&logging.environment).cast_mut().cast();
         let null = std::ptr::null();
         let (instance, category, format) = (c"i".as_ptr(), c"logError".as_ptr(), c"%s is %d".as_ptr());
         // SAFETY: the environment lives; texts are literals; arguments match the format.
-        unsafe { logger()(environment, instance, 3, category, format, c"n".as_ptr(), 7) };
+        unsafe {
+            punctual_host_logger(environment, instance, Status::ERROR, category, format, c"n".as_ptr(), 7);
+        };
         // SAFETY: as above.
-        unsafe { logger()(environment, null, -5, null, null) };
+        unsafe { punctual_host_logger(environment, null, Status(-5), null, null) };
         // SAFETY: a NULL environment is allowed.
-        unsafe { logger()(null.cast(), null, 0, null, c"lost".as_ptr()) };
+        unsafe { punctual_host_logger(std::ptr::null_mut(), null, Status::OK, null, c"lost".as_ptr()) };
         // SAFETY: as above. A conversion that writes is not carried out: nothing is there to write to.
-        unsafe { logger()(environment, instance, 0, null, c"100%n %s\x1b[2J".as_ptr()) };
+        unsafe { punctual_host_logger(environment, instance, Status::OK, null, c"100%n %s\x1b[2J".as_ptr()) };
         let messages = logging.messages();
         assert_eq!(messages.len(), 3);
         assert_eq!(messages[0].to_string(), "[fmi2Error, logError] n is 7");
@@ -184,11 +175,19 @@ mod tests {
     #[test]
     fn keeps_the_last_messages_and_bounds_their_length() {
         let logging = Logging::new();
-        let environment = Rc::as_ptr(&logging.environment);
+        let environment: fmi2::Environment = Rc::as_ptr(&logging.environment).cast_mut().cast();
         let long = std::ffi::CString::new("x".repeat(10_000)).unwrap();
         for _ in 0..3 * KEPT {
             // SAFETY: the environment lives; the text has no conversion.
-            unsafe { logger()(environment, std::ptr::null(), 0, std::ptr::null(), long.as_ptr()) };
+            unsafe {
+                punctual_host_logger(
+                    environment,
+                    std::ptr::null(),
+                    Status::OK,
+                    std::ptr::null(),
+                    long.as_ptr(),
+                );
+            };
         }
         assert_eq!(logging.messages().len(), KEPT);
         assert_eq!(logging.messages()[0].text.len(), 2047);

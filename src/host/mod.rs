@@ -11,69 +11,23 @@ mod logging;
 mod slave;
 
 use std::cell::{Cell, OnceCell};
-use std::ffi::c_int;
-use std::fmt;
 use std::path::Path;
 
 pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
     MAX_UNPACKED_BYTES, SMALL_BYTES,
 };
-pub use description::{Capabilities, DefaultExperiment, Description, Item, Kind, Output, Variable};
+pub use description::{Description, Output};
 pub use logging::LogMessage;
-pub use punctual_modeldescription::{Causality, PLATFORM, Variability};
+pub use punctual_modeldescription::fmi2::Status;
+pub use punctual_modeldescription::{
+    Causality, DefaultExperiment, PLATFORM, ScalarType, Variability, Variable, VariableKind,
+};
 pub use slave::Slave;
 
 use library::Library;
 
 use crate::error::{Error, FmuProblem};
-
-/// What an FMI 2.0 function returns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Status {
-    /// Done.
-    Ok,
-    /// Done, with a remark in the log.
-    Warning,
-    /// Not done; the instance is as before.
-    Discard,
-    /// Not done; the instance can only be reset or freed.
-    Error,
-    /// Not done; no instance of this FMU can be used any more.
-    Fatal,
-    /// Still being done (asynchronous steps).
-    Pending,
-    /// A number the standard does not know.
-    Unknown(c_int),
-}
-
-impl Status {
-    fn from_code(code: c_int) -> Self {
-        match code {
-            0 => Self::Ok,
-            1 => Self::Warning,
-            2 => Self::Discard,
-            3 => Self::Error,
-            4 => Self::Fatal,
-            5 => Self::Pending,
-            other => Self::Unknown(other),
-        }
-    }
-}
-
-impl fmt::Display for Status {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Ok => "fmi2OK",
-            Self::Warning => "fmi2Warning",
-            Self::Discard => "fmi2Discard",
-            Self::Error => "fmi2Error",
-            Self::Fatal => "fmi2Fatal",
-            Self::Pending => "fmi2Pending",
-            Self::Unknown(code) => return write!(f, "unknown status {code}"),
-        })
-    }
-}
 
 /// An FMU: its archive unpacked, its description read, its library loaded when first needed.
 #[derive(Debug)]
@@ -122,7 +76,7 @@ impl Fmu {
         if let Some(library) = self.library.get() {
             return Ok(library);
         }
-        let path = self.archive.library(&self.description.model_identifier);
+        let path = self.archive.library(&self.description.co_simulation.model_identifier);
         if !path.is_file() {
             let present = self.archive.platforms().to_vec();
             return Err(Error::fmu(self.path(), FmuProblem::NoBinary { wanted: PLATFORM, present }));

@@ -1,11 +1,13 @@
 //! One instance of an FMU, as a safe value: every call checked, every failure told with its name,
 //! time, status and the instance's last log messages. No call allocates unless it fails.
 
-use std::ffi::{CString, c_int};
+use std::ffi::CString;
 use std::ptr::NonNull;
 use std::rc::Rc;
 
-use super::library::{CO_SIMULATION, Component, FALSE, Functions, TRUE};
+use punctual_modeldescription::fmi2::{CO_SIMULATION, Component, FALSE, TRUE};
+
+use super::library::Functions;
 use super::logging::{Logging, owned};
 use super::{Fmu, LogMessage, Status, journal};
 use crate::error::{CallFailure, Error};
@@ -172,7 +174,7 @@ impl Slave {
         let (call, component) = (self.functions().do_step, self.component());
         // SAFETY: the instance lives; the arguments are plain numbers.
         let status = unsafe { call(component, time, step, TRUE) };
-        self.time = Some(if matches!(status, 0 | 1) { time + step } else { time });
+        self.time = Some(if matches!(status, Status::OK | Status::WARNING) { time + step } else { time });
         self.check("fmi2DoStep", status)
     }
 
@@ -207,19 +209,18 @@ impl Slave {
     }
 
     #[inline]
-    fn check(&mut self, call: &'static str, status: c_int) -> Result<(), Error> {
-        if status == 0 { Ok(()) } else { self.not_ok(call, status) }
+    fn check(&mut self, call: &'static str, status: Status) -> Result<(), Error> {
+        if status == Status::OK { Ok(()) } else { self.not_ok(call, status) }
     }
 
     #[cold]
-    fn not_ok(&mut self, call: &'static str, status: c_int) -> Result<(), Error> {
-        let status = Status::from_code(status);
-        if matches!(status, Status::Fatal | Status::Pending | Status::Unknown(_)) {
+    fn not_ok(&mut self, call: &'static str, status: Status) -> Result<(), Error> {
+        if matches!(status, Status::FATAL | Status::PENDING) || !status.is_known() {
             self.abandoned = true;
             self.fmu.abandoned.set(true);
             self.logging.leak();
         }
-        if status == Status::Warning {
+        if status == Status::WARNING {
             self.warnings += 1;
             return Ok(());
         }

@@ -2,14 +2,14 @@
 
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::product::Product;
-use punctual_modeldescription::{ModelDescription, VariableKind};
+use punctual_modeldescription::{ModelDescription, Real, VariableKind};
 
 /// The page.
 pub(super) fn page(product: &Product, description: &ModelDescription, canonical: &str) -> String {
     let mut rows = String::new();
     for v in &description.variables {
         let (unit, start, range) = match &v.kind {
-            VariableKind::Real { start, min, max, unit, .. } => {
+            VariableKind::Real(Real { start, min, max, unit, .. }) => {
                 let text = |value: &Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
                 let range = match (min, max) {
                     (None, None) => String::new(),
@@ -17,11 +17,11 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
                 };
                 (unit.clone().unwrap_or_default(), text(start), range)
             }
-            VariableKind::Enumeration { declared_type, .. } => {
-                (String::new(), String::new(), declared_type.clone())
+            VariableKind::Enumeration(of) => {
+                (String::new(), String::new(), of.declared_type.clone().unwrap_or_default())
             }
-            VariableKind::Boolean { start } => {
-                (String::new(), start.map(|s| s.to_string()).unwrap_or_default(), String::new())
+            VariableKind::Boolean(of) => {
+                (String::new(), of.start.map(|s| s.to_string()).unwrap_or_default(), String::new())
             }
             _ => Default::default(),
         };
@@ -30,7 +30,7 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
         rows += &format!("<tr>{cells}</tr>\n");
     }
     let mut enumerations = String::new();
-    for e in &description.enumerations {
+    for e in &description.types {
         let items: String = e
             .items
             .iter()

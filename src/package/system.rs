@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use punctual_modeldescription::{
-    Archive, Causality, Connector, ConnectorKind, DefaultExperiment, EnumerationItem, EnumerationType,
-    ParameterSet, ParameterValue, SystemComponent, SystemConnection, SystemStructure,
+    Archive, Causality, Connector, DefaultExperiment, EnumerationItem, ParameterSet, ParameterValue,
+    SimpleType, SystemComponent, SystemConnection, SystemStructure,
 };
 
 use crate::coupling::{self, Link, Port, StartValue, System};
 use crate::error::Error;
-use crate::host::{Description, Fmu, Kind, Variable};
+use crate::host::{Description, Fmu, Variable, VariableKind};
 
 /// The parameter set with the start values, in the archive.
 const START_VALUES: &str = "resources/start_values.ssv";
@@ -123,8 +123,8 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
                     || links.iter().any(|link| link.to == port)
             };
             let connectors = (0..description.variables.len()).filter(shown);
-            let connectors = connectors
-                .filter_map(|v| connector(&component.name, &description.variables[v], &mut enumerations));
+            let connectors =
+                connectors.filter_map(|v| connector(&component.name, description, v, &mut enumerations));
             SystemComponent {
                 name: component.name.clone(),
                 source: store.of(c).1.clone(),
@@ -151,7 +151,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
         connections: links.iter().map(connection).collect(),
         enumerations: enumerations.0,
         default_experiment: Some(DefaultExperiment {
-            start_time: experiment.start_time,
+            start_time: Some(experiment.start_time),
             stop_time: Some(experiment.stop_time),
             ..DefaultExperiment::default()
         }),
@@ -178,42 +178,44 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
 /// The enumerations of all components, each once. Where two share a name but not the items, the later one
 /// is named after its component too.
 #[derive(Default)]
-struct Enumerations(Vec<EnumerationType>);
+struct Enumerations(Vec<SimpleType>);
 
 impl Enumerations {
-    fn declare(&mut self, component: &str, variable: &Variable) -> String {
-        let item = |item: &crate::host::Item| EnumerationItem {
-            name: item.name.clone(),
-            value: item.value,
-            description: String::new(),
-        };
-        let items: Vec<_> = variable.items.iter().map(item).collect();
-        let mut name = variable.declared_type.clone().unwrap_or_else(|| variable.name.clone());
+    /// Declares the type of a variable, which has these items.
+    fn declare(&mut self, component: &str, variable: &Variable, items: &[EnumerationItem]) -> String {
+        // What items mean has no place in the format.
+        let plain = |item: &EnumerationItem| EnumerationItem { description: String::new(), ..item.clone() };
+        let items: Vec<_> = items.iter().map(plain).collect();
+        let mut name = variable.kind.declared_type().unwrap_or(&variable.name).to_owned();
         while let Some(other) = self.0.iter().find(|e| e.name == name) {
             if other.items == items {
                 return name;
             }
             name = format!("{component}.{name}");
         }
-        self.0.push(EnumerationType { name: name.clone(), description: String::new(), items });
+        self.0.push(SimpleType::enumeration(&name, "", items));
         name
     }
 }
 
 /// The connector of a variable that can have one.
-fn connector(component: &str, variable: &Variable, enumerations: &mut Enumerations) -> Option<Connector> {
+fn connector(
+    component: &str,
+    description: &Description,
+    variable: usize,
+    enumerations: &mut Enumerations,
+) -> Option<Connector> {
     use Causality::{CalculatedParameter, Input, Output, Parameter};
+    let variable = &description.variables[variable];
     if !matches!(variable.causality, Input | Output | Parameter | CalculatedParameter) {
         return None;
     }
-    let kind = match variable.kind {
-        Kind::Real => ConnectorKind::Real,
-        Kind::Boolean => ConnectorKind::Boolean,
-        Kind::String => ConnectorKind::String,
-        Kind::Enumeration if !variable.items.is_empty() => {
-            ConnectorKind::Enumeration(enumerations.declare(component, variable))
-        }
-        Kind::Integer | Kind::Enumeration => ConnectorKind::Integer,
+    let kind = match &variable.kind {
+        VariableKind::Enumeration(of) => match description.items(variable) {
+            [] => VariableKind::Integer(of.clone()),
+            items => VariableKind::enumeration(enumerations.declare(component, variable, items)),
+        },
+        kind => kind.clone(),
     };
     Some(Connector { name: variable.name.clone(), causality: variable.causality, kind })
 }
@@ -226,11 +228,14 @@ fn start_values(system: &System, descriptions: &[&Description]) -> Vec<(String, 
             let Some(variable) = description.index_of(name).map(|i| &description.variables[i]) else {
                 continue;
             };
-            let item = |number: i64| variable.items.iter().find(|item| i64::from(item.value) == number);
+            let items = description.items(variable);
+            let item = |number: i64| items.iter().find(|item| i64::from(item.value) == number);
             let value = match *value {
                 StartValue::Real(x) => ParameterValue::Real(x),
                 StartValue::Boolean(b) => ParameterValue::Boolean(b),
-                StartValue::Integer(i) if variable.kind == Kind::Real => ParameterValue::Real(i as f64),
+                StartValue::Integer(i) if matches!(variable.kind, VariableKind::Real(_)) => {
+                    ParameterValue::Real(i as f64)
+                }
                 StartValue::Integer(i) => match item(i) {
                     Some(item) => ParameterValue::Enumeration(item.name.clone()),
                     None => ParameterValue::Integer(i32::try_from(i).unwrap_or_default()),

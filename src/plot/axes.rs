@@ -1,6 +1,7 @@
 //! A rectangle with two axes: grid, frame, ticks, labels; and curves inside it.
 
-use super::canvas::{Anchor, Canvas, FRAME, GRID, INK, Pen, Point};
+use super::Disc;
+use super::canvas::{Anchor, Canvas, FRAME, GRID, INK, Pen, Point, SAFE, text_width};
 use super::scale::Axis;
 
 /// Size of tick labels in pixels.
@@ -58,8 +59,21 @@ impl Axes {
 
     /// The width of the widest y tick label, in pixels, about.
     fn tick_width(&self) -> f64 {
-        let longest = self.y.ticks.iter().map(|(_, label)| label.chars().count()).max().unwrap_or(0);
-        longest as f64 * TICK_SIZE * 0.56
+        self.y.ticks.iter().map(|(_, label)| text_width(label, TICK_SIZE)).fold(0.0, f64::max)
+    }
+
+    /// Draws discs, cut to the rectangle. A pixel must mean the same on both axes.
+    pub(super) fn discs(&self, canvas: &mut Canvas, discs: &[Disc]) {
+        if discs.is_empty() {
+            return;
+        }
+        let pixels = (self.area[2] - self.area[0]) / (self.x.high - self.x.low);
+        canvas.clipped(self.area, |canvas| {
+            for disc in discs {
+                let centre = self.place(disc.centre[0], disc.centre[1]);
+                canvas.circle(centre, disc.radius * pixels, (SAFE, 0.18), Pen::solid(SAFE, 1.2));
+            }
+        });
     }
 
     /// Draws a curve, cut to the rectangle, broken where a point has no place. Steps are taken

@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, MARK, Pen};
+use super::canvas::{Anchor, Canvas, INK, MARK, Pen, SAFE};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::path::equal_axes;
@@ -15,8 +15,6 @@ use super::{Disc, Mark, Style, colour};
 pub(super) const WIDTH: f64 = 860.0;
 /// Height of the sheet in pixels: of equal axes, and of others.
 const HEIGHTS: [f64; 2] = [620.0, 440.0];
-/// Colour of discs.
-const DISC: [u8; 3] = [0, 158, 115];
 /// Room for one entry of the legend, in pixels.
 const ROW: f64 = 21.0;
 
@@ -131,7 +129,7 @@ impl Chart {
             }
         }
         for disc in self.discs.iter().filter(|disc| !disc.label.is_empty()) {
-            entries.push((Key::Patch(DISC, 0.18, Pen::solid(DISC, 1.2)), disc.label.clone()));
+            entries.push((Key::Patch(SAFE, 0.18, Pen::solid(SAFE, 1.2)), disc.label.clone()));
         }
         entries
     }
@@ -167,13 +165,7 @@ pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
     if !chart.title.is_empty() {
         canvas.text(&chart.title, ((area[0] + area[2]) / 2.0, 20.0), 16.0, Anchor::Middle, INK);
     }
-    let scale = (area[2] - area[0]) / (axes.x.high - axes.x.low);
-    canvas.clipped(area, |canvas| {
-        for disc in &chart.discs {
-            let centre = axes.place(disc.centre[0], disc.centre[1]);
-            canvas.circle(centre, disc.radius * scale, (DISC, 0.18), Pen::solid(DISC, 1.2));
-        }
-    });
+    axes.discs(canvas, &chart.discs);
     marks(chart, &axes, canvas);
     for curve in curves() {
         let points = || curve.x.iter().copied().zip(curve.y.iter().copied());
@@ -240,7 +232,7 @@ mod tests {
         for text in ["t &lt; u", "x (s)", "y (m)", "deadline", "10⁻³"] {
             assert!(svg.contains(text), "no {text} in {svg}");
         }
-        assert_eq!(svg.matches("<circle").count(), 4);
+        assert_eq!(svg.matches("<circle").count(), 2);
         assert!(crate::plot::chart(&Chart::default(), "test").is_err());
     }
 

@@ -1,6 +1,6 @@
 //! The legend: a column right of the axes, so that it never covers data.
 
-use super::canvas::{Anchor, Canvas, INK, Pen, Point};
+use super::canvas::{Anchor, Canvas, INK, Pen, Point, text_width};
 
 /// Text size in pixels.
 const SIZE: f64 = 12.0;
@@ -24,8 +24,7 @@ pub(super) type Entry = (Key, String);
 
 /// The width a column of these entries needs, in pixels, about; 0 for none.
 pub(super) fn width(entries: &[Entry]) -> f64 {
-    let longest = entries.iter().map(|(_, text)| text.chars().count()).max();
-    longest.map_or(0.0, |n| KEY + 8.0 + n as f64 * SIZE * 0.55)
+    entries.iter().map(|(_, text)| KEY + 8.0 + text_width(text, SIZE)).fold(0.0, f64::max)
 }
 
 /// Draws the entries downwards from `at`.

@@ -30,6 +30,9 @@ pub const PALETTE: [[u8; 3]; 7] = [
     [60, 60, 60],    // grey
 ];
 
+/// Name of a picture that has its file for itself.
+const ALONE: &str = "plot";
+
 /// Points of a series that are drawn, about; more are thinned out without losing extremes.
 const POINTS: usize = 2000;
 
@@ -163,7 +166,7 @@ pub enum Scale {
 ///
 /// Nothing finite to draw, or the file cannot be written.
 pub fn path(plot: &PathPlot, file: &File) -> Result<(), Error> {
-    let mut canvas = Canvas::new(path::WIDTH, path::HEIGHT);
+    let mut canvas = Canvas::new(ALONE, path::WIDTH, path::HEIGHT);
     path::draw(plot, &mut canvas).map_err(|message| Error::plot(file, message))?;
     canvas.save(file)
 }
@@ -183,18 +186,19 @@ pub fn time(plot: &TimePlot, file: &File) -> Result<(), Error> {
 ///
 /// As for [`time`].
 pub fn times(plots: &[TimePlot], file: &File) -> Result<(), Error> {
-    let mut canvas = Canvas::new(time::WIDTH, time::height(plots.len()));
+    let mut canvas = Canvas::new(ALONE, time::WIDTH, time::height(plots.len()));
     time::draw(plots, &mut canvas).map_err(|message| Error::plot(file, message))?;
     canvas.save(file)
 }
 
-/// Draws a [`Chart`] as an SVG document; `name` is for messages.
+/// Draws a [`Chart`] as an SVG document. `name` (letters, digits, `-` and `_`) begins its ids, so that several can
+/// stand in one page, and names it in messages.
 ///
 /// # Errors
 ///
 /// Nothing finite to draw.
 pub fn chart(chart: &Chart, name: &str) -> Result<String, Error> {
-    let mut canvas = Canvas::new(chart::WIDTH, chart.height());
+    let mut canvas = Canvas::new(name, chart::WIDTH, chart.height());
     chart::draw(chart, &mut canvas).map_err(|message| Error::plot(File::new(name), message))?;
     Ok(canvas.document())
 }

@@ -1,7 +1,7 @@
 //! Paths in a plane, drawn with equal axes.
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, Pen};
+use super::canvas::{Anchor, Canvas, INK, Pen, SAFE};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent};
@@ -11,8 +11,6 @@ use super::{POINTS, PathPlot, Style, colour};
 pub(super) const WIDTH: f64 = 860.0;
 /// See [`WIDTH`].
 pub(super) const HEIGHT: f64 = 640.0;
-/// Colour of discs.
-const DISC: [u8; 3] = [0, 158, 115];
 /// Share of the range left free at each side.
 const MARGIN: f64 = 0.06;
 
@@ -32,13 +30,7 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
     if !plot.title.is_empty() {
         canvas.text(&plot.title, ((area[0] + area[2]) / 2.0, 24.0), 16.0, Anchor::Middle, INK);
     }
-    let scale = (area[2] - area[0]) / (axes.x.high - axes.x.low);
-    canvas.clipped(area, |canvas| {
-        for disc in &plot.discs {
-            let centre = axes.place(disc.centre[0], disc.centre[1]);
-            canvas.circle(centre, disc.radius * scale, (DISC, 0.18), Pen::solid(DISC, 1.2));
-        }
-    });
+    axes.discs(canvas, &plot.discs);
     for (i, path) in plot.paths.iter().enumerate() {
         let pen = pen(i, path.style);
         let kept = decimate(&[&path.x, &path.y], POINTS);
@@ -76,7 +68,7 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     }
     for disc in plot.discs.iter().filter(|disc| !disc.label.is_empty()) {
         if !entries.iter().any(|(_, text)| *text == disc.label) {
-            entries.push((Key::Patch(DISC, 0.18, Pen::solid(DISC, 1.2)), disc.label.clone()));
+            entries.push((Key::Patch(SAFE, 0.18, Pen::solid(SAFE, 1.2)), disc.label.clone()));
         }
     }
     entries
@@ -119,7 +111,7 @@ mod tests {
 
     #[test]
     fn nothing_to_draw_is_an_error() {
-        let mut canvas = Canvas::new(WIDTH, HEIGHT);
+        let mut canvas = Canvas::new("test", WIDTH, HEIGHT);
         assert!(draw(&PathPlot::default(), &mut canvas).unwrap_err().contains("no finite point"));
     }
 }

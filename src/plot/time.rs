@@ -1,7 +1,7 @@
 //! Signals over time, in one panel or several over one time axis.
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, MARK, Pen};
+use super::canvas::{Anchor, Canvas, INK, MARK, Pen, SAFE};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent, percentiles};
@@ -15,8 +15,6 @@ const SINGLE: f64 = 460.0;
 const PANEL: f64 = 290.0;
 /// Room below the last panel, in pixels.
 const BOTTOM: f64 = 58.0;
-/// Colour of shaded regions.
-const REGION: [u8; 3] = [0, 158, 115];
 /// Decades shown on a logarithmic axis at most.
 const DECADES: f64 = 12.0;
 
@@ -63,7 +61,7 @@ fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
         let clamp = |value: f64, axis: &Axis| value.clamp(axis.low, axis.high);
         let from = axes.place(clamp(region.time[0], &axes.x), clamp(region.values[0], &axes.y));
         let to = axes.place(clamp(region.time[1], &axes.x), clamp(region.values[1], &axes.y));
-        canvas.polygon(&[from, (to.0, from.1), to, (from.0, to.1)], REGION, 0.10);
+        canvas.polygon(&[from, (to.0, from.1), to, (from.0, to.1)], SAFE, 0.10);
     }
     axes.frame(canvas, if last { "time (s)" } else { "" }, &plot.y_label, last);
     let dashed = Pen { colour: MARK, width: 1.4, dash: Some((3.0, 3.0)) };
@@ -106,7 +104,7 @@ fn entries(plot: &TimePlot) -> Vec<Entry> {
     let mut entries: Vec<Entry> =
         series.map(|(i, series)| (Key::Line(pen(i, series)), series.label.clone())).collect();
     for region in plot.regions.iter().filter(|region| !region.label.is_empty()) {
-        entries.push((Key::Patch(REGION, 0.10, Pen::solid(REGION, 0.5)), region.label.clone()));
+        entries.push((Key::Patch(SAFE, 0.10, Pen::solid(SAFE, 0.5)), region.label.clone()));
     }
     entries
 }

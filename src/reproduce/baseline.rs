@@ -1,9 +1,9 @@
 //! What is compared: constraints with their parameters, and the settings they are run in.
 
-use punctual_core::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
 use punctual_core::lie::DerivativeSource;
+use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
 
 /// A constraint with its parameters, for relative degree 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,10 +142,14 @@ impl Baseline {
             Some(bounds) => builder.bounds(&bounds.map(|b| -b), &bounds)?,
             None => builder,
         };
-        let sampling = match self {
-            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(setup.step) },
+        builder.sampling(self.sampling(setup.step)).and_then(FilterBuilder::build)
+    }
+
+    /// Whether the period between samples is accounted for; `step` is the first, in s.
+    pub fn sampling(self, step: f64) -> Sampling {
+        match self {
+            Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(step) },
             _ => Sampling::Pointwise,
-        };
-        builder.sampling(sampling).and_then(FilterBuilder::build)
+        }
     }
 }

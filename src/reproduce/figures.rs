@@ -3,18 +3,15 @@
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
+use super::cases::{self, CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Vehicle};
 use super::table::{Cell, Table};
-use super::trial::{self, CENTRE, Nominal, Outcome, RADIUS, Setup, Vehicle};
+use super::trial::{self, Outcome};
 use super::{Figure, Options};
 use crate::error::Error;
 use crate::plot::{Chart, Curve, Disc, Mark, Scaling, Style};
 
 /// Points of a curve.
 const POINTS: usize = 800;
-/// Deadline of the pictures over time in s, as in the paper.
-const DEADLINE: f64 = 10.0;
-/// Sampling period in s where nothing else is said.
-const STEP: f64 = 1e-3;
 /// Bounds on |u_1| and |u_2| in the pictures of inputs.
 const BOUNDS: [f64; 2] = [8.0, 3.0];
 
@@ -130,9 +127,12 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
     let existing = trace(EXISTING, Setup::paper(T, STEP))?;
     let searched = trace(SEARCHED, Setup::advised(T, STEP))?;
     let ours = trace(Baseline::Profile, Setup::advised(T, STEP))?;
-    let late = |o: &Outcome| match o.arrival {
-        Some(t) => format!("arrives at {t:.3} s"),
-        None => "never arrives".to_owned(),
+    let path = |trace: &Trace, name: &str, colour, style| {
+        let late = match trace.outcome.arrival {
+            Some(t) => format!("arrives at {t:.3} s"),
+            None => "never arrives".to_owned(),
+        };
+        trace.path(&format!("{name}, {late}"), colour, style)
     };
     let chart = Chart {
         title: format!("{}: into the disc within {T} s", vehicle.title()),
@@ -141,21 +141,10 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
         y: Scaling::linear("y_p (m)").over(-15.0, 60.0),
         equal: true,
         curves: vec![
-            ours.path(&format!("reference profile (ours), {}", late(&ours.outcome)), 0, Style::Solid),
-            paper.path(&format!("repeated root (the paper), {}", late(&paper.outcome)), 1, Style::Dashed),
-            existing.path(
-                &format!("finite-time HOCBF, p = 1, 1, q = 0.5, {}", late(&existing.outcome)),
-                3,
-                Style::Dashed,
-            ),
-            searched.path(
-                &format!(
-                    "finite-time HOCBF, p = 4, 4, q = 0.5, distance, damping, {}",
-                    late(&searched.outcome)
-                ),
-                4,
-                Style::Dashed,
-            ),
+            path(&ours, Baseline::Profile.title(), 0, Style::Solid),
+            path(&paper, Baseline::RepeatedRoot.title(), 1, Style::Dashed),
+            path(&existing, "finite-time HOCBF, p = 1, 1, q = 0.5", 3, Style::Dashed),
+            path(&searched, "finite-time HOCBF, p = 4, 4, q = 0.5, distance, damping", 4, Style::Dashed),
         ],
         discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS }],
         ..Chart::default()
@@ -183,8 +172,8 @@ fn depths(vehicle: Vehicle) -> Result<Figure, Error> {
         x: Scaling::linear("time (s)"),
         y: Scaling::linear("R − d (m)").over(-90.0, 5.0),
         curves: vec![
-            line(&ours, "reference profile (ours)", 0, Style::Solid),
-            line(&paper, "repeated root (the paper)", 1, Style::Dashed),
+            line(&ours, Baseline::Profile.title(), 0, Style::Solid),
+            line(&paper, Baseline::RepeatedRoot.title(), 1, Style::Dashed),
             line(&existing, "finite-time HOCBF, p = 1, 1, q = 0.5", 3, Style::Dashed),
         ],
         verticals: deadline(DEADLINE),
@@ -235,9 +224,9 @@ fn inputs(vehicle: Vehicle) -> Result<Vec<Figure>, Error> {
     };
     let setup = Setup { bounds: Some(bounds), ..Setup::advised(DEADLINE, STEP) };
     let trace = Trace::new(vehicle, Baseline::Profile, &setup, x0)?;
-    let names = vehicle.inputs();
+    let names: Vec<String> = vehicle.inputs().iter().map(cases::label).collect();
     let curve = |i: usize, colour: usize| {
-        trace.over_time(trace.u.iter().map(|u| u[i]).collect(), names[i], colour, Style::Steps)
+        trace.over_time(trace.u.iter().map(|u| u[i]).collect(), &names[i], colour, Style::Steps)
     };
     let picture = |curves: Vec<Curve>, label: &str, bound: f64, part: &str| Figure {
         key: format!("inputs-{}{part}", vehicle.key()),
@@ -263,8 +252,8 @@ fn inputs(vehicle: Vehicle) -> Result<Vec<Figure>, Error> {
     Ok(match vehicle {
         Vehicle::PointMass => vec![picture(vec![curve(0, 0), curve(1, 1)], "u (m/s²)", bounds[0], "")],
         _ => vec![
-            picture(vec![curve(0, 0)], names[0], bounds[0], "-1"),
-            picture(vec![curve(1, 1)], names[1], bounds[1], "-2"),
+            picture(vec![curve(0, 0)], &names[0], bounds[0], "-1"),
+            picture(vec![curve(1, 1)], &names[1], bounds[1], "-2"),
         ],
     })
 }

@@ -1,9 +1,13 @@
 //! The paper's tables and figures beside ours, and beside the constraints of the literature.
 //!
-//! Everything runs in process: the filter of `punctual-core`, a plant that moves by the integrator named, inputs held
-//! between samples. Every number is a pure function of the options but the times.
+//! Tables and figures run in process: the filter of `punctual-core`, a plant that moves by the integrator named, inputs
+//! held between samples. Every number is a pure function of the options but the times. [`demo`] runs its cases through
+//! FMI.
 
 pub mod baseline;
+pub mod bicycles;
+pub mod cases;
+pub mod demo;
 pub mod figures;
 pub mod guide;
 pub mod page;
@@ -20,8 +24,8 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::plot::{self, Chart};
+pub use cases::{Setup, Vehicle};
 pub use table::{Cell, Table};
-pub use trial::{Setup, Vehicle};
 
 /// How much is run.
 #[derive(Clone, Copy, Debug, Serialize)]

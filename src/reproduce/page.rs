@@ -55,9 +55,6 @@ fn section(table: &Table) -> String {
 /// The picture as SVG, which the script replaces by one to work with.
 fn figure(figure: &Figure) -> Result<String, Error> {
     let svg = plot::chart(&figure.chart, &figure.key)?;
-    // Ids are of the whole page.
-    let svg = svg.replace("id=\"clip", &format!("id=\"{}-clip", figure.key));
-    let svg = svg.replace("url(#clip", &format!("url(#{}-clip", figure.key));
     Ok(format!(
         "<figure id=\"{0}\">\n<div class=\"chart\" data-chart=\"{0}\">{svg}</div>\n<figcaption>{1}</figcaption>\n</figure>\n",
         figure.key,

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 
 use super::baseline::Baseline;
 use super::starts::drawn;
-use super::trial::{self, Setup, Vehicle};
-use super::{Options, Watch};
+use super::{Options, Setup, Vehicle, Watch, trial};
 use crate::error::Error;
 
 /// Seed of the starts that parameters are chosen on: none of the tables'.

@@ -3,16 +3,15 @@
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
+use super::cases::{DEADLINE, Integrator, STEP, Setup, Vehicle};
 use super::starts::{drawn, hundred};
 use super::table::{Cell, Table};
-use super::trial::{self, Integrator, Outcome, Setup, Vehicle};
+use super::trial::{self, Outcome};
 use super::{Options, Watch, search};
 use crate::error::Error;
 
 /// Deadline of the random starts in s.
 const RANDOM: f64 = 5.0;
-/// Sampling period of the random starts in s.
-const STEP: f64 = 1e-3;
 /// Sampling periods at which other seeds are run, in s.
 const SEED_STEP: f64 = 0.01;
 
@@ -154,7 +153,6 @@ pub(super) fn discretisation(options: &Options) -> Result<Table, Error> {
     .note("One run each, from (0, 0, 0, 0), T = 10 s; arrival is the first sample with h ≥ 0, the peak is up to it.")
     .note("Paper's method: R² − d², u_ref = 0, pointwise. Ours: distance-shaped, damping, margin 0.02 m.")
     .note("The paper does not name its integrator. Not explained: its 9.9995 s, before T; none of the three gets there by T.");
-    const DEADLINE: f64 = 10.0;
     for (vehicle, paper) in Vehicle::ALL.into_iter().zip(PAPER_ARRIVALS) {
         for (step, paper) in [1e-3, 1e-4].into_iter().zip(paper) {
             if step < options.finest {

@@ -2,26 +2,8 @@
 
 use std::fmt;
 
+use punctual_modeldescription::{self as description, Located, Severity, Violation, brief};
 use serde::{Deserialize, Serialize};
-
-/// How bad a finding is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// The standard is broken, or the FMU does not work.
-    Error,
-    /// Allowed, but some importers will stumble over it.
-    Warning,
-}
-
-impl fmt::Display for Severity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Error => "error",
-            Self::Warning => "warning",
-        })
-    }
-}
 
 /// Where a finding is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,7 +34,7 @@ impl fmt::Display for Place {
 pub struct Finding {
     /// How bad it is.
     pub severity: Severity,
-    /// One of [`RULES`].
+    /// The name of one of [`rules`].
     pub rule: String,
     /// Where it is.
     pub place: Place,
@@ -75,9 +57,11 @@ impl fmt::Display for Finding {
 
 use Severity::{Error, Warning};
 
-/// Every rule: its name, how bad it is to break it, and what it asks. A rule's name never changes its
-/// meaning.
-pub const RULES: &[(&str, Severity, &str)] = &[
+/// A rule: its name, how bad it is to break it, and what it asks.
+type Rule = (&'static str, Severity, &'static str);
+
+/// The rules on what comes before the description's meaning.
+const BEFORE: &[Rule] = &[
     (
         "archive.readable",
         Error,
@@ -97,34 +81,10 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("schema.attribute", Error, "attributes are those of the schema; the required ones are there"),
     ("schema.value", Error, "values have the type that the schema gives them"),
     ("schema.text", Error, "there is no text between elements"),
-    ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
-    ("interface.identifier", Error, "modelIdentifier is a C identifier"),
-    ("interface.guid", Error, "guid is not empty"),
-    ("interface.flags", Warning, "the capability flags do not contradict each other"),
-    ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
-    ("unit.unique", Error, "no unit or display unit is defined twice"),
-    ("unit.defined", Error, "units and display units used are defined"),
-    ("type.unique", Error, "no type is defined twice or named like a variable"),
-    ("type.defined", Error, "declaredType names a type of the same kind"),
-    ("type.items", Error, "the items of an enumeration have different names and values"),
-    ("variable.unique", Error, "variable names are unique"),
-    ("variable.name", Error, "variable names follow the naming convention"),
-    ("variable.alias", Warning, "variables with the same value reference agree in start value and unit"),
-    ("variable.alias-set", Error, "at most one variable of an alias set can be set from outside"),
-    ("variable.combination", Error, "causality, variability and initial go together"),
-    ("variable.continuous", Error, "only Real variables are continuous"),
-    ("variable.start", Error, "start values are there where they must be, and only there"),
-    ("variable.range", Error, "min <= start <= max"),
-    ("variable.enumeration", Error, "start values of enumerations are values of their items"),
-    ("variable.independent", Error, "there is at most one independent variable, and it is Real"),
-    ("variable.derivative", Error, "derivative is the index of a Real variable"),
-    ("structure.outputs", Error, "ModelStructure/Outputs lists every output exactly once"),
-    ("structure.derivatives", Error, "ModelStructure/Derivatives lists derivatives"),
-    ("structure.initial-unknowns", Error, "ModelStructure/InitialUnknowns is complete, without others"),
-    ("structure.order", Error, "ModelStructure/InitialUnknowns is sorted by index"),
-    ("structure.index", Error, "indices are those of variables, from 1"),
-    ("structure.dependencies", Error, "dependencies name variables; dependenciesKind has as many words"),
-    ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
+];
+
+/// The rules on libraries and what instances do.
+const AFTER: &[Rule] = &[
     ("symbols.readable", Error, "libraries are of the format and processor of their folder"),
     ("symbols.missing", Error, "libraries export every function of FMI 2.0 co-simulation"),
     ("trial.load", Error, "the library can be loaded, and an FMI 2.0 importer can read the description"),
@@ -139,6 +99,17 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("trial.reset", Warning, "after fmi2Reset the FMU does the same again"),
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
+
+/// Every rule: its name, how bad it is to break it, and what it asks. A rule's name never changes its
+/// meaning.
+pub fn rules() -> impl Iterator<Item = &'static (&'static str, Severity, &'static str)> {
+    BEFORE.iter().chain(description::RULES).chain(AFTER)
+}
+
+/// How bad it is to break a rule. One that is not among [`rules`] counts as an error.
+pub(super) fn severity(rule: &str) -> Severity {
+    rules().find(|known| known.0 == rule).map_or(Error, |known| known.1)
+}
 
 /// Most findings kept of one rule: the thousandth variable without a start value teaches nothing.
 const KEPT_OF_A_RULE: usize = 20;
@@ -180,9 +151,22 @@ impl Findings {
         self.place(rule, Place { file: DESCRIPTION.to_owned(), position, variable: mark.variable }, message);
     }
 
-    /// Adds a finding of a rule. A rule that is not in [`RULES`] counts as an error.
+    /// Adds what breaks a rule on the description.
+    pub(super) fn violation(&mut self, model: &Located, violation: Violation) {
+        let Violation { rule, place, message } = violation;
+        let variable = match place {
+            description::Place::Variable(v) | description::Place::Start(v) => {
+                let named = !model.is_unread(description::Place::Variable(v), "name");
+                named.then(|| brief(&model.description.variables[v].name))
+            }
+            _ => None,
+        };
+        self.add(rule, Mark { at: model.position(place), variable }, message);
+    }
+
+    /// Adds a finding of a rule.
     pub(super) fn place(&mut self, rule: &str, place: Place, message: impl Into<String>) {
-        let severity = RULES.iter().find(|known| known.0 == rule).map_or(Error, |known| known.1);
+        let severity = severity(rule);
         self.push(Finding { severity, rule: rule.to_owned(), place, message: message.into() });
     }
 

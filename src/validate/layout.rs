@@ -1,7 +1,8 @@
 //! Which entries the archive must and may have (FMI 2.0.4, section 2.3).
 
+use punctual_modeldescription::Located;
+
 use super::finding::Findings;
-use super::model::Model;
 use crate::host::{Archive, PLATFORM};
 
 /// What may stand at the top of the archive.
@@ -25,7 +26,7 @@ pub(super) fn ending(platform: &str) -> Option<&'static str> {
     ENDINGS.iter().find(|(head, _)| platform.starts_with(head)).map(|(_, ending)| *ending)
 }
 
-pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Findings) {
+pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
     let mut odd: Vec<&str> = archive.entries().iter().filter_map(|entry| entry.split('/').next()).collect();
     odd.retain(|top| !TOP.contains(top));
     odd.sort_unstable();
@@ -34,8 +35,7 @@ pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Finding
         let message = format!("{top:?} at the top of the archive; the standard has {}", TOP.join(", "));
         findings.archive("archive.top-folder", top, message);
     }
-    let Some(interface) = model.interface() else { return };
-    let Some(identifier) = interface.identifier else { return };
+    let Some(identifier) = model.model_identifier() else { return };
     let mut libraries = 0;
     for platform in archive.platforms() {
         let Some(ending) = ending(platform) else { continue };
@@ -58,7 +58,7 @@ pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Finding
         );
         findings.archive("archive.binary", &folder, message);
     }
-    let sources = interface.source_files > 0
+    let sources = !model.description.co_simulation.source_files.is_empty()
         || archive.entries().iter().any(|entry| entry.starts_with("sources/") && !entry.ends_with('/'));
     if libraries == 0 && !sources && !findings.any("archive.binary") {
         let message = format!(

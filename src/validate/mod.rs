@@ -5,28 +5,29 @@
 //! |---|---|
 //! | `finding` | how a finding is told |
 //! | `schema` | what the XML schema says: elements, attributes, types of values |
-//! | `model` | nothing: the description as plain data with positions |
-//! | `semantics` | what the standard says beyond the schema |
 //! | `layout` | which files the archive must and may hold |
 //! | `symbols` | whether the libraries export what they must, without loading them |
 //! | `trial` | whether an instance does what it should, in a child process |
+//!
+//! What the standard says of a description beyond the schema is asked by `punctual_modeldescription`, of the
+//! same model and with the same rules as where a description is written.
 
 mod finding;
 mod layout;
-mod model;
 mod schema;
-mod semantics;
 mod symbols;
 pub mod trial;
 
 use std::path::Path;
 use std::time::Duration;
 
-pub use finding::{Finding, Place, RULES, Severity};
+pub use finding::{Finding, Place, rules};
+pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
 use crate::host::Archive;
 use finding::Findings;
+use punctual_modeldescription::Located;
 
 /// What was found in one FMU.
 #[derive(Clone, Debug, Default)]
@@ -76,8 +77,8 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
         return Ok(Report { findings: findings.finish(), skipped });
     };
     schema::check(&document, &mut findings);
-    let model = model::Model::read(&document);
-    semantics::check(&model, &mut findings);
+    let model = Located::read(&document);
+    model.check(&mut |violation| findings.violation(&model, violation));
     layout::check(&archive, &model, &mut findings);
     symbols::check(&archive, &model, &mut findings);
     match (limit, trial::reason_to_skip(&archive, &model, &findings)) {

@@ -5,55 +5,18 @@ use std::collections::HashSet;
 
 use object::read::NameOrOrdinal;
 use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
+use punctual_modeldescription::Located;
+use punctual_modeldescription::fmi2::FUNCTIONS;
 
 use super::finding::Findings;
 use super::layout::ending;
-use super::model::Model;
 use crate::host::Archive;
-
-/// The functions of FMI 2.0 for co-simulation: sections 2.1 and 4.2.
-const FUNCTIONS: [&str; 34] = [
-    "fmi2GetTypesPlatform",
-    "fmi2GetVersion",
-    "fmi2SetDebugLogging",
-    "fmi2Instantiate",
-    "fmi2FreeInstance",
-    "fmi2SetupExperiment",
-    "fmi2EnterInitializationMode",
-    "fmi2ExitInitializationMode",
-    "fmi2Terminate",
-    "fmi2Reset",
-    "fmi2GetReal",
-    "fmi2GetInteger",
-    "fmi2GetBoolean",
-    "fmi2GetString",
-    "fmi2SetReal",
-    "fmi2SetInteger",
-    "fmi2SetBoolean",
-    "fmi2SetString",
-    "fmi2GetFMUstate",
-    "fmi2SetFMUstate",
-    "fmi2FreeFMUstate",
-    "fmi2SerializedFMUstateSize",
-    "fmi2SerializeFMUstate",
-    "fmi2DeSerializeFMUstate",
-    "fmi2GetDirectionalDerivative",
-    "fmi2SetRealInputDerivatives",
-    "fmi2GetRealOutputDerivatives",
-    "fmi2DoStep",
-    "fmi2CancelStep",
-    "fmi2GetStatus",
-    "fmi2GetRealStatus",
-    "fmi2GetIntegerStatus",
-    "fmi2GetBooleanStatus",
-    "fmi2GetStringStatus",
-];
 
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
-pub(super) fn check(archive: &Archive, model: &Model<'_>, findings: &mut Findings) {
-    let Some(identifier) = model.interface().and_then(|interface| interface.identifier) else { return };
+pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
+    let Some(identifier) = model.model_identifier() else { return };
     for platform in archive.platforms() {
         let Some(ending) = ending(platform) else { continue };
         let entry = format!("binaries/{platform}/{identifier}{ending}");
@@ -80,7 +43,7 @@ fn library(archive: &Archive, platform: &str, entry: &str, findings: &mut Findin
         Err(message) => findings.archive("symbols.readable", entry, message),
         Ok(exported) => {
             let missing: Vec<&str> =
-                FUNCTIONS.into_iter().filter(|function| !exported.contains(*function)).collect();
+                FUNCTIONS.iter().copied().filter(|function| !exported.contains(*function)).collect();
             if !missing.is_empty() {
                 let message = format!(
                     "does not export {} of the {} functions of FMI 2.0 co-simulation: {}",

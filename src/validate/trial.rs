@@ -8,10 +8,13 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Duration;
 
-use super::finding::{Finding, Findings, Place, RULES, Severity};
-use super::model::Model;
+use punctual_modeldescription::Located;
+
+use super::finding::{Finding, Findings, Place, severity};
 use crate::error::Error;
-use crate::host::{Archive, Causality, Fmu, Kind, PLATFORM, Slave, Status, Variability, Variable, journal};
+use crate::host::{
+    Archive, Causality, Fmu, PLATFORM, ScalarType, Slave, Status, Variability, Variable, journal,
+};
 use crate::isolation::{self, Child, End, Voice};
 
 /// The name of the trial's instance.
@@ -26,7 +29,7 @@ const STEP: f64 = 0.01;
 const CLOSE: f64 = 1e-12;
 
 /// Why there can be no trial, if so.
-pub(super) fn reason_to_skip(archive: &Archive, model: &Model<'_>, findings: &Findings) -> Option<String> {
+pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Findings) -> Option<String> {
     for (head, reason) in [
         ("schema.", "the description breaks the schema"),
         ("interface.co-simulation", "there is no co-simulation"),
@@ -41,7 +44,7 @@ pub(super) fn reason_to_skip(archive: &Archive, model: &Model<'_>, findings: &Fi
     if !archive.platforms().iter().any(|platform| platform == PLATFORM) {
         return Some(format!("there is no library for {PLATFORM}"));
     }
-    let needs_tool = model.interface().is_some_and(|interface| interface.needs_execution_tool);
+    let needs_tool = model.description.co_simulation.needs_execution_tool;
     needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
@@ -97,7 +100,7 @@ pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
     let mut trial = Trial { file, told: HashSet::new() };
     if let Err(error) = trial.all(path) {
         let rule = match error.as_call() {
-            Some(call) if call.status == Some(Status::Discard) => "trial.discard",
+            Some(call) if call.status == Some(Status::DISCARD) => "trial.discard",
             Some(_) => "trial.call",
             None => "trial.load",
         };
@@ -118,7 +121,7 @@ impl Trial {
         if !self.told.insert((rule, variable.map(str::to_owned))) {
             return;
         }
-        let severity = RULES.iter().find(|known| known.0 == rule).map_or(Severity::Error, |known| known.1);
+        let severity = severity(rule);
         let place = Place { file: PLACE.to_owned(), position: None, variable: variable.map(str::to_owned) };
         let finding = Finding { severity, rule: rule.to_owned(), place, message: message.to_owned() };
         // The watching process will say that this one left nothing, if so.
@@ -154,7 +157,7 @@ impl Trial {
                 &format!("{} calls returned fmi2Warning{last}", slave.warnings()),
             );
         }
-        if !fmu.description().capabilities.can_be_instantiated_only_once_per_process {
+        if !fmu.description().co_simulation.can_be_instantiated_only_once_per_process {
             self.two_instances(&fmu, &slave, plan)?;
         }
         Ok(())
@@ -195,7 +198,8 @@ impl Trial {
             if !value.is_finite() {
                 self.tell("trial.output", Some(&v.name), &format!("the output is {value}; should be finite"));
             }
-            let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
+            let (min, max) = v.kind.range();
+            let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
             if value < min || value > max {
                 let text =
                     format!("the output is {value}; should be in [{min}, {max}], as the description says");
@@ -210,20 +214,20 @@ impl Trial {
     fn get(&mut self, slave: &mut Slave, v: &Variable) -> Result<Option<f64>, Error> {
         let reference = [v.value_reference];
         let (mut real, mut integer) = ([f64::NAN], [0]);
-        Ok(match v.kind {
-            Kind::Real => {
+        Ok(match v.kind.scalar_type() {
+            ScalarType::Real => {
                 slave.get_real(&reference, &mut real)?;
                 Some(real[0])
             }
-            Kind::Integer | Kind::Enumeration => {
+            ScalarType::Integer | ScalarType::Enumeration => {
                 slave.get_integer(&reference, &mut integer)?;
                 Some(f64::from(integer[0]))
             }
-            Kind::Boolean => {
+            ScalarType::Boolean => {
                 slave.get_boolean(&reference, &mut integer)?;
                 Some(f64::from(u8::from(integer[0] != 0)))
             }
-            Kind::String => {
+            ScalarType::String => {
                 if slave.get_string(v.value_reference)?.is_none() {
                     self.tell("trial.text", Some(&v.name), "fmi2GetString gave NULL; must give a text");
                 }
@@ -237,7 +241,7 @@ impl Trial {
         if !is_set_by_importers(v) {
             return Ok(());
         }
-        let Some(start) = start(v) else { return Ok(()) };
+        let Some(start) = v.kind.start_number() else { return Ok(()) };
         let Some(value) = self.get(slave, v)? else { return Ok(()) };
         if (value - start).abs() > CLOSE * start.abs() || value.is_nan() != start.is_nan() {
             let text = format!("is {value} after initialisation; the description says start = {start}");
@@ -292,23 +296,13 @@ fn is_set_by_importers(v: &Variable) -> bool {
     matches!(v.causality, Causality::Parameter | Causality::Input) && v.variability != Variability::Constant
 }
 
-/// The start value as a number.
-fn start(v: &Variable) -> Option<f64> {
-    let text = v.start.as_deref()?.trim();
-    match v.kind {
-        Kind::Boolean => Some(f64::from(u8::from(matches!(text, "true" | "1")))),
-        Kind::String => None,
-        _ => text.parse().ok(),
-    }
-}
-
 fn set_start(slave: &mut Slave, v: &Variable) -> Result<(), Error> {
-    let Some(value) = start(v).filter(|_| is_set_by_importers(v)) else { return Ok(()) };
+    let Some(value) = v.kind.start_number().filter(|_| is_set_by_importers(v)) else { return Ok(()) };
     let reference = [v.value_reference];
-    match v.kind {
-        Kind::Real => slave.set_real(&reference, &[value]),
-        Kind::Integer | Kind::Enumeration => slave.set_integer(&reference, &[value as i32]),
-        Kind::Boolean => slave.set_boolean(&reference, &[value as i32]),
-        Kind::String => Ok(()),
+    match v.kind.scalar_type() {
+        ScalarType::Real => slave.set_real(&reference, &[value]),
+        ScalarType::Integer | ScalarType::Enumeration => slave.set_integer(&reference, &[value as i32]),
+        ScalarType::Boolean => slave.set_boolean(&reference, &[value as i32]),
+        ScalarType::String => Ok(()),
     }
 }

@@ -3,6 +3,7 @@
 //! The oracle is the filter of `punctual-core` with the same configuration.
 
 use punctual_core::filter::{Phase, SafetyFilter, Status};
+use punctual_fmu::configuration::Shape;
 
 use crate::api::API;
 use crate::fmu::{FILTER, Fmu};
@@ -218,7 +219,8 @@ fn parameters_in_every_mode_before_the_steps() {
         set(2);
         let mut configuration = fmu.filter().clone();
         configuration.barrier[0].deadline = Some(4.0);
-        configuration.barrier[0].centre = Some([45.0, 30.0]);
+        let Shape::Disc { at, .. } = &mut configuration.barrier[0].shape else { panic!("not a disc") };
+        at.centre = [45.0, 30.0];
         configuration.bounds.get_mut("u_x").unwrap()[1] = 3.0;
         let mut filter = configuration.build().unwrap();
         let u = sample(&mut filter, 0.0, &inputs(2), false);

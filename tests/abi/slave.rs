@@ -1,13 +1,12 @@
 //! One instance with its log, used by variable names.
 
 use std::ffi::{CStr, CString, c_int, c_void};
-use std::ptr::null;
 use std::sync::Mutex;
 
 use punctual_core::filter::SafetyFilter;
 use punctual_modeldescription::BaseType;
 
-use crate::api::{API, Api, Callbacks, Component, ERROR, OK, State, Text};
+use crate::api::{API, Api, Callbacks, Component, ERROR, OK, State, Text, callbacks};
 use crate::fmu::Fmu;
 
 /// One call of the logger.
@@ -42,13 +41,7 @@ impl Log {
 
     /// Callbacks with this log, and without anything that may be NULL.
     pub(crate) fn callbacks(&self) -> Callbacks {
-        Callbacks {
-            logger: Some(log),
-            allocate_memory: null(),
-            free_memory: null(),
-            step_finished: null(),
-            environment: std::ptr::from_ref(self).cast_mut().cast(),
-        }
+        callbacks(log, std::ptr::from_ref(self).cast_mut().cast())
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
-use std::ptr::{null, null_mut};
+use std::ptr::null_mut;
 
 use punctual_fmu::instance::Mode;
 use punctual_modeldescription::{BaseType, Causality};
 
-use crate::api::{API, Callbacks, Component, ERROR, OK, State, Text};
+use crate::api::{API, Component, ERROR, OK, State, Text, callbacks};
 use crate::fmu::Fmu;
 
 /// What the logger saw.
@@ -56,13 +56,7 @@ impl Drop for Instance {
 impl Instance {
     pub(crate) fn new(fmu: &'static Fmu) -> Self {
         let log = Box::<RefCell<Log>>::default();
-        let callbacks = Callbacks {
-            logger: Some(self::log),
-            allocate_memory: null(),
-            free_memory: null(),
-            step_finished: null(),
-            environment: std::ptr::from_ref(&*log).cast_mut().cast(),
-        };
+        let callbacks = callbacks(self::log, std::ptr::from_ref(&*log).cast_mut().cast());
         let (guid, location) = (CString::new(fmu.guid()).unwrap(), CString::new(fmu.location()).unwrap());
         let (name, guid, location) = (c"attacked".as_ptr(), guid.as_ptr(), location.as_ptr());
         let component = (API.instantiate)(name, 1, guid, location, &raw const callbacks, 0, 0);

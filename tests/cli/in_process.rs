@@ -1,7 +1,7 @@
 //! `punctual run` equals the core in process, bit for bit: going through files, FMI and a shared
 //! library changes nothing.
 //!
-//! The loop below is [`punctual_core::simulation::closed_loop`] with one difference, the time of a
+//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a
 //! sample. `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on
 //! from the end of its last step, (k−1)·h + h, as long as the two differ by round-off only, so that
 //! its time never runs backwards under a master that counts otherwise. The filter's profile is a
@@ -11,7 +11,7 @@ use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{SVector, Vector2};
-use punctual_core::plants::Unicycle;
+use punctual_reference::plants::Unicycle;
 
 use crate::running::recorded;
 use crate::table::{Table, assert_same_bits};

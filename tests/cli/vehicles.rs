@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use punctual_core::nominal::Heading;
+use punctual_reference::nominal::Heading;
 
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};

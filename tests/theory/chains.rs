@@ -6,7 +6,7 @@ use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
 use punctual_core::lie;
 use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// ẋ₁ = x₂, …, ẋ_N = u.
 pub(super) struct Chain<const N: usize>;

@@ -5,9 +5,9 @@ use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, SafetyFilter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
-use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::PointMass;
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 use super::distance;
 use super::starts::{DEADLINE, drawn};

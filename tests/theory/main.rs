@@ -21,8 +21,8 @@ use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 type Nominal = fn(f64, &SVector<f64, 4>) -> SVector<f64, 2>;
 

@@ -5,7 +5,7 @@ use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_core::plants::PointMass;
+use punctual_reference::plants::PointMass;
 
 use super::distance;
 use super::disturbances::{Failures, JerkCar};

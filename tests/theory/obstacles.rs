@@ -6,8 +6,8 @@ use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Status};
 use punctual_core::nalgebra::SVector;
-use punctual_core::nominal::Heading;
-use punctual_core::plants::{Bicycle, Unicycle};
+use punctual_reference::nominal::Heading;
+use punctual_reference::plants::{Bicycle, Unicycle};
 
 use super::starts::drawn;
 

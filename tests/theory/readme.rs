@@ -7,8 +7,8 @@
 use std::f64::consts::PI;
 
 use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_core::plants::Unicycle;
-use punctual_core::simulation::{Schedule, closed_loop};
+use punctual_reference::plants::Unicycle;
+use punctual_reference::simulation::{Schedule, closed_loop};
 
 use super::judge::case::{Case, Numbers, Reference, Set};
 use super::judge::model::{Plant, Shape};

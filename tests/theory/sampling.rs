@@ -5,8 +5,8 @@
 
 use punctual_core::filter::{BarrierSettings, Sampling};
 use punctual_core::nalgebra::SVector;
-use punctual_core::nominal::Heading;
-use punctual_core::plants::{PointMass, Unicycle};
+use punctual_reference::nominal::Heading;
+use punctual_reference::plants::{PointMass, Unicycle};
 
 use super::starts::{DEADLINE, assert_all_keep_the_deadline, drawn, quantile, starts};
 use super::{Nominal, Run, Scheme, bicycle, damp_speed, damp_velocity, distance, run_as};

@@ -101,7 +101,7 @@ fn the_variables_of_the_filter_are_listed() {
     {
         assert_eq!(quoted_in_row(document, head), variables(causality), "docs/fmu.md, {head}");
     }
-    let items = filter().model_description().enumerations.into_iter().flat_map(|e| e.items);
+    let items = filter().model_description().types.into_iter().flat_map(|e| e.items);
     let rows: Vec<_> = items.map(|i| format!("| {} `{}` | {} |", i.value, i.name, i.description)).collect();
     assert!(rows.len() > 10, "statuses and phases: {rows:?}");
     for row in rows {
@@ -121,7 +121,7 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
 }
 
 /// Beginnings of files up to a key that none has, in the order of the tables of docs/configuration.md.
-const PLACES: [&str; 19] = [
+const PLACES: [&str; 20] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[[barrier]]",
     "kind = \"filter\"\n[plant]",
@@ -132,6 +132,7 @@ const PLACES: [&str; 19] = [
     "kind = \"plant\"\n[integration]",
     "kind = \"plant\"\n[disturbance]",
     "kind = \"controller\"",
+    "kind = \"controller\"\n[plant]",
     "kind = \"filter\"\n[experiment]",
     "",
     "[experiment]",

@@ -8,5 +8,6 @@ mod formulas;
 mod lexer;
 mod places;
 mod references;
+mod schema;
 mod sources;
 mod versions;

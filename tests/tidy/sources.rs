@@ -59,7 +59,15 @@ pub(crate) static SOURCES: LazyLock<Vec<Source>> = LazyLock::new(|| {
 
 /// The Rust files of the six crates themselves.
 pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
-    let folders = ["src/", "core/src/", "modeldescription/src/", "models/src/", "fmu/src/", "python/src/"];
+    let folders = [
+        "src/",
+        "core/src/",
+        "reference/src/",
+        "modeldescription/src/",
+        "models/src/",
+        "fmu/src/",
+        "python/src/",
+    ];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))
 }
 

@@ -24,6 +24,31 @@ pub enum Phase {
 }
 
 impl Phase {
+    /// Every phase, in the order of its number.
+    pub const ALL: [Self; 6] =
+        [Self::Waiting, Self::Approach, Self::Late, Self::Stay, Self::Left, Self::Released];
+
+    /// Its name, as the FMU's enumeration has it.
+    pub fn name(self) -> &'static str {
+        self.words().0
+    }
+
+    /// Where the barrier stands, in a few words.
+    pub fn meaning(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Waiting => ("waiting", "no step with valid inputs yet"),
+            Self::Approach => ("approach", "on the way, before the deadline"),
+            Self::Late => ("late", "the deadline passed outside; the approach goes on"),
+            Self::Stay => ("stay", "inside, and kept there"),
+            Self::Left => ("left", "outside again; pulled back without a deadline"),
+            Self::Released => ("released", "let go: nothing is asked any more"),
+        }
+    }
+
     /// Whether the set is to be kept now, so that the stay constraint is in force.
     pub fn keeps(self) -> bool {
         matches!(self, Self::Stay | Self::Left)

@@ -7,6 +7,7 @@ use crate::error::{Error, ErrorKind, non_negative, positive};
 
 /// The method by which the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root::rate`](super::repeated_root::rate).
     /// Relative degree 2 and above; for odd ones many anchors have no such rate
@@ -33,6 +34,7 @@ pub enum ProfileKind {
 /// The answer to a deadline that the input bounds certainly do not allow, at the anchor's sample or at any
 /// later one ([`reach`](crate::reach)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Infeasible {
     /// Report it and keep the deadline.
     #[default]

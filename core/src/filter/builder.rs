@@ -59,7 +59,8 @@ impl FilterBuilder {
     /// finding); a plant whose dimensions are not the filter's; settings outside their ranges.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::SmallSlipBicycle};
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_reference::plants::SmallSlipBicycle;
     /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
     /// let refused = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
@@ -142,7 +143,8 @@ impl FilterBuilder {
     /// No barrier yet; a barrier with another method than the reference profile.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, convergence::profile::Hermite, filter::*, plants::PointMass};
+    /// # use punctual_core::{barriers::DistanceDisc, convergence::profile::Hermite, filter::*};
+    /// # use punctual_reference::plants::PointMass;
     /// use punctual_core::convergence::profile::Profile;
     ///
     /// // Arrive in nine tenths of the time.
@@ -163,15 +165,16 @@ impl FilterBuilder {
     }
 
     /// Puts a constraint of one's own in the place of the last barrier's method
-    /// ([`FixedTime::with_condition`]), such as one of [`baselines`](crate::baselines).
+    /// ([`FixedTime::with_condition`]), such as one of the crate `punctual-reference`.
     ///
     /// # Errors
     ///
     /// No barrier yet; settings that the constraint would take the place of.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
-    /// use punctual_core::baselines::Exponential;
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_reference::plants::PointMass;
+    /// use punctual_reference::baselines::Exponential;
     ///
     /// let filter = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
@@ -191,7 +194,8 @@ impl FilterBuilder {
     /// Sets when the last barrier added begins and ceases to be enforced. Default: at once and never.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_reference::plants::PointMass;
     /// // In A by 5 s, then in B by 10 s.
     /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
     /// let filter = SafetyFilter::builder(4, 2)

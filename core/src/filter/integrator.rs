@@ -5,8 +5,8 @@ use crate::error::{Error, ErrorKind, length, positive};
 use crate::qp::Bounds;
 
 /// An integrator between a filter and its plant. The filter is one of a plant whose state `state` has the input
-/// `input` for its derivative, such as [`SmallSlipBicycleWithRate`](crate::plants::SmallSlipBicycleWithRate) or
-/// [`KinematicBicycle`](crate::plants::KinematicBicycle); the plant outside takes that state as its input. So
+/// `input` for its derivative, such as `SmallSlipBicycleWithRate` or
+/// `KinematicBicycle` of the reference plants; the plant outside takes that state as its input. So
 /// x lacks it, and u and u_ref have it in the place of its rate.
 ///
 /// Over each period the filter's model has it change evenly. The plant is given its mean over the period, to be held;
@@ -14,7 +14,8 @@ use crate::qp::Bounds;
 /// that leads there within the period where that is less.
 ///
 /// ```
-/// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::SmallSlipBicycle};
+/// # use punctual_core::{barriers::DistanceDisc, filter::*};
+/// # use punctual_reference::plants::SmallSlipBicycle;
 /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let model = SmallSlipBicycle::new(10.0)?.with_rate();
 /// let mut filter = SafetyFilter::builder(5, 2)

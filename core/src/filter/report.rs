@@ -9,6 +9,7 @@ const DEADLOCK_TIME: f64 = 0.1;
 /// The end of a step, and so the meaning of the returned input. The numbers are stable: they leave the
 /// library as the FMU's `status`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Status {
     /// u_ref satisfies every constraint; the input is u_ref, bit for bit.
@@ -48,6 +49,31 @@ impl Status {
         Self::SolverFailed,
     ];
 
+    /// Its name, as the FMU's enumeration has it.
+    pub fn name(self) -> &'static str {
+        self.words().0
+    }
+
+    /// What the returned input is, in a few words.
+    pub fn meaning(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Unchanged => ("unchanged", "u_ref satisfies every constraint and is passed through"),
+            Self::Filtered => ("filtered", "u is the safe input nearest to u_ref"),
+            Self::Infeasible => ("infeasible", "not possible within the input bounds: least violation"),
+            Self::NoAuthority => ("no_authority", "the barrier cannot be influenced at this state"),
+            Self::InvalidInput => ("invalid_input", "an input is not a number or infinite: u nearest 0"),
+            Self::Singular => ("singular", "the model is not finite at this state: u nearest 0"),
+            Self::WrongRelativeDegree => {
+                ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
+            }
+            Self::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
+        }
+    }
+
     /// Whether the returned input satisfies every constraint.
     pub fn is_satisfied(self) -> bool {
         matches!(self, Self::Unchanged | Self::Filtered)
@@ -56,6 +82,7 @@ impl Status {
 
 /// One barrier's part of a [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct BarrierReport {
     /// h now, in its own unit; not a number where the state is not.
     pub h: f64,
@@ -97,7 +124,7 @@ pub struct BarrierReport {
     pub blocked_by: Option<usize>,
     /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
     /// been met, and h has not risen by a hundredth of its size. A u_ref that goes around leads out of it
-    /// ([`Heading::around`](crate::nominal::Heading::around)), if this barrier lets it: a hard one that is not
+    /// (`Heading::around` of the reference controllers), if this barrier lets it: a hard one that is not
     /// met stays at its least violation, whatever u_ref is; a soft one
     /// ([`Strictness::Soft`](super::Strictness::Soft)) yields to it.
     pub deadlocked: bool,
@@ -170,6 +197,7 @@ impl BarrierReport {
 
 /// The report of a step.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Time of the sample in s.
     pub time: f64,

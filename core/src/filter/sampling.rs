@@ -8,6 +8,7 @@ use crate::error::{Error, positive};
 
 /// The account that a filter takes of inputs held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Sampling {
     /// None: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs,
     /// Mδ/aⁿ.

@@ -162,7 +162,8 @@ impl SafetyFilter {
     /// A slice of the wrong length; a direction that is not finite.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_reference::plants::PointMass;
     /// let mut filter = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;

@@ -66,7 +66,7 @@ impl RelativeDegree {
 /// use punctual_core::barriers::DistanceDisc;
 /// use punctual_core::lie::{RelativeDegree, relative_degree};
 /// use punctual_core::nalgebra::{self, vector};
-/// use punctual_core::plants::{SmallSlipBicycle, Unicycle};
+/// use punctual_reference::plants::{SmallSlipBicycle, Unicycle};
 ///
 /// let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let x = [vector![1.0, 2.0, 0.3, 4.0]];

@@ -28,6 +28,7 @@
 mod canonical;
 mod dual_active_set;
 mod factors;
+#[cfg(feature = "interior-point")]
 mod interior_point;
 mod kkt;
 mod one_active;
@@ -174,17 +175,20 @@ impl<'a> Problem<'a> {
 
 /// Method for problems that have no closed form.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Backend {
     /// The dual active-set method: exact up to round-off, no allocation.
     #[default]
     DualActiveSet,
     /// The interior-point method clarabel, for comparison: accurate to about 1e-6 of the correction. It
     /// takes rows as hard, relaxes them together where they cannot be met, and ignores weights.
+    #[cfg(feature = "interior-point")]
     InteriorPoint,
 }
 
 /// Method that produced the answer. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Solver {
     /// None was needed: u_ref was feasible.
@@ -325,6 +329,7 @@ impl Workspace {
             }
             return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
         }
+        #[cfg(feature = "interior-point")]
         if self.backend == Backend::InteriorPoint {
             return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
         }

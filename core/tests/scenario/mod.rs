@@ -7,8 +7,8 @@ use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, SafetyFilter};
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
-use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
+use punctual_reference::plants::PointMass;
 
 /// A chain of `N` integrators, u in the last.
 #[derive(Clone, Copy)]

@@ -7,8 +7,8 @@ use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::{SMatrix, SVector};
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
 /// A matrix of zeros with `value` in the last row: one input, in the last equation.
 fn last_equation<S: Scalar, const NX: usize>(value: S) -> SMatrix<S, NX, 1> {

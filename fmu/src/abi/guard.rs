@@ -5,8 +5,9 @@ use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, Once, PoisonError};
 
+use punctual_modeldescription::fmi2::{Component, Status, Text};
+
 use super::logger::Logger;
-use super::types::{Component, Status, StringPointer};
 use crate::instance::{Failure, Instance};
 
 /// What a component pointer points to.
@@ -53,21 +54,21 @@ pub(super) unsafe fn guarded(
     body: impl FnOnce(&mut Handle) -> Result<Status, Failure>,
 ) -> Status {
     // SAFETY: the caller's contract; a NULL pointer gives None.
-    let Some(handle) = (unsafe { component.cast::<Handle>().as_mut() }) else { return Status::Error };
+    let Some(handle) = (unsafe { component.cast::<Handle>().as_mut() }) else { return Status::ERROR };
     if handle.poisoned {
         handle.logger.error(&format!("{name}: the instance failed before and can only be freed"));
-        return Status::Error;
+        return Status::ERROR;
     }
     match catch(|| body(handle)) {
         Ok(Ok(status)) => status,
         Ok(Err(failure)) => {
             handle.logger.error(&format!("{name}: {failure}"));
-            Status::Error
+            Status::ERROR
         }
         Err(panic) => {
             handle.poisoned = true;
             handle.logger.error(&format!("{name}: {panic}"));
-            Status::Error
+            Status::ERROR
         }
     }
 }
@@ -130,7 +131,7 @@ fn check_array<T>(name: &str, pointer: *const T, len: usize) -> Result<(), Failu
 /// # Safety
 ///
 /// `pointer` is NULL or points to a NUL-terminated string.
-pub(super) unsafe fn text(pointer: StringPointer) -> Option<String> {
+pub(super) unsafe fn text(pointer: Text) -> Option<String> {
     if pointer.is_null() {
         return None;
     }

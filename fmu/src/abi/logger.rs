@@ -2,7 +2,8 @@
 
 use std::ffi::{CStr, CString};
 
-use super::types::{CallbackFunctions, Environment, LoggerFunction, Status};
+use punctual_modeldescription::fmi2::{self, CallbackFunctions, Environment, Status};
+
 use crate::product::LOG_CATEGORIES;
 
 /// The category of failed calls.
@@ -13,7 +14,7 @@ const EVENTS: &CStr = c"logEvents";
 
 /// What is needed to log for one instance; copied out of the importer's structure.
 pub(super) struct Logger {
-    function: Option<LoggerFunction>,
+    function: Option<fmi2::Logger>,
     environment: Environment,
     instance_name: CString,
     /// Whether events are wanted (`loggingOn` and the categories). Errors are always logged.
@@ -36,13 +37,13 @@ impl Logger {
 
     /// Logs a failed call.
     pub(super) fn error(&self, message: &str) {
-        self.send(Status::Error, ERRORS, message);
+        self.send(Status::ERROR, ERRORS, message);
     }
 
     /// Logs an event, if they are wanted.
     pub(super) fn event(&self, message: &str) {
         if self.events {
-            self.send(Status::Ok, EVENTS, message);
+            self.send(Status::OK, EVENTS, message);
         }
     }
 
@@ -65,7 +66,7 @@ impl Logger {
         // SAFETY: the importer guarantees that its logger stays callable with its environment while the
         // instance lives; the strings are NUL-terminated and outlive the call; the text has no
         // conversion, so no further argument is read.
-        unsafe { function(self.environment, name, status as i32, category, text.as_ptr()) };
+        unsafe { function(self.environment, name, status, category, text.as_ptr()) };
     }
 }
 

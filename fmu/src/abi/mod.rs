@@ -7,6 +7,9 @@
 //! from `fmi2Instantiate` and was not freed; calls for one component do not overlap; an array is NULL
 //! or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong
 //! counts of zero are met with a status, never with a crash.
+//!
+//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned: several importers take a warning for a failure, and
+//! no failure leaves an instance that could not be freed. `fmi2Discard` says that a status asked for does not exist.
 
 #[cfg(old_glibc)]
 mod glibc;
@@ -15,7 +18,6 @@ mod logger;
 mod plugin;
 mod resources;
 mod states;
-mod types;
 mod unsupported;
 
 use std::ffi::{CString, c_int};
@@ -23,24 +25,39 @@ use std::ptr;
 
 pub use plugin::{PluginFolder, file_name};
 
+use punctual_modeldescription::fmi2::{
+    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
+    TERMINATED, Text, ValueReference,
+};
+
 use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
 use logger::Logger;
-use types::{
-    Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
-    StringPointer, TERMINATED, ValueReference,
+use states::{
+    fmi2DeSerializeFMUstate, fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SerializeFMUstate,
+    fmi2SerializedFMUstateSize, fmi2SetFMUstate,
 };
+use unsupported::fmi2CancelStep;
 
 use crate::instance::{Call, Instance, Mode};
 
+/// The exports have the types of the standard.
+macro_rules! exported {
+    ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
+        $(const _: fmi2::$type = $symbol;)*
+    };
+}
+
+punctual_modeldescription::fmi2_functions!(exported);
+
 /// `"default"`: the types of `fmi2TypesPlatform.h`.
 #[unsafe(no_mangle)]
-extern "C" fn fmi2GetTypesPlatform() -> StringPointer {
+extern "C" fn fmi2GetTypesPlatform() -> Text {
     c"default".as_ptr()
 }
 
 /// `"2.0"`.
 #[unsafe(no_mangle)]
-extern "C" fn fmi2GetVersion() -> StringPointer {
+extern "C" fn fmi2GetVersion() -> Text {
     c"2.0".as_ptr()
 }
 
@@ -51,10 +68,10 @@ extern "C" fn fmi2GetVersion() -> StringPointer {
 /// See the module; `callbacks` is NULL or points to a structure that is read during this call only.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2Instantiate(
-    instance_name: StringPointer,
+    instance_name: Text,
     fmu_type: c_int,
-    guid: StringPointer,
-    resource_location: StringPointer,
+    guid: Text,
+    resource_location: Text,
     callbacks: *const CallbackFunctions,
     _visible: Boolean,
     logging_on: Boolean,
@@ -118,7 +135,7 @@ unsafe extern "C" fn fmi2SetDebugLogging(
     component: Component,
     logging_on: Boolean,
     count: usize,
-    categories: *const StringPointer,
+    categories: *const Text,
 ) -> Status {
     let body = |handle: &mut Handle| {
         // SAFETY: the caller's contract for arrays.
@@ -129,7 +146,7 @@ unsafe extern "C" fn fmi2SetDebugLogging(
             names.push(unsafe { text(pointer) }.ok_or("a category is NULL")?);
         }
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        handle.logger.set_debug_logging(logging_on != 0, &names).map(|()| Status::Ok)
+        handle.logger.set_debug_logging(logging_on != 0, &names).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SetDebugLogging", body) }
@@ -151,7 +168,7 @@ unsafe extern "C" fn fmi2SetupExperiment(
 ) -> Status {
     let body = |handle: &mut Handle| {
         let stop_time = (stop_time_defined != 0).then_some(stop_time);
-        handle.instance.setup_experiment(start_time, stop_time).map(|()| Status::Ok)
+        handle.instance.setup_experiment(start_time, stop_time).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SetupExperiment", body) }
@@ -169,7 +186,7 @@ macro_rules! plain {
         unsafe extern "C" fn $name(component: Component) -> Status {
             let body: fn(&mut Handle) -> Result<(), String> = $body;
             // SAFETY: the caller's contract for components.
-            unsafe { guarded(component, stringify!($name), |handle| body(handle).map(|()| Status::Ok)) }
+            unsafe { guarded(component, stringify!($name), |handle| body(handle).map(|()| Status::OK)) }
         }
     )*};
 }
@@ -213,7 +230,7 @@ macro_rules! values {
                 let references = unsafe { slice("vr", references, count) }?;
                 // SAFETY: the caller's contract for arrays.
                 let values = unsafe { $slice("value", values, count) }?;
-                handle.instance.$method(references, values).map(|()| Status::Ok)
+                handle.instance.$method(references, values).map(|()| Status::OK)
             };
             // SAFETY: the caller's contract for components.
             unsafe { guarded(component, stringify!($name), body) }
@@ -246,12 +263,12 @@ unsafe extern "C" fn fmi2GetString(
     component: Component,
     references: *const ValueReference,
     count: usize,
-    _values: *mut StringPointer,
+    _values: *mut Text,
 ) -> Status {
     let body = |handle: &mut Handle| {
         // SAFETY: the caller's contract for arrays.
         let references = unsafe { slice("vr", references, count) }?;
-        handle.instance.check_strings(Call::Get, references).map(|()| Status::Ok)
+        handle.instance.check_strings(Call::Get, references).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetString", body) }
@@ -267,12 +284,12 @@ unsafe extern "C" fn fmi2SetString(
     component: Component,
     references: *const ValueReference,
     count: usize,
-    _values: *const StringPointer,
+    _values: *const Text,
 ) -> Status {
     let body = |handle: &mut Handle| {
         // SAFETY: the caller's contract for arrays.
         let references = unsafe { slice("vr", references, count) }?;
-        handle.instance.check_strings(Call::Set, references).map(|()| Status::Ok)
+        handle.instance.check_strings(Call::Set, references).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SetString", body) }
@@ -302,7 +319,7 @@ unsafe extern "C" fn fmi2GetDirectionalDerivative(
         let seed = unsafe { slice("dvKnown", seed, known_count) }?;
         // SAFETY: the caller's contract for arrays.
         let result = unsafe { slice_mut("dvUnknown", result, unknown_count) }?;
-        handle.instance.directional_derivative(unknowns, knowns, seed, result).map(|()| Status::Ok)
+        handle.instance.directional_derivative(unknowns, knowns, seed, result).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetDirectionalDerivative", body) }
@@ -322,7 +339,7 @@ unsafe extern "C" fn fmi2DoStep(
 ) -> Status {
     let body = |handle: &mut Handle| {
         let (t, h) = (current_communication_point, communication_step_size);
-        handle.instance.do_step(t, h).map(|()| Status::Ok)
+        handle.instance.do_step(t, h).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2DoStep", body) }
@@ -337,12 +354,12 @@ unsafe extern "C" fn fmi2DoStep(
 unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: StatusKind, value: *mut f64) -> Status {
     let body = |handle: &mut Handle| {
         if kind != LAST_SUCCESSFUL_TIME {
-            return Ok(Status::Discard);
+            return Ok(Status::DISCARD);
         }
         // SAFETY: the caller's contract for `value`.
         let value = unsafe { slice_mut("value", value, 1) }?;
         value[0] = handle.instance.time();
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetRealStatus", body) }
@@ -361,12 +378,12 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
 ) -> Status {
     let body = |handle: &mut Handle| {
         if kind != TERMINATED {
-            return Ok(Status::Discard);
+            return Ok(Status::DISCARD);
         }
         // SAFETY: the caller's contract for `value`.
         let value = unsafe { slice_mut("value", value, 1) }?;
         value[0] = Boolean::from(handle.instance.mode() == Mode::TERMINATED);
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetBooleanStatus", body) }
@@ -382,7 +399,7 @@ macro_rules! no_status {
         /// See the module.
         #[unsafe(no_mangle)]
         unsafe extern "C" fn $name(component: Component, _kind: StatusKind, _value: $pointer) -> Status {
-            let body = |_: &mut Handle| Ok(Status::Discard);
+            let body = |_: &mut Handle| Ok(Status::DISCARD);
             // SAFETY: the caller's contract for components.
             unsafe { guarded(component, stringify!($name), body) }
         }
@@ -392,7 +409,7 @@ macro_rules! no_status {
 no_status! {
     fmi2GetStatus(*mut c_int);
     fmi2GetIntegerStatus(*mut c_int);
-    fmi2GetStringStatus(*mut StringPointer);
+    fmi2GetStringStatus(*mut Text);
 }
 
 /// Time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.

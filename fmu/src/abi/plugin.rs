@@ -1,4 +1,16 @@
-//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them.
+//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them. The same in Rust stands in
+//! `punctual_model.rs`, the file that plug-ins copy, and is used from there.
+
+#[allow(
+    clippy::all,
+    clippy::missing_errors_doc,
+    clippy::multiple_unsafe_ops_per_block,
+    clippy::undocumented_unsafe_blocks,
+    missing_docs,
+    unreachable_pub,
+    reason = "compiled into the plug-ins of others as it is"
+)]
+mod punctual_model;
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::{CStr, c_char, c_void};
@@ -9,40 +21,18 @@ use libloading::Library;
 use punctual_models::evaluated::{Calculator, Code, Dimensions, Number};
 use uuid::Uuid;
 
+use punctual_model::{
+    ABI, BarrierFunction, Calculator as RawCalculator, Description as RawModel, PlantFunction,
+    Variable as RawVariable,
+};
+
 use super::guard::catch;
 use crate::configuration::{ParameterSection, Plugin, PluginLoader, VariableSection};
 
-/// `PUNCTUAL_ABI`.
-const ABI: u32 = 1;
 /// Most parameters of a model.
 const MAX_PARAMETERS: u32 = 256;
 /// Longest text that is read.
 const MAX_TEXT: usize = 4096;
-
-/// `punctual_calculator`.
-#[repr(C)]
-struct RawCalculator {
-    host: *mut c_void,
-    apply: extern "C" fn(*mut c_void, u32, Number, Number, f64) -> Number,
-    value: extern "C" fn(*mut c_void, Number) -> f64,
-}
-
-/// `punctual_variable`.
-#[repr(C)]
-struct RawVariable {
-    name: *const c_char,
-    unit: *const c_char,
-    description: *const c_char,
-    minimum: f64,
-    maximum: f64,
-    start: f64,
-}
-
-type Initialize = unsafe extern "C" fn() -> *const c_char;
-/// Calculator, parameters, x, f, g.
-type Plant = unsafe extern "C" fn(*const RawCalculator, *const f64, *const Number, *mut Number, *mut Number);
-/// Calculator, index, parameters, t, x.
-type Barrier = unsafe extern "C" fn(*const RawCalculator, u32, *const f64, Number, *const Number) -> Number;
 
 /// The first two fields of every version.
 #[repr(C)]
@@ -50,24 +40,6 @@ type Barrier = unsafe extern "C" fn(*const RawCalculator, u32, *const f64, Numbe
 struct Head {
     abi: u32,
     size: u32,
-}
-
-/// `punctual_model_description`.
-#[repr(C)]
-#[derive(Clone, Copy)]
-struct RawModel {
-    head: Head,
-    states: u32,
-    inputs: u32,
-    parameters: u32,
-    barriers: u32,
-    state: *const RawVariable,
-    input: *const RawVariable,
-    parameter: *const RawVariable,
-    barrier: *const RawVariable,
-    initialize: Option<Initialize>,
-    plant: Option<Plant>,
-    barrier_value: Option<Barrier>,
 }
 
 type GetModel = unsafe extern "C" fn() -> *const RawModel;
@@ -170,8 +142,8 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
             size_of::<RawModel>()
         ));
     }
-    // SAFETY: version and size are those of this type.
-    let raw = unsafe { *model };
+    // SAFETY: not NULL, aligned, version and size are those of this type, and the library stays loaded.
+    let raw = unsafe { &*model };
     let dimensions = Dimensions {
         states: raw.states as usize,
         inputs: raw.inputs as usize,
@@ -280,8 +252,8 @@ fn text(field: &str, pointer: *const c_char) -> Result<Option<String>, String> {
 
 /// The functions of a plug-in, which is unloaded when nobody has them any more.
 struct LoadedCode {
-    plant: Plant,
-    barrier: Option<Barrier>,
+    plant: PlantFunction,
+    barrier: Option<BarrierFunction>,
     dimensions: Dimensions,
     parameters: usize,
     _library: Library,

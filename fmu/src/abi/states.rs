@@ -9,8 +9,9 @@ use std::ffi::c_char;
 use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use punctual_modeldescription::fmi2::{self, Component, Status};
+
 use super::guard::{Handle, guarded, slice, slice_mut};
-use super::types::{Component, StatePointer, Status};
 use crate::instance::{Failure, State};
 use crate::state;
 
@@ -34,14 +35,14 @@ impl States {
         STATES.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn insert(&mut self, owner: &Handle, state: State) -> StatePointer {
+    fn insert(&mut self, owner: &Handle, state: State) -> fmi2::State {
         self.last += 1;
         self.live.insert(self.last, Entry { state: Box::new(state), owner: ptr::from_ref(owner).addr() });
         ptr::without_provenance_mut(self.last)
     }
 
     /// A live state of the FMU of `handle`.
-    fn find(&mut self, handle: &Handle, pointer: StatePointer) -> Result<&mut State, Failure> {
+    fn find(&mut self, handle: &Handle, pointer: fmi2::State) -> Result<&mut State, Failure> {
         if pointer.is_null() {
             return Err("FMUstate is NULL".to_owned());
         }
@@ -74,7 +75,7 @@ pub(super) fn free_all(owner: &Handle) {
 ///
 /// See the module above; `state` is NULL or points to a state pointer.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut StatePointer) -> Status {
+pub(super) unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut fmi2::State) -> Status {
     let body = |handle: &mut Handle| {
         // SAFETY: the caller's contract for `state`.
         let state = unsafe { slice_mut("FMUstate", state, 1) }?;
@@ -84,7 +85,7 @@ unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut StatePoin
         } else {
             handle.instance.save(States::lock().find(handle, state[0])?);
         }
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetFMUstate", body) }
@@ -96,11 +97,11 @@ unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut StatePoin
 ///
 /// See the module above.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetFMUstate(component: Component, state: StatePointer) -> Status {
+pub(super) unsafe extern "C" fn fmi2SetFMUstate(component: Component, state: fmi2::State) -> Status {
     let body = |handle: &mut Handle| {
         let mut states = States::lock();
         let state = states.find(handle, state)?;
-        handle.instance.restore(state).map(|()| Status::Ok)
+        handle.instance.restore(state).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SetFMUstate", body) }
@@ -112,10 +113,10 @@ unsafe extern "C" fn fmi2SetFMUstate(component: Component, state: StatePointer) 
 ///
 /// See the module above; `state` is NULL or points to a state pointer.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut StatePointer) -> Status {
+pub(super) unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut fmi2::State) -> Status {
     let body = |handle: &mut Handle| {
         if state.is_null() {
-            return Ok(Status::Ok);
+            return Ok(Status::OK);
         }
         // SAFETY: the caller's contract for `state`.
         let state = unsafe { slice_mut("FMUstate", state, 1) }?;
@@ -125,7 +126,7 @@ unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut StatePoi
             states.live.remove(&state[0].addr());
             state[0] = ptr::null_mut();
         }
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2FreeFMUstate", body) }
@@ -137,9 +138,9 @@ unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut StatePoi
 ///
 /// See the module above; `size` is NULL or writable.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SerializedFMUstateSize(
+pub(super) unsafe extern "C" fn fmi2SerializedFMUstateSize(
     component: Component,
-    state: StatePointer,
+    state: fmi2::State,
     size: *mut usize,
 ) -> Status {
     let body = |handle: &mut Handle| {
@@ -147,7 +148,7 @@ unsafe extern "C" fn fmi2SerializedFMUstateSize(
         // SAFETY: the caller's contract for `size`.
         let size = unsafe { slice_mut("size", size, 1) }?;
         size[0] = state::size(handle.instance.product());
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SerializedFMUstateSize", body) }
@@ -159,9 +160,9 @@ unsafe extern "C" fn fmi2SerializedFMUstateSize(
 ///
 /// See the module above.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SerializeFMUstate(
+pub(super) unsafe extern "C" fn fmi2SerializeFMUstate(
     component: Component,
-    state: StatePointer,
+    state: fmi2::State,
     bytes: *mut c_char,
     size: usize,
 ) -> Status {
@@ -170,7 +171,7 @@ unsafe extern "C" fn fmi2SerializeFMUstate(
         let state = states.find(handle, state)?;
         // SAFETY: the caller's contract for arrays.
         let bytes = unsafe { slice_mut("serializedState", bytes.cast::<u8>(), size) }?;
-        state::write(handle.instance.product(), state, bytes).map(|()| Status::Ok)
+        state::write(handle.instance.product(), state, bytes).map(|()| Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2SerializeFMUstate", body) }
@@ -182,11 +183,11 @@ unsafe extern "C" fn fmi2SerializeFMUstate(
 ///
 /// See the module above; `state` is NULL or writable.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2DeSerializeFMUstate(
+pub(super) unsafe extern "C" fn fmi2DeSerializeFMUstate(
     component: Component,
     bytes: *const c_char,
     size: usize,
-    state: *mut StatePointer,
+    state: *mut fmi2::State,
 ) -> Status {
     let body = |handle: &mut Handle| {
         // SAFETY: the caller's contract for arrays.
@@ -195,7 +196,7 @@ unsafe extern "C" fn fmi2DeSerializeFMUstate(
         let state = unsafe { slice_mut("FMUstate", state, 1) }?;
         let read = state::read(handle.instance.product(), bytes)?;
         state[0] = States::lock().insert(handle, read);
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2DeSerializeFMUstate", body) }

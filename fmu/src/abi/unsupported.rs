@@ -1,12 +1,13 @@
 //! Exports that the capability flags of the model description exclude: each answers `fmi2Error` and
 //! names the flag.
 
+use punctual_modeldescription::fmi2::{Component, Status};
+
 use super::guard::{Handle, guarded};
-use super::types::{Component, Status};
 
 /// OK where nothing is asked for, else an error that says why.
 pub(super) fn none(why: &str, count: usize) -> Result<Status, String> {
-    if count == 0 { Ok(Status::Ok) } else { Err(format!("{why}: {count} values were asked for, must be 0")) }
+    if count == 0 { Ok(Status::OK) } else { Err(format!("{why}: {count} values were asked for, must be 0")) }
 }
 
 /// Nothing runs asynchronously, so there is nothing to cancel: not supported.
@@ -15,7 +16,7 @@ pub(super) fn none(why: &str, count: usize) -> Result<Status, String> {
 ///
 /// The component is NULL or came from `fmi2Instantiate` and was not freed.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2CancelStep(component: Component) -> Status {
+pub(super) unsafe extern "C" fn fmi2CancelStep(component: Component) -> Status {
     let body = |_: &mut Handle| Err("not supported: canRunAsynchronuously is false".into());
     // SAFETY: the caller's contract.
     unsafe { guarded(component, "fmi2CancelStep", body) }

@@ -2,8 +2,8 @@
 //! the present one.
 
 use punctual_core::jet::Tangent;
-use punctual_core::nominal::damping;
 use punctual_core::scalar::Scalar;
+use punctual_reference::nominal::damping;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{

@@ -4,7 +4,7 @@ use punctual_core::filter::{FilterState, Integrator, NoDerivative, SafetyFilter,
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
-use crate::product::{BARRIER_OUTPUTS, Layout};
+use crate::product::{BARRIER_OUTPUTS, Layout, Reading};
 
 pub(super) struct FilterBlock {
     configuration: FilterConfiguration,
@@ -113,15 +113,15 @@ impl FilterBlock {
         values.integers[at] = report.status as i32;
         at += 1;
         for b in &report.barriers {
-            let reals = [b.h, b.profile, b.time_left, b.slack, b.margin, b.sampling_loss];
-            values.reals[at..][..6].copy_from_slice(&reals);
-            for (i, count) in [b.unmet_steps, b.postponed].into_iter().enumerate() {
-                values.integers[at + 6 + i] = i32::try_from(count).unwrap_or(i32::MAX);
+            for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
+                match output.reading {
+                    Reading::Real(_, value, _) => values.reals[i] = value(b),
+                    Reading::Count(value) => values.integers[i] = i32::try_from(value(b)).unwrap_or(i32::MAX),
+                    Reading::Flag(value) => values.booleans[i] = value(b),
+                    Reading::Phase => values.integers[i] = b.phase as i32,
+                }
             }
-            let flags = [b.arrived, b.guaranteed, b.deadline_unreachable, b.deadlocked];
-            values.booleans[at + 8..][..4].copy_from_slice(&flags);
-            values.integers[at + 12] = b.phase as i32;
-            at += BARRIER_OUTPUTS;
+            at += BARRIER_OUTPUTS.len();
         }
         if self.integrator.is_some() {
             values.reals[at] = integrated;
@@ -175,10 +175,12 @@ impl Block for FilterBlock {
         // `status` is in between.
         at += inputs + 1;
         for b in &self.change.barriers {
-            // The time left does not depend on the inputs.
-            let reals = [b.h, b.profile, 0.0, b.slack, b.margin, b.sampling_loss];
-            derivative[at..][..6].copy_from_slice(&reals);
-            at += BARRIER_OUTPUTS;
+            for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
+                if let Reading::Real(_, _, along) = output.reading {
+                    derivative[i] = along(b);
+                }
+            }
+            at += BARRIER_OUTPUTS.len();
         }
         if let Some(integrator) = &self.integrator {
             derivative[at] = 2.0 * self.change.u[integrator.input()];

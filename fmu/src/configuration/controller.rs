@@ -1,17 +1,24 @@
 //! `kind = "controller"`: a nominal controller, which says what is wanted of a plant without any promise.
 
-use punctual_core::nominal::Heading;
+use punctual_reference::nominal::Heading;
 use serde::{Deserialize, Serialize};
 
+use super::key::{
+    Key, Section,
+    Unit::Is,
+    Value::{Flag, Name, Number, Pair, Pairs, Table, Word},
+};
+use super::names::check_identifier;
 use super::{
-    ConfigurationError, ExperimentSection, ModelName, Parameter, Range, ReferenceSection, check_identifier,
+    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, Range, ReferenceSection,
+    reference,
 };
 
 /// Which nominal controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControllerName {
-    /// [`damping`](punctual_core::nominal::damping): of speeds, and of the angle that a rate steers.
+    /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
     Damping,
     /// [`Heading`] to one goal.
     Heading,
@@ -32,8 +39,8 @@ impl ControllerName {
 
 /// The numbers of the controllers, each with the controllers and models that have it.
 struct Gain {
-    name: &'static str,
-    unit: &'static str,
+    key: Key,
+    /// Meaning, as the FMU says it.
     description: &'static str,
     has: fn(ControllerName, ModelName) -> bool,
     default: fn(&Heading) -> f64,
@@ -61,78 +68,150 @@ const ACCEPTANCE: f64 = 1.0;
 
 static GAINS: [Gain; 9] = [
     Gain {
-        name: "gain",
-        unit: "1/s",
+        key: Key::new(
+            "gain",
+            Number(Is("1/s"), Range::POSITIVE),
+            Some("1"),
+            "`damping`: deceleration per speed, and rate per steering or slip angle where a rate steers",
+        ),
         description: "deceleration per speed, and rate per steering or slip angle where a rate steers",
         has: |controller, _| controller == ControllerName::Damping,
         default: |_| GAIN,
         access: |c| &mut c.gain,
     },
     Gain {
-        name: "acceptance_radius",
-        unit: "m",
+        key: Key::new(
+            "acceptance_radius",
+            Number(Is("m"), Range::POSITIVE),
+            Some("1"),
+            "`waypoints`: distance from a point at which the next one becomes the goal",
+        ),
         description: "distance from a point at which the next one becomes the goal",
         has: |controller, _| controller == ControllerName::Waypoints,
         default: |_| ACCEPTANCE,
         access: |c| &mut c.acceptance_radius,
     },
     Gain {
-        name: "speed_gain",
-        unit: "1/s",
+        key: Key::new(
+            "speed_gain",
+            Number(Is("1/s"), Range::POSITIVE),
+            Some("0.8"),
+            "speed aimed at per distance to the goal",
+        ),
         description: "speed aimed at per distance to the goal",
         has: drives,
         default: |h| h.speed_gain,
         access: |c| &mut c.speed_gain,
     },
     Gain {
-        name: "speed_limit",
-        unit: "m/s",
+        key: Key::new(
+            "speed_limit",
+            Number(Is("m/s"), Range::POSITIVE),
+            Some("15"),
+            "largest speed aimed at",
+        ),
         description: "largest speed aimed at",
         has: drives,
         default: |h| h.speed_limit,
         access: |c| &mut c.speed_limit,
     },
     Gain {
-        name: "acceleration_gain",
-        unit: "1/s",
+        key: Key::new(
+            "acceleration_gain",
+            Number(Is("1/s"), Range::POSITIVE),
+            Some("1"),
+            "acceleration per speed error",
+        ),
         description: "acceleration per speed error",
         has: drives,
         default: |h| h.acceleration_gain,
         access: |c| &mut c.acceleration_gain,
     },
     Gain {
-        name: "acceleration_limit",
-        unit: "m/s2",
+        key: Key::new(
+            "acceleration_limit",
+            Number(Is("m/s2"), Range::POSITIVE),
+            Some("10"),
+            "largest acceleration",
+        ),
         description: "largest acceleration",
         has: drives,
         default: |h| h.acceleration_limit,
         access: |c| &mut c.acceleration_limit,
     },
     Gain {
-        name: "turn_gain",
-        unit: "1/s",
+        key: Key::new(
+            "turn_gain",
+            Number(Is("1/s"), Range::POSITIVE),
+            Some("3"),
+            "turning rate per angle to the goal; not for the point mass",
+        ),
         description: "turning rate per angle to the goal",
         has: turns,
         default: |h| h.turn_gain,
         access: |c| &mut c.turn_gain,
     },
     Gain {
-        name: "turn_limit",
-        unit: "rad/s",
+        key: Key::new(
+            "turn_limit",
+            Number(Is("rad/s"), Range::POSITIVE),
+            Some("3"),
+            "largest turning rate; not for the point mass",
+        ),
         description: "largest turning rate",
         has: turns,
         default: |h| h.turn_limit,
         access: |c| &mut c.turn_limit,
     },
     Gain {
-        name: "slip_limit",
-        unit: "rad",
+        key: Key::new(
+            "slip_limit",
+            Number(Is("rad"), Range::POSITIVE),
+            Some("1"),
+            "largest slip angle; bicycles steered by it",
+        ),
         description: "largest slip angle",
         has: slips,
         default: |h| h.slip_limit,
         access: |c| &mut c.slip_limit,
     },
 ];
+
+/// A controller.
+pub(super) static SECTION: Section = Section {
+    name: "controller",
+    keys: || {
+        static KEYS: [Key; 7] = [
+            Key::new("kind", Word(&["controller"]), None, ""),
+            Key::new("name", Name, Some("`controller`"), "the FMU's name"),
+            Key::new("plant", Table(&reference::SECTION), None, "`model`, `l_r`, `l_f` of a vehicle"),
+            Key::new(
+                "controller",
+                Word(&["damping", "heading", "waypoints"]),
+                None,
+                "`damping`, `heading` to a goal, `waypoints` one after the other, the last one held (output `waypoint`)",
+            ),
+            Key::new("goal", Pair(Is("m"), Range::FINITE), Some(""), "`heading`: the goal"),
+            Key::new(
+                "goal_input",
+                Flag,
+                Some("`false`"),
+                "`heading`: the goal is an input of the FMU that starts with `goal`",
+            ),
+            Key::new(
+                "points",
+                Pairs(Is("m"), Range::FINITE),
+                Some(""),
+                "`waypoints`: the points, at least one",
+            ),
+        ];
+        static LAST: [Key; 2] = [
+            Key::new("direct_feedthrough", Flag, Some("`true`"), "as of a filter"),
+            Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
+        ];
+        KEYS.iter().chain(GAINS.iter().map(|gain| &gain.key)).chain(&LAST).collect()
+    },
+};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -243,7 +322,7 @@ impl ControllerConfiguration {
             if (gain.has)(controller, model) {
                 value.get_or_insert((gain.default)(&defaults));
             } else if value.is_some() {
-                return refuse(gain.name, format!("{name} of {} has none", model.name()));
+                return refuse(gain.key.name, format!("{name} of {} has none", model.name()));
             }
         }
         self.experiment.check()?;
@@ -270,7 +349,7 @@ impl ControllerConfiguration {
                 "m",
                 Range::FINITE,
                 description,
-                move |c: &mut Self| &mut c.goal.get_or_insert_default()[i],
+                move |c: &mut Self| c.goal.as_mut().map(|goal| &mut goal[i]),
             ));
         }
         for k in 0..self.points.len() {
@@ -279,14 +358,16 @@ impl ControllerConfiguration {
                 let names = (format!("points[{},{}]", k + 1, i + 1), format!("points[{k}][{}]", i + 1));
                 let description = format!("point {} along {axis}", k + 1);
                 rows.push(Parameter::new(names, "m", Range::FINITE, description, move |c: &mut Self| {
-                    &mut c.points[k][i]
+                    c.points.get_mut(k).map(|point| &mut point[i])
                 }));
             }
         }
         for gain in GAINS.iter().filter(|g| (g.has)(self.controller, self.plant.model)) {
-            let names = (gain.name.to_owned(), gain.name.to_owned());
-            rows.push(Parameter::new(names, gain.unit, Range::POSITIVE, gain.description, |c: &mut Self| {
-                (gain.access)(c).get_or_insert(1.0)
+            let Number(unit, range) = gain.key.value else { continue };
+            let names = (gain.key.name.to_owned(), gain.key.name.to_owned());
+            let unit = unit.of_barrier("1", 0);
+            rows.push(Parameter::new(names, unit, range, gain.description, |c: &mut Self| {
+                (gain.access)(c).as_mut()
             }));
         }
         if slips(self.controller, self.plant.model) {

@@ -2,9 +2,10 @@
 
 use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
+use super::names::taken;
 use super::{
-    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, ShapeName,
-    over_seconds, unit_per,
+    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, Shape, over_seconds,
+    unit_per,
 };
 
 /// A real input of a filter that belongs to a barrier.
@@ -20,17 +21,16 @@ pub struct BarrierInput {
     pub description: String,
 }
 
-/// The inputs of an external barrier, in the order of [`punctual_core::lie::external`].
-pub(super) fn inputs(section: &BarrierSection, plant: &PlantSection) -> Vec<BarrierInput> {
-    let unit = &section.unit(plant);
-    let n = section.relative_degree.unwrap_or(1);
+/// The inputs of the external barrier `name` of relative degree `n`, with h in `unit`, in the order of
+/// [`punctual_core::lie::external`].
+pub(super) fn inputs(name: &str, unit: &str, n: usize, plant: &PlantSection) -> Vec<BarrierInput> {
     let input = |field: String, unit: String, description: String| BarrierInput {
-        name: format!("{}.{field}", section.name),
+        name: format!("{name}.{field}"),
         unit,
         start: 0.0,
         description,
     };
-    let mut rows = vec![input("lf0".to_owned(), unit.clone(), "h".to_owned())];
+    let mut rows = vec![input("lf0".to_owned(), unit.to_owned(), "h".to_owned())];
     for k in 1..=n {
         let without = if k == n { " where every input is 0" } else { "" };
         let description = format!("time derivative of h of order {k}{without}");
@@ -44,14 +44,12 @@ pub(super) fn inputs(section: &BarrierSection, plant: &PlantSection) -> Vec<Barr
 }
 
 /// Refuses a relative degree out of range, by the path of the barrier.
-pub(super) fn check_degree(path: &str, degree: Option<usize>) -> Result<(), ConfigurationError> {
-    match degree {
-        Some(n) if !(1..=MAX_RELATIVE_DEGREE).contains(&n) => {
-            let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
-            Err(ConfigurationError::new(format!("{path}.relative_degree"), message))
-        }
-        _ => Ok(()),
+pub(super) fn check_degree(path: &str, degree: usize) -> Result<(), ConfigurationError> {
+    if (1..=MAX_RELATIVE_DEGREE).contains(&degree) {
+        return Ok(());
     }
+    let message = format!("is {degree}, must be 1 to {MAX_RELATIVE_DEGREE}");
+    Err(ConfigurationError::new(format!("{path}.relative_degree"), message))
 }
 
 /// Refuses inputs of a plant without a model that are too many or share a name.
@@ -62,8 +60,7 @@ pub(super) fn check_inputs(plant: &PlantSection) -> Result<(), ConfigurationErro
     }
     for (i, input) in plant.inputs.iter().enumerate() {
         if plant.inputs[..i].iter().any(|other| other.name == input.name) {
-            let message = format!("is {:?}, which is already the name of something else", input.name);
-            return Err(ConfigurationError::new(format!("plant.inputs[{i}].name"), message));
+            return Err(taken(format!("plant.inputs[{i}].name"), &input.name));
         }
     }
     Ok(())
@@ -72,15 +69,11 @@ pub(super) fn check_inputs(plant: &PlantSection) -> Result<(), ConfigurationErro
 impl FilterConfiguration {
     /// The first barrier whose derivatives are inputs.
     pub fn external(&self) -> Option<&BarrierSection> {
-        self.barrier.iter().find(|b| b.shape == ShapeName::External)
+        self.barrier.iter().find(|b| matches!(b.shape, Shape::External { .. }))
     }
 
-    /// Says how it samples where the file does not, and refuses what needs a prediction nobody can make.
-    pub(super) fn complete_sampling(&mut self) -> Result<(), ConfigurationError> {
-        if self.sampling == SamplingName::Unstated {
-            let known = !self.plant.is_external();
-            self.sampling = if known { SamplingName::Measured } else { SamplingName::Pointwise };
-        }
+    /// Refuses what needs a prediction nobody can make.
+    pub(super) fn check_sampling(&self) -> Result<(), ConfigurationError> {
         let Some(barrier) = self.external() else { return Ok(()) };
         let why = format!("barrier {} is external, and what it is given cannot be predicted", barrier.name);
         if self.sampling != SamplingName::Pointwise {

@@ -1,8 +1,14 @@
 //! `[integrator]` of a filter: a state of its model that is commanded and not measured.
 
 use punctual_core::filter::{Integrator, SafetyFilter};
+use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
+use super::key::{
+    Key, Section,
+    Unit::{Is, Of},
+    Value::{Name, Number},
+};
 use super::{
     ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, UNBOUNDED, VariableSection,
 };
@@ -38,14 +44,35 @@ fn none_above() -> f64 {
     UNBOUNDED
 }
 
+const GAIN: Range = Range::POSITIVE;
+const LIMIT: Range = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
+
+/// `[integrator]`.
+pub(super) static SECTION: Section = Section {
+    name: "integrator",
+    keys: || {
+        static KEYS: [Key; 4] = [
+            Key::new("state", Name, None, "such as `delta` of `bicycle_kinematic`"),
+            Key::new(
+                "gain",
+                Number(Is("1/s"), GAIN),
+                Some("2"),
+                "how fast it follows `u_ref.<state>` where nothing is in the way",
+            ),
+            Key::new("min", Number(Of("in its unit"), LIMIT), Some("none"), "its smallest value"),
+            Key::new("max", Number(Of("in its unit"), LIMIT), Some("none"), "its largest value"),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
 impl IntegratorSection {
     /// The number of the state and of the input that is its rate.
     pub(super) fn place(&self, plant: &PlantSection) -> Result<(usize, usize), ConfigurationError> {
         let (states, inputs, derivatives) = (plant.states(), plant.inputs(), plant.derivatives());
         let rate = |i: usize| {
             let input = inputs.iter().position(|input| input.name == derivatives[i].trim())?;
-            let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-            let moves = |text: &str| text.split(|c| !word(c)).any(|name| name == inputs[input].name);
+            let moves = |text: &str| text.split(|c| !is_in_name(c)).any(|name| name == inputs[input].name);
             let alone = derivatives.iter().enumerate().all(|(k, text)| k == i || !moves(text));
             alone.then_some(input)
         };
@@ -67,23 +94,18 @@ impl IntegratorSection {
         let (unit, description) = state.map_or_else(Default::default, |s| (s.unit, s.description));
         type Access = fn(&mut IntegratorSection) -> &mut f64;
         let row = |name: String, field: &str, unit: String, range, meaning: String, access: Access| {
-            let given = self.clone();
-            Parameter::new(
-                (name, format!("integrator.{field}")),
-                unit,
-                range,
-                meaning,
-                move |c: &mut FilterConfiguration| access(c.integrator.get_or_insert_with(|| given.clone())),
-            )
+            let names = (name, format!("integrator.{field}"));
+            Parameter::new(names, unit, range, meaning, move |c: &mut FilterConfiguration| {
+                c.integrator.as_mut().map(access)
+            })
         };
-        let bounded = Range { min: Some(-UNBOUNDED), max: Some(UNBOUNDED) };
         let (least, largest) = (format!("u_min.{}", self.state), format!("u_max.{}", self.state));
         let limit = |word: &str| format!("{word} {description} (no bound: {UNBOUNDED:e} in size)");
         let follows = format!("how fast the filter's {} follows what is wanted", self.state);
         vec![
-            row(least, "min", unit.clone(), bounded, limit("smallest"), |i| &mut i.min),
-            row(largest, "max", unit, bounded, limit("largest"), |i| &mut i.max),
-            row("integrator.gain".into(), "gain", "1/s".into(), Range::POSITIVE, follows, |i| &mut i.gain),
+            row(least, "min", unit.clone(), LIMIT, limit("smallest"), |i| &mut i.min),
+            row(largest, "max", unit, LIMIT, limit("largest"), |i| &mut i.max),
+            row("integrator.gain".into(), "gain", "1/s".into(), GAIN, follows, |i| &mut i.gain),
         ]
     }
 }

@@ -4,12 +4,15 @@
 //! travels inside the FMU as `resources/configuration.toml`. Numbers in it are also the FMU's
 //! parameters: [`Parameter`] is the one table of their names, units, ranges and meaning.
 
+mod adding;
 mod barrier;
 mod controller;
 mod external;
 mod filter;
 mod integrator;
+mod key;
 mod model;
+mod names;
 mod parameter;
 mod plant;
 mod plugin;
@@ -17,11 +20,14 @@ mod read;
 mod reference;
 mod unit;
 
-pub use barrier::{BarrierSection, InfeasibleName, MethodName, ProfileName, ShapeName};
+pub use barrier::{
+    Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
+};
 pub use controller::{ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use integrator::IntegratorSection;
+pub use key::{Key, Section, Unit, Value};
 pub use model::{ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
@@ -94,7 +100,7 @@ impl Configuration {
             return Err(ConfigurationError::new("kind", message));
         };
         Ok(match kind {
-            Kind::Filter => Self::Filter(read_toml::<FilterConfiguration>(text)?.completed(loader)?),
+            Kind::Filter => Self::Filter(FilterConfiguration::parse(read_toml(text)?, loader)?),
             Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed(loader)?),
             Kind::Controller => Self::Controller(read_toml::<ControllerConfiguration>(text)?.completed()?),
         })
@@ -151,6 +157,37 @@ impl Configuration {
     }
 }
 
+/// The files and their tables, each after those that have it.
+pub static SECTIONS: [&Section; 12] = [
+    &filter::SECTION,
+    &barrier::SECTION,
+    &model::PLANT,
+    &model::VARIABLE,
+    &model::PARAMETER,
+    &integrator::SECTION,
+    &plant::SECTION,
+    &plant::INTEGRATION,
+    &plant::DISTURBANCE,
+    &controller::SECTION,
+    &reference::SECTION,
+    &EXPERIMENT,
+];
+
+/// `[experiment]`.
+static EXPERIMENT: Section = Section {
+    name: "experiment",
+    keys: || {
+        static KEYS: [Key; 3] = [
+            Key::new("start_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("0"), "when it begins"),
+            Key::new("stop_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("10"), "after the start"),
+            Key::new("step_size", STEP_SIZE, Some("0.001"), "the communication step"),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
+const STEP_SIZE: Value = Value::Number(Unit::Is("s"), Range::POSITIVE);
+
 /// `[experiment]`: the run that the FMU is meant for; importers take it as their default.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
@@ -180,18 +217,6 @@ impl ExperimentSection {
         }
         Ok(())
     }
-}
-
-/// A name that can stand in variable names and file names: a C identifier of at most 64 characters.
-fn check_identifier(field: &str, name: &str) -> Result<(), ConfigurationError> {
-    let mut chars = name.chars();
-    let head = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
-    if head && chars.all(|c| c.is_ascii_alphanumeric() || c == '_') && name.len() <= 64 {
-        return Ok(());
-    }
-    let message =
-        format!("is {name:?}, must be letters, digits and underscores, not starting with a digit (1 to 64)");
-    Err(ConfigurationError::new(field, message))
 }
 
 #[cfg(test)]

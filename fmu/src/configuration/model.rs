@@ -3,30 +3,20 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::plants::Signal;
 use punctual_models::Model;
+use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
 use super::external::check_inputs as check_external_inputs;
-use super::plugin::{Loaded, PluginDigest, PluginLoader};
-use super::{
-    ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_identifier, check_unit,
+use super::key::{
+    Key, Section,
+    Unit::Of,
+    Value::{Name, Number, Tables, Text, TextByName, TextOrByName, Word},
 };
-
-/// Names that parameters of a model must leave to the FMU.
-const RESERVED: [&str; 11] = [
-    "x",
-    "u",
-    "u_ref",
-    "u_min",
-    "u_max",
-    "status",
-    "rearm",
-    "x0",
-    "inner_step",
-    "integrator",
-    "measurement_error",
-];
+use super::names::{Named, check_identifier, is_reserved, taken};
+use super::plugin::{Loaded, PluginDigest, PluginLoader};
+use super::reference::{self, MODELS};
+use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit};
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -130,6 +120,96 @@ pub struct PlantSection {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<String, String>,
 }
+
+/// `[plant]` of a filter or plant.
+pub(super) static PLANT: Section = Section {
+    name: "model",
+    keys: || {
+        static KEYS: [Key; 9] = [
+            Key::new("model", Word(&MODELS), Some(""), "a vehicle by name, see the next table"),
+            reference::L_R,
+            reference::L_F,
+            Key::new(
+                "states",
+                Tables(&VARIABLE),
+                Some(""),
+                "your own model: variables, in order, at most 32",
+            ),
+            Key::new(
+                "inputs",
+                Tables(&VARIABLE),
+                Some(""),
+                "your own model: variables, in order, at most 12",
+            ),
+            Key::new(
+                "parameters",
+                Tables(&PARAMETER),
+                Some("none"),
+                "your own model: constants, parameters of the FMU",
+            ),
+            Key::new(
+                "derivatives",
+                TextByName,
+                Some(""),
+                "your own model: for each state the [expression](#expressions) of its derivative, affine in the inputs",
+            ),
+            Key::new("plugin", Name, Some(""), "a shared library beside the file: [plugin.md](plugin.md)"),
+            Key::new(
+                "plugin_digest",
+                TextOrByName,
+                Some("any"),
+                "what its bytes must come to: a text, or one for each platform",
+            ),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
+const NAME: Key = Key::new("name", Name, None, "unique");
+const UNIT: Key = Key::new("unit", Text, Some("`1`"), "such as `m/s2` or `kg.m2/s`");
+const DESCRIPTION: Key = Key::new("description", Text, Some("none"), "for a human");
+
+/// An entry of `states` or `inputs`.
+pub(super) static VARIABLE: Section = Section {
+    name: "variable",
+    keys: || {
+        static KEYS: [Key; 5] = [
+            NAME,
+            UNIT,
+            DESCRIPTION,
+            Key::new(
+                "min",
+                Number(Of("in its unit"), Range::FINITE),
+                Some("none"),
+                "of a state: where the model is meant, and the relative degree looked for; of an input: its bound where \
+                 `[bounds]` says nothing",
+            ),
+            Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "the same from above"),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
+/// An entry of `parameters`.
+pub(super) static PARAMETER: Section = Section {
+    name: "parameter",
+    keys: || {
+        static KEYS: [Key; 6] = [
+            NAME,
+            Key::new(
+                "start",
+                Number(Of("in its unit"), Range::FINITE),
+                None,
+                "its value until an importer sets another one",
+            ),
+            UNIT,
+            DESCRIPTION,
+            Key::new("min", Number(Of("in its unit"), Range::FINITE), Some("none"), "its smallest value"),
+            Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "its largest value"),
+        ];
+        KEYS.iter().collect()
+    },
+};
 
 impl PlantSection {
     /// The reference plant, if it is one.
@@ -258,9 +338,8 @@ impl PlantSection {
         for (i, p) in self.parameters.iter().enumerate() {
             let path = format!("plant.parameters[{i}]");
             check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
-            if RESERVED.contains(&p.name.as_str()) {
-                let message = format!("is {:?}, which is already the name of something else", p.name);
-                return Err(ConfigurationError::new(format!("{path}.name"), message));
+            if is_reserved(&p.name, Named::Parameter) {
+                return Err(taken(format!("{path}.name"), &p.name));
             }
         }
         Ok(())
@@ -310,7 +389,7 @@ impl PlantSection {
             let names = (p.name.clone(), format!("plant.parameters[{i}].start"));
             let range = Range { min: p.min, max: p.max };
             Parameter::new(names, p.unit.clone(), range, p.description.clone(), move |c| {
-                &mut section(c).parameters[i].start
+                section(c).parameters.get_mut(i).map(|p| &mut p.start)
             })
         };
         self.parameters.iter().enumerate().map(row).collect()

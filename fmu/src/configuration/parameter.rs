@@ -64,8 +64,8 @@ pub(super) fn number(value: f64) -> String {
     if size == 0.0 || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
 }
 
-/// How a parameter's number is reached in a completed configuration of type `C`.
-type Access<C> = Box<dyn Fn(&mut C) -> &mut f64 + Send>;
+/// How a parameter's number is reached in a completed configuration of type `C`; `None` in one without it.
+type Access<C> = Box<dyn Fn(&mut C) -> Option<&mut f64> + Send>;
 
 /// One number of a configuration: its name as an FMU variable, its path in the file, unit, range and
 /// meaning. Validation, the model description and the FMU's accessors all read this row.
@@ -89,7 +89,7 @@ impl<C> Parameter<C> {
         unit: impl Into<Cow<'static, str>>,
         range: Range,
         description: impl Into<String>,
-        access: impl Fn(&mut C) -> &mut f64 + Send + 'static,
+        access: impl Fn(&mut C) -> Option<&mut f64> + Send + 'static,
     ) -> Self {
         Self {
             name,
@@ -101,14 +101,16 @@ impl<C> Parameter<C> {
         }
     }
 
-    /// The value in `configuration`.
+    /// The value in `configuration`; not a number in one that does not have it.
     pub fn get(&self, configuration: &mut C) -> f64 {
-        *(self.access)(configuration)
+        (self.access)(configuration).copied().unwrap_or(f64::NAN)
     }
 
-    /// Writes the value into `configuration`, unchecked.
+    /// Writes the value into `configuration`, unchecked, if that has it.
     pub fn set(&self, configuration: &mut C, value: f64) {
-        *(self.access)(configuration) = value;
+        if let Some(number) = (self.access)(configuration) {
+            *number = value;
+        }
     }
 
     /// Checks the value in `configuration`.

@@ -5,8 +5,79 @@ use std::collections::BTreeMap;
 use punctual_core::dynamics::DynPlant;
 use serde::{Deserialize, Serialize};
 
+use super::key::{
+    Key, Section,
+    Unit::{Is, Of},
+    Value::{Name, Number, NumberByName, Table, Word},
+};
+use super::names::check_identifier;
 use super::{
-    ConfigurationError, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, check_identifier,
+    ConfigurationError, EXPERIMENT, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, model,
+};
+
+const INNER_STEP: Range = Range::POSITIVE;
+const SEED: Range = Range::NON_NEGATIVE;
+const PERIOD: Range = Range::POSITIVE;
+const SIZE: Range = Range::NON_NEGATIVE;
+
+/// A plant.
+pub(super) static SECTION: Section = Section {
+    name: "plant",
+    keys: || {
+        static KEYS: [Key; 7] = [
+            Key::new("kind", Word(&["plant"]), None, ""),
+            Key::new("name", Name, Some("the model's"), "the FMU's name"),
+            Key::new("plant", Table(&model::PLANT), None, "[the model](#models)"),
+            Key::new(
+                "x0",
+                NumberByName(Of("unit of the state"), Range::FINITE),
+                Some("0, or nearest to it in the state's range"),
+                "initial value of a state, by name",
+            ),
+            Key::new("integration", Table(&INTEGRATION), Some(""), "how it is integrated"),
+            Key::new("disturbance", Table(&DISTURBANCE), Some("none"), "what the model does not say"),
+            Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
+/// `[integration]`.
+pub(super) static INTEGRATION: Section = Section {
+    name: "integration",
+    keys: || {
+        static KEYS: [Key; 1] = [Key::new(
+            "inner_step",
+            Number(Is("s"), INNER_STEP),
+            Some("0.001"),
+            "largest step; a communication step is divided into equal ones",
+        )];
+        KEYS.iter().collect()
+    },
+};
+
+/// `[disturbance]`.
+pub(super) static DISTURBANCE: Section = Section {
+    name: "disturbance",
+    keys: || {
+        static KEYS: [Key; 4] = [
+            Key::new(
+                "inputs",
+                NumberByName(Of("unit of the input"), SIZE),
+                Some("nothing"),
+                "largest size of what is added to an input, by name",
+            ),
+            Key::new(
+                "measurements",
+                NumberByName(Of("unit of the state"), SIZE),
+                Some("nothing"),
+                "largest size of what is added to an output `x.<state>`, by the state's name",
+            ),
+            Key::new("seed", Number(Is("1"), SEED), Some("0"), "another number, another sequence"),
+            Key::new("period", Number(Is("s"), PERIOD), Some("0.01"), "how long a value lasts"),
+        ];
+        KEYS.iter().collect()
+    },
 };
 
 /// `[integration]`: how the plant moves between communication points.
@@ -59,14 +130,8 @@ fn hold() -> f64 {
     0.01
 }
 
-impl Default for DisturbanceSection {
-    fn default() -> Self {
-        Self { seed: 0.0, period: hold(), inputs: BTreeMap::new(), measurements: BTreeMap::new() }
-    }
-}
-
 /// How a number of the section is reached.
-type Access = Box<dyn Fn(&mut DisturbanceSection) -> &mut f64 + Send>;
+type Access = Box<dyn Fn(&mut DisturbanceSection) -> Option<&mut f64> + Send>;
 
 impl DisturbanceSection {
     fn check(&self, plant: &PlantSection) -> Result<(), ConfigurationError> {
@@ -151,16 +216,16 @@ impl PlantConfiguration {
             let description = format!("initial value: {}", state.description);
             let (unit, range) = (state.unit.clone(), state.range());
             rows.push(Parameter::new((name.clone(), name), unit, range, description, move |c: &mut Self| {
-                c.x0.entry(state.name.clone()).or_insert(0.0)
+                c.x0.get_mut(&state.name)
             }));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         rows.push(Parameter::new(
             ("inner_step".to_owned(), "integration.inner_step".to_owned()),
             "s",
-            Range::POSITIVE,
+            INNER_STEP,
             "largest Runge-Kutta step; the communication step is divided into equal ones",
-            |c: &mut Self| &mut c.integration.inner_step,
+            |c: &mut Self| Some(&mut c.integration.inner_step),
         ));
         rows.extend(self.disturbance.as_ref().map(|d| self.disturbance_parameters(d)).into_iter().flatten());
         rows
@@ -170,7 +235,7 @@ impl PlantConfiguration {
         let row = |field: &str, place: &str, unit: String, range, meaning: String, access: Access| {
             let names = (format!("disturbance.{field}"), format!("disturbance.{place}"));
             Parameter::new(names, unit, range, meaning, move |c: &mut Self| {
-                access(c.disturbance.get_or_insert_with(DisturbanceSection::default))
+                c.disturbance.as_mut().and_then(&access)
             })
         };
         let mut rows = vec![
@@ -178,30 +243,30 @@ impl PlantConfiguration {
                 "seed",
                 "seed",
                 "1".to_owned(),
-                Range::NON_NEGATIVE,
+                SEED,
                 "another number, another sequence".to_owned(),
-                Box::new(|d| &mut d.seed),
+                Box::new(|d| Some(&mut d.seed)),
             ),
             row(
                 "period",
                 "period",
                 "s".to_owned(),
-                Range::POSITIVE,
+                PERIOD,
                 "time for which a value lasts".to_owned(),
-                Box::new(|d| &mut d.period),
+                Box::new(|d| Some(&mut d.period)),
             ),
         ];
         for input in self.plant.inputs().into_iter().filter(|i| given.inputs.contains_key(&i.name)) {
             let (field, place) = (format!("u.{}", input.name), format!("inputs.{}", input.name));
             let meaning = format!("largest size of what is added to {}", input.description);
-            let access: Access = Box::new(move |d| d.inputs.entry(input.name.clone()).or_default());
-            rows.push(row(&field, &place, input.unit, Range::NON_NEGATIVE, meaning, access));
+            let access: Access = Box::new(move |d| d.inputs.get_mut(&input.name));
+            rows.push(row(&field, &place, input.unit, SIZE, meaning, access));
         }
         for state in self.plant.states().into_iter().filter(|s| given.measurements.contains_key(&s.name)) {
             let (field, place) = (format!("x.{}", state.name), format!("measurements.{}", state.name));
             let meaning = format!("largest error of the measurement of {}", state.description);
-            let access: Access = Box::new(move |d| d.measurements.entry(state.name.clone()).or_default());
-            rows.push(row(&field, &place, state.unit, Range::NON_NEGATIVE, meaning, access));
+            let access: Access = Box::new(move |d| d.measurements.get_mut(&state.name));
+            rows.push(row(&field, &place, state.unit, SIZE, meaning, access));
         }
         rows
     }

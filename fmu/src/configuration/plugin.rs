@@ -14,10 +14,8 @@ use punctual_models::evaluated::{Code, CodeModel, Dimensions};
 use serde::{Deserialize, Serialize};
 
 use super::model::check_variable;
-use super::{
-    BarrierSection, ConfigurationError, ParameterSection, PlantSection, Range, ShapeName, VariableSection,
-    check_identifier,
-};
+use super::names::{check_identifier, taken};
+use super::{ConfigurationError, ParameterSection, PlantSection, Range, VariableSection};
 
 /// What a plug-in says of itself, and its code, which stays loaded as long as this is there.
 #[derive(Clone)]
@@ -121,8 +119,7 @@ impl Plugin {
         for (i, (path, name, unit, range)) in all.iter().enumerate() {
             check_variable(path, name, unit, *range)?;
             if all[..i].iter().any(|other| other.1 == *name) {
-                let message = format!("is {name:?}, which is already the name of something else");
-                return Err(ConfigurationError::new(format!("{path}.name"), message));
+                return Err(taken(format!("{path}.name"), name));
             }
         }
         for (i, p) in self.parameters.iter().enumerate() {
@@ -186,54 +183,9 @@ impl PlantSection {
         self.loaded.as_ref().map(|loaded| &*loaded.0)
     }
 
-    fn plugin_barriers(&self) -> &[VariableSection] {
+    /// The barriers of its plug-in.
+    pub(super) fn plugin_barriers(&self) -> &[VariableSection] {
         self.loaded().map_or(&[], |plugin| &plugin.barriers)
-    }
-}
-
-impl BarrierSection {
-    /// Refuses a shape that is not for plug-ins where the plant is one, and theirs elsewhere.
-    pub(super) fn check_plugin(&self, path: &str, plant: &PlantSection) -> Result<(), ConfigurationError> {
-        let shape = self.shape.name();
-        let known = matches!(self.shape, ShapeName::Plugin | ShapeName::External);
-        let message = match plant.plugin {
-            Some(_) if !known => format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")"),
-            None if self.shape == ShapeName::Plugin => format!("is {shape:?}, but the plant is none"),
-            _ => return Ok(()),
-        };
-        Err(ConfigurationError::new(format!("{path}.shape"), message))
-    }
-
-    /// Takes over what the plug-in says of the barrier, if it has it.
-    pub(super) fn complete_output(
-        &mut self,
-        path: &str,
-        plant: &PlantSection,
-    ) -> Result<(), ConfigurationError> {
-        if self.shape != ShapeName::Plugin {
-            return Ok(());
-        }
-        let output = self.output.get_or_insert_with(|| self.name.clone());
-        let known = plant.plugin_barriers();
-        let Some(barrier) = known.iter().find(|b| b.name == *output) else {
-            let names: Vec<_> = known.iter().map(|b| b.name.as_str()).collect();
-            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            let message =
-                format!("is {output:?}, which is no barrier of the plug-in; its barriers are {names}");
-            return Err(ConfigurationError::new(format!("{path}.output"), message));
-        };
-        let unit = self.unit.get_or_insert_with(|| barrier.unit.clone());
-        if *unit != barrier.unit {
-            let message = format!("is {unit:?}, but the plug-in gives {:?}", barrier.unit);
-            return Err(ConfigurationError::new(format!("{path}.unit"), message));
-        }
-        Ok(())
-    }
-
-    /// Which of the plug-in's barriers it is.
-    pub(super) fn output_index(&self, plant: &PlantSection) -> usize {
-        let known = plant.plugin_barriers();
-        known.iter().position(|b| Some(&b.name) == self.output.as_ref()).unwrap_or(usize::MAX)
     }
 }
 

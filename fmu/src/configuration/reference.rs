@@ -1,13 +1,13 @@
 //! The reference plants by name, with their constants.
 
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_core::plants::{
+use punctual_reference::plants::{
     Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
     SteeredBicycle, Steering, Unicycle,
 };
 use serde::{Deserialize, Serialize};
 
-use super::{ConfigurationError, Parameter, Range};
+use super::{ConfigurationError, Key, Parameter, Range, Section, Unit, Value};
 
 /// The reference plants by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -32,6 +32,18 @@ pub enum ModelName {
 }
 
 impl ModelName {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::PointMass,
+        Self::Unicycle,
+        Self::Bicycle,
+        Self::BicycleSmallSlip,
+        Self::BicycleSmallSlipRate,
+        Self::BicycleKinematic,
+        Self::BicycleKinematicAngle,
+        Self::BicycleKinematicSlip,
+    ];
+
     /// The states, in order.
     pub fn states(self) -> &'static [Signal] {
         match self {
@@ -74,7 +86,7 @@ impl ModelName {
     }
 
     /// Its name in a configuration.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::PointMass => "point_mass",
             Self::Unicycle => "unicycle",
@@ -100,6 +112,37 @@ impl ModelName {
         !matches!(self, Self::BicycleKinematicAngle | Self::BicycleKinematicSlip)
     }
 }
+
+/// The names of the models.
+pub(super) static MODELS: [&str; ModelName::ALL.len()] = {
+    let mut names = [""; ModelName::ALL.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = ModelName::ALL[i].name();
+        i += 1;
+    }
+    names
+};
+
+pub(super) const L_R: Key =
+    Key::new("l_r", LENGTH_VALUE, Some("10"), "bicycles: from the rear axle to the centre of mass");
+pub(super) const L_F: Key = Key::new(
+    "l_f",
+    LENGTH_VALUE,
+    Some("10"),
+    "`bicycle_kinematic`, `bicycle_kinematic_angle`: from the centre of mass to the front axle",
+);
+const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
+
+/// `[plant]` of a controller.
+pub(super) static SECTION: Section = Section {
+    name: "vehicle",
+    keys: || {
+        static KEYS: [Key; 3] =
+            [Key::new("model", Value::Word(&MODELS), None, "a [vehicle](#models) by name"), L_R, L_F];
+        KEYS.iter().collect()
+    },
+};
 
 /// A reference plant with its constants: `[plant]` of a controller, or of a filter or plant without expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
@@ -146,16 +189,12 @@ impl ReferenceSection {
         if self.l_r.is_some() {
             let what = "distance from the rear axle to the centre of mass";
             let names = names("l_r");
-            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| {
-                l_r(c).get_or_insert(LENGTH)
-            }));
+            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| l_r(c).as_mut()));
         }
         if self.l_f.is_some() {
             let what = "distance from the centre of mass to the front axle";
             let names = names("l_f");
-            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| {
-                l_f(c).get_or_insert(LENGTH)
-            }));
+            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| l_f(c).as_mut()));
         }
         rows
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::names::check_identifier;
 use super::*;
 
 const FILTER: &str = r#"
@@ -304,6 +305,16 @@ fn every_kind() -> Vec<String> {
         if ["bicycle_small_slip", "bicycle_kinematic_angle", "bicycle_kinematic_slip"].contains(&model) {
             continue;
         }
+        for (shape, keys) in [
+            ("ellipse", "half_axes = [3.0, 2.0]"),
+            ("rectangular_obstacle", "half_sides = [3.0, 2.0]\nangle = 0.3"),
+            ("half_plane", "normal = [3.0, 2.0]"),
+        ] {
+            texts.push(format!(
+                "kind = \"filter\"\nplant.model = \"{model}\"\n[[barrier]]\nname = \"a\"\nshape = \"{shape}\"\n\
+                 centre = [1.0, 2.0]\npenalty = 3.0\nbegin = 1.0\nend = 4.0\n{keys}\n"
+            ));
+        }
         for shape in ["disc", "quadratic_disc", "obstacle"] {
             for method in ["reference_profile", "repeated_root"] {
                 texts.push(format!(
@@ -367,9 +378,11 @@ fn models_and_shapes_are_named_as_in_the_file() {
 fn defaults_are_those_of_the_documentation() {
     let Configuration::Filter(c) = Configuration::parse(FILTER).unwrap() else { panic!("not a filter") };
     let barrier = &c.barrier[0];
-    assert_eq!((barrier.rate, barrier.stay_rate, barrier.smoothing), (0.0, 0.0, Some(0.0)), "by default");
-    assert_eq!(barrier.margin, Some(0.02), "a hundredth of the radius");
-    assert_eq!(barrier.velocity, Some([0.0; 2]), "at rest");
+    assert_eq!((barrier.rate, barrier.stay_rate), (Automatic(0.0), Automatic(0.0)), "by default");
+    assert_eq!(barrier.margin, 0.02, "a hundredth of the radius");
+    let at = Point { centre: [45.0, 44.0], velocity: [0.0; 2], centre_input: false };
+    let disc = Shape::Disc { at, radius: 2.0, smoothing: Automatic(0.0) };
+    assert_eq!(barrier.shape, disc, "at rest, rounded by its radius");
     assert_eq!((c.name.as_str(), c.direct_feedthrough, c.correction_limit), ("filter", true, 1e6));
     let Configuration::Plant(c) =
         Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle\"").unwrap()
@@ -381,6 +394,113 @@ fn defaults_are_those_of_the_documentation() {
     let Configuration::Plant(kinematic) = kinematic else { panic!("not a plant") };
     assert_eq!((kinematic.plant.l_f, kinematic.plant.l_r), (Some(10.0), Some(10.0)));
     assert_eq!(c.x0.values().copied().collect::<Vec<_>>(), [0.0; 4]);
+}
+
+/// The default of a key as TOML, where the table gives a value.
+fn default_value(key: &Key) -> Option<toml::Value> {
+    let text = key.default?.trim_matches('`');
+    match key.value {
+        Value::Number(..) => text.parse().ok().map(toml::Value::Float),
+        Value::Count(..) => text.parse().ok().map(toml::Value::Integer),
+        Value::Flag => text.parse().ok().map(toml::Value::Boolean),
+        Value::Word(words) if words.contains(&text) => Some(text.into()),
+        _ => None,
+    }
+}
+
+/// A key that says its default changes nothing.
+#[test]
+fn defaults_of_the_tables_are_those_of_the_files() {
+    let heading = HEADING.replace("unicycle", "bicycle_small_slip");
+    let steered = "kind = \"filter\"\nplant.model = \"bicycle_kinematic\"\nintegrator.state = \"delta\"\n\
+                   [[barrier]]\nname = \"goal\"\ncentre = [1.0, 2.0]\nradius = 1.0\n";
+    let ellipse =
+        format!("{}shape = \"ellipse\"\n", steered.replace("radius = 1.0", "half_axes = [1.0, 1.0]"));
+    let plant = "kind = \"plant\"\nplant.model = \"bicycle_kinematic\"\nintegration = {}\ndisturbance = {}\nexperiment = {}\n";
+    let controller = "kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"bicycle_kinematic\"\n";
+    let mut compared = BTreeSet::new();
+    for (text, place) in [
+        (steered, "filter"),
+        (steered, "barrier"),
+        (&ellipse, "barrier"),
+        (steered, "integrator"),
+        (plant, "plant"),
+        (plant, "integration"),
+        (plant, "disturbance"),
+        (plant, "experiment"),
+        (plant, "model"),
+        (controller, "controller"),
+        (controller, "vehicle"),
+        (&heading, "controller"),
+        (WAYPOINTS, "controller"),
+    ] {
+        let short = Configuration::parse(text).unwrap_or_else(|e| panic!("{e} in {text}"));
+        let section = SECTIONS.iter().find(|section| section.name == place).unwrap();
+        for key in (section.keys)() {
+            let Some(value) = default_value(key) else { continue };
+            let mut file: toml::Table = text.parse().unwrap();
+            let table = match place {
+                "filter" | "plant" | "controller" => &mut file,
+                "barrier" => file["barrier"][0].as_table_mut().unwrap(),
+                "model" | "vehicle" => file["plant"].as_table_mut().unwrap(),
+                place => file[place].as_table_mut().unwrap(),
+            };
+            table.insert(key.name.to_owned(), value);
+            match Configuration::parse(&file.to_string()) {
+                Ok(long) => assert_eq!(long, short, "{place}: {}", key.name),
+                Err(e) => assert!(e.to_string().ends_with("has none"), "{place}: {}: {e}", key.name),
+            }
+            compared.insert((place, key.name));
+        }
+    }
+    let valued = |section: &&'static Section| {
+        let keys = (section.keys)().into_iter().filter(|key| default_value(key).is_some());
+        keys.map(|key| (section.name, key.name)).collect::<Vec<_>>()
+    };
+    assert_eq!(compared, SECTIONS.iter().flat_map(valued).collect());
+}
+
+/// The keys that the table of shapes says a shape needs are enough, and none is too many.
+#[test]
+fn shapes_need_what_their_row_says() {
+    let values = [
+        ("centre", "[1.0, 2.0]"),
+        ("radius", "1.0"),
+        ("half_axes", "[2.0, 1.0]"),
+        ("half_sides", "[2.0, 1.0]"),
+        ("normal", "[1.0, 0.0]"),
+        ("state", "\"v\""),
+        ("bound", "1.0"),
+        ("expression", "\"v\""),
+        ("relative_degree", "1"),
+        ("smoothing", "0.5"),
+        ("velocity", "[1.0, 0.0]"),
+        ("centre_input", "true"),
+        ("angle", "0.5"),
+        ("unit", "\"m\""),
+    ];
+    let line = |key: &&str| {
+        let value = values.iter().find(|v| v.0 == *key).unwrap_or_else(|| panic!("no value of {key}"));
+        format!("{key} = {}\n", value.1)
+    };
+    let head = "kind = \"filter\"\nplant.model = \"unicycle\"\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\n";
+    // A plug-in has to be there: tests/cli.
+    for row in SHAPES.iter().filter(|row| row.name != "plugin") {
+        let needed: String = row.required.iter().map(line).collect();
+        let head = format!("{head}shape = \"{}\"\n", row.name);
+        for text in [needed.clone(), needed.clone() + &row.optional.iter().map(line).collect::<String>()] {
+            let Configuration::Filter(c) = Configuration::parse(&(head.clone() + &text))
+                .unwrap_or_else(|e| panic!("{e} in {head}{text}"))
+            else {
+                panic!("not a filter")
+            };
+            assert_eq!(c.barrier[0].shape.name(), row.name);
+        }
+        for key in row.required {
+            let error = Configuration::parse(&(head.clone() + &needed.replace(&line(key), ""))).unwrap_err();
+            assert_eq!(error.to_string(), format!("barrier[0].{key}: missing, {} needs it", row.name));
+        }
+    }
 }
 
 #[test]

@@ -88,8 +88,8 @@ fn every_unit_has_its_exponents() {
     for product in every_product() {
         let units: BTreeMap<_, _> = units(&product.variables).into_iter().map(|u| (u.name, u.base)).collect();
         for variable in &product.variables {
-            if let VariableKind::Real { unit, .. } = &variable.kind {
-                let unit = unit.as_deref().unwrap_or_else(|| panic!("{} has no unit", variable.name));
+            if matches!(variable.kind, VariableKind::Real(_)) {
+                let unit = variable.kind.unit().unwrap_or_else(|| panic!("{} has no unit", variable.name));
                 assert!(units.contains_key(unit), "{} is in {unit}, which is not declared", variable.name);
                 seen.insert(unit.to_owned());
             }
@@ -145,11 +145,7 @@ fn value_references_are_indices_and_names_are_unique() {
 fn inputs_and_parameters_start_within_their_range() {
     for product in every_product() {
         for (i, variable) in product.variables.iter().enumerate() {
-            let start = match &variable.kind {
-                VariableKind::Real { start, .. } => *start,
-                VariableKind::Boolean { start } => start.map(f64::from),
-                _ => None,
-            };
+            let start = variable.kind.start_number();
             let output = variable.causality == Causality::Output;
             assert_eq!(start.is_none(), output, "{} starts at {start:?}", variable.name);
             if let (Some(start), Some(i)) = (start, i.checked_sub(product.layout.parameters)) {
@@ -184,7 +180,7 @@ fn dependencies_of_controllers_are_those_found() {
         let mut block = crate::block::build(&product).unwrap();
         let mut values = crate::block::Values::zeros(product.variables.len());
         for (value, variable) in values.reals.iter_mut().zip(&product.variables) {
-            if let VariableKind::Real { start: Some(start), .. } = variable.kind {
+            if let VariableKind::Real(Real { start: Some(start), .. }) = variable.kind {
                 *value = start;
             }
         }
@@ -213,7 +209,7 @@ fn dependencies_of_controllers_are_those_found() {
 
 #[test]
 fn enumerations_cover_every_status_and_phase() {
-    let values = |t: EnumerationType| t.items.iter().map(|i| i.value).collect::<Vec<_>>();
+    let values = |t: SimpleType| t.items.iter().map(|i| i.value).collect::<Vec<_>>();
     assert_eq!(values(status_type()), Status::ALL.map(|s| s as i32));
     assert_eq!(values(phase_type()), [0, 1, 2, 3, 4, 5]);
     let names = status_type().items.into_iter().map(|i| i.name).collect::<BTreeSet<_>>();

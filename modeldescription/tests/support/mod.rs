@@ -1,13 +1,18 @@
 //! A small valid description with every kind of variable, for the tests to look at or to break.
 
 use punctual_modeldescription::{
-    BaseUnit, Causality, CoSimulation, DefaultExperiment, EnumerationItem, EnumerationType, Initial,
-    LogCategory, ModelDescription, NamingConvention, Unit, Variability, Variable, VariableKind,
+    BaseUnit, Causality, CoSimulation, DefaultExperiment, EnumerationItem, Initial, Integer, LogCategory,
+    ModelDescription, NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
 };
 
 /// A real kind with unit and start value only.
 pub(crate) fn real(unit: &str, start: Option<f64>) -> VariableKind {
-    VariableKind::Real { start, min: None, max: None, nominal: None, quantity: None, unit: Some(unit.into()) }
+    VariableKind::Real(Real { start, unit: Some(unit.into()), ..Real::default() })
+}
+
+/// A Boolean or text with a start value.
+pub(crate) fn plain<T>(start: T) -> Plain<T> {
+    Plain { start: Some(start), declared_type: None }
 }
 
 /// A variable with initial and dependencies left out.
@@ -31,18 +36,24 @@ pub(crate) fn variable(
     }
 }
 
+/// A unit without display units.
+pub(crate) fn unit(name: &str, base: BaseUnit) -> Unit {
+    Unit { name: name.into(), base: Some(base), display_units: Vec::new() }
+}
+
 /// A valid description with every kind of variable and every element.
 pub(crate) fn small() -> ModelDescription {
     use Causality::{CalculatedParameter, Input, Local, Output, Parameter};
     use Variability::{Continuous, Discrete, Fixed, Tunable};
-    let length = VariableKind::Real {
+    let length = VariableKind::Real(Real {
         start: Some(0.1),
         min: Some(0.0),
         max: Some(f64::INFINITY),
         nominal: Some(1e-7),
         quantity: Some("Length".into()),
         unit: Some("m".into()),
-    };
+        ..Real::default()
+    });
     ModelDescription {
         model_name: "Small <model> & \"more\"".into(),
         guid: "{00000000-0000-5000-8000-000000000001}".into(),
@@ -62,24 +73,21 @@ pub(crate) fn small() -> ModelDescription {
             ..Default::default()
         },
         units: vec![
-            Unit { name: "m".into(), base: BaseUnit { m: 1, ..Default::default() } },
-            Unit {
-                name: "deg/s".into(),
-                base: BaseUnit { rad: 1, s: -1, factor: 0.017453292519943295, ..Default::default() },
-            },
-            Unit { name: "1".into(), base: BaseUnit::default() },
+            unit("m", BaseUnit { m: 1, ..Default::default() }),
+            unit("deg/s", BaseUnit { rad: 1, s: -1, factor: 0.017453292519943295, ..Default::default() }),
+            unit("1", BaseUnit::default()),
         ],
-        enumerations: vec![EnumerationType {
-            name: "Status".into(),
-            description: "How it went".into(),
-            items: vec![
+        types: vec![SimpleType::enumeration(
+            "Status",
+            "How it went",
+            vec![
                 EnumerationItem { name: "good".into(), value: 0, description: "Well".into() },
                 EnumerationItem { name: "bad".into(), value: 7, description: String::new() },
             ],
-        }],
+        )],
         log_categories: vec![LogCategory { name: "logAll".into(), description: "Everything".into() }],
         default_experiment: Some(DefaultExperiment {
-            start_time: 0.0,
+            start_time: Some(0.0),
             stop_time: Some(10.0),
             step_size: Some(0.01),
             tolerance: None,
@@ -96,10 +104,15 @@ pub(crate) fn small() -> ModelDescription {
                 0,
                 Parameter,
                 Tunable,
-                VariableKind::Integer { start: Some(3), min: Some(1), max: Some(9) },
+                VariableKind::Integer(Integer {
+                    start: Some(3),
+                    min: Some(1),
+                    max: Some(9),
+                    ..Integer::default()
+                }),
             ),
-            variable("rearm", 0, Input, Discrete, VariableKind::Boolean { start: Some(false) }),
-            variable("label", 0, Parameter, Fixed, VariableKind::String { start: Some("a\n<b>".into()) }),
+            variable("rearm", 0, Input, Discrete, VariableKind::Boolean(plain(false))),
+            variable("label", 0, Parameter, Fixed, VariableKind::String(plain("a\n<b>".into()))),
             Variable {
                 dependencies: Some(vec![2]),
                 initial_dependencies: Some(vec![2, 0x10, 2]),
@@ -110,13 +123,7 @@ pub(crate) fn small() -> ModelDescription {
                 initial: Some(Initial::Exact),
                 ..variable("der(y)", 4, Output, Continuous, real("1", Some(-0.5)))
             },
-            variable(
-                "status",
-                1,
-                Output,
-                Discrete,
-                VariableKind::Enumeration { declared_type: "Status".into(), start: None },
-            ),
+            variable("status", 1, Output, Discrete, VariableKind::enumeration("Status")),
             Variable {
                 initial: Some(Initial::Approx),
                 ..variable("guess", 5, Local, Continuous, real("1", Some(1e300)))

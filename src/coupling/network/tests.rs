@@ -1,22 +1,29 @@
 //! Resolution of system files against made-up descriptions, one defect each.
 
-use super::*;
-use crate::host::{Capabilities, Item, Variability};
+use punctual_modeldescription::{EnumerationItem, ModelDescription, Plain, Real, SimpleType};
 
-fn variable(name: &str, kind: Kind, causality: Causality) -> Variable {
+use super::*;
+use crate::host::{Variability, VariableKind};
+
+fn real() -> VariableKind {
+    VariableKind::Real(Real::default())
+}
+
+fn boolean() -> VariableKind {
+    VariableKind::Boolean(Plain::default())
+}
+
+fn variable(name: &str, kind: VariableKind, causality: Causality) -> Variable {
     Variable {
         name: name.into(),
         value_reference: 0,
         kind,
         causality,
         variability: Variability::Discrete,
-        unit: None,
-        start: None,
-        min: None,
-        max: None,
-        description: None,
-        declared_type: None,
-        items: vec![],
+        initial: None,
+        description: String::new(),
+        dependencies: None,
+        initial_dependencies: None,
     }
 }
 
@@ -30,47 +37,40 @@ fn description(variables: Vec<Variable>, dependencies: &[(&str, Option<&[&str]>)
         })
         .collect();
     Description {
-        model_name: "m".into(),
-        guid: "g".into(),
-        model_identifier: "m".into(),
-        description: None,
-        author: None,
-        version: None,
-        generation_tool: None,
-        generation_time: None,
-        capabilities: Capabilities::default(),
-        default_experiment: None,
-        variables,
+        starts: vec![None; variables.len()],
+        model: ModelDescription { variables, ..ModelDescription::default() },
         outputs,
         problems: vec![],
     }
 }
 
 fn filter() -> Description {
-    let mut deadline = variable("deadline", Kind::Real, Causality::Parameter);
-    (deadline.min, deadline.unit) = (Some(0.0), Some("s".into()));
-    let mut mode = variable("mode", Kind::Enumeration, Causality::Parameter);
-    mode.items = vec![Item { name: "on".into(), value: 1 }];
-    description(
+    let time = Real { min: Some(0.0), unit: Some("s".into()), ..Real::default() };
+    let deadline = variable("deadline", VariableKind::Real(time), Causality::Parameter);
+    let mode = variable("mode", VariableKind::enumeration("Mode"), Causality::Parameter);
+    let on = EnumerationItem { name: "on".into(), value: 1, description: String::new() };
+    let mut filter = description(
         vec![
-            variable("x", Kind::Real, Causality::Input),
-            variable("u_ref", Kind::Real, Causality::Input),
-            variable("rearm", Kind::Boolean, Causality::Input),
-            variable("u", Kind::Real, Causality::Output),
-            variable("arrived", Kind::Boolean, Causality::Output),
+            variable("x", real(), Causality::Input),
+            variable("u_ref", real(), Causality::Input),
+            variable("rearm", boolean(), Causality::Input),
+            variable("u", real(), Causality::Output),
+            variable("arrived", boolean(), Causality::Output),
             deadline,
             mode,
         ],
         &[("u", None), ("arrived", None)],
-    )
+    );
+    filter.model.types = vec![SimpleType::enumeration("Mode", "", vec![on])];
+    filter
 }
 
 fn plant() -> Description {
     description(
         vec![
-            variable("u", Kind::Real, Causality::Input),
-            variable("x", Kind::Real, Causality::Output),
-            variable("text", Kind::String, Causality::Output),
+            variable("u", real(), Causality::Input),
+            variable("x", real(), Causality::Output),
+            variable("text", VariableKind::String(Plain::default()), Causality::Output),
         ],
         &[("x", Some(&[])), ("text", Some(&[]))],
     )
@@ -79,7 +79,7 @@ fn plant() -> Description {
 /// A gain block.
 fn gain() -> Description {
     description(
-        vec![variable("i", Kind::Real, Causality::Input), variable("o", Kind::Real, Causality::Output)],
+        vec![variable("i", real(), Causality::Input), variable("o", real(), Causality::Output)],
         &[("o", Some(&["i"]))],
     )
 }

@@ -1,8 +1,9 @@
 //! What the XML schema of FMI 2.0 says, as one table ([`table`]) and one pass over the document.
 
 mod table;
-pub(super) mod types;
+mod types;
 
+use punctual_modeldescription::brief;
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::finding::{DESCRIPTION, Findings, Mark, Place};
@@ -47,14 +48,8 @@ fn declared_encoding(text: &str, findings: &mut Findings) {
 }
 
 /// Where a node begins.
-pub(super) fn place(node: Node<'_, '_>) -> Mark {
+fn place(node: Node<'_, '_>) -> Mark {
     mark(node, node.range().start)
-}
-
-/// Where an attribute of a node stands, or the node where it has none of this name.
-pub(super) fn place_of(node: Node<'_, '_>, attribute: &str) -> Mark {
-    let at = node.attribute_node(attribute).map_or(node.range().start, |a| a.range().start);
-    mark(node, at)
 }
 
 fn mark(node: Node<'_, '_>, at: usize) -> Mark {
@@ -106,15 +101,6 @@ fn attributes(node: Node<'_, '_>, element: &Element, findings: &mut Findings) {
             findings.add("schema.attribute", place(node), message);
         }
     }
-}
-
-/// The beginning of a long value.
-pub(super) fn brief(value: &str) -> String {
-    const LENGTH: usize = 80;
-    if value.chars().count() <= LENGTH {
-        return value.to_owned();
-    }
-    value.chars().take(LENGTH).chain("...".chars()).collect()
 }
 
 fn children<'a, 'i>(

@@ -1,6 +1,8 @@
 //! The elements and attributes of the FMI 2.0 schema (`fmi2ModelDescription.xsd` and the files it
 //! includes), row by row.
 
+use punctual_modeldescription::{Causality, Initial, NamingConvention, Variability};
+
 use super::types::Value;
 use Times::{Choice, Many, Maybe, One, Some};
 use Value::{Boolean, DateTime, Double, Int, Line, OneOf, Text, Unsigned, Version, Words};
@@ -89,11 +91,10 @@ const fn row(kind: &'static str, attributes: &'static [Attribute], children: &'s
     Element { kind, attributes, children, content: Content::Elements }
 }
 
-const CAUSALITY: Value =
-    OneOf(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]);
-const VARIABILITY: Value = OneOf(&["constant", "fixed", "tunable", "discrete", "continuous"]);
-const INITIAL: Value = OneOf(&["exact", "approx", "calculated"]);
-const NAMING: Value = OneOf(&["flat", "structured"]);
+const CAUSALITY: Value = OneOf(Causality::WORDS);
+const VARIABILITY: Value = OneOf(Variability::WORDS);
+const INITIAL: Value = OneOf(Initial::WORDS);
+const NAMING: Value = OneOf(NamingConvention::WORDS);
 const DEPENDENCY: Value = Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 
 /// The schema.

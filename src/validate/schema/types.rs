@@ -1,4 +1,6 @@
-//! The simple types of XML Schema that the FMI 2.0 schema uses.
+//! The simple types of XML Schema that the FMI 2.0 schema uses, and what a text must be to be one.
+
+use punctual_modeldescription::xsd::{boolean, double, int, is_date_time, unsigned, words};
 
 /// The type of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ impl Value {
                 "integers, 0 to 4294967295, with blanks between them".to_owned(),
             ),
             Self::Double => (double(text).is_some(), "a number such as 1.5e-3, INF, -INF or NaN".to_owned()),
-            Self::DateTime => (date_time(text), "a date and time such as 2026-01-31T23:59:59Z".to_owned()),
+            Self::DateTime => (is_date_time(text), "a date and time such as 2026-01-31T23:59:59Z".to_owned()),
             Self::OneOf(list) => (list.contains(&text), format!("one of {}", one_of(list))),
             Self::Words(list) => {
                 (words(text).all(|word| list.contains(&word)), format!("words out of {}", one_of(list)))
@@ -49,98 +51,6 @@ impl Value {
             Self::Version => (text == "2.0", "\"2.0\"".to_owned()),
         };
         if good { Ok(()) } else { Err(allowed) }
-    }
-}
-
-/// White space of XML, which is less than that of Unicode.
-fn trimmed(text: &str) -> &str {
-    text.trim_matches([' ', '\t', '\n', '\r'])
-}
-
-/// The words of a list.
-pub(in crate::validate) fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split([' ', '\t', '\n', '\r']).filter(|word| !word.is_empty())
-}
-
-/// An `xs:boolean`.
-pub(in crate::validate) fn boolean(text: &str) -> Option<bool> {
-    match trimmed(text) {
-        "true" | "1" => Some(true),
-        "false" | "0" => Some(false),
-        _ => None,
-    }
-}
-
-/// An `xs:int`.
-pub(in crate::validate) fn int(text: &str) -> Option<i32> {
-    trimmed(text).parse().ok()
-}
-
-/// An `xs:unsignedInt`.
-pub(in crate::validate) fn unsigned(text: &str) -> Option<u32> {
-    let text = trimmed(text);
-    // "-0" is one too.
-    if text.strip_prefix('-').is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b == b'0')) {
-        return Some(0);
-    }
-    text.parse().ok()
-}
-
-/// An `xs:double`. Rust reads more than that: `inf`, `infinity`, `nan`.
-pub(in crate::validate) fn double(text: &str) -> Option<f64> {
-    match trimmed(text) {
-        "INF" => Some(f64::INFINITY),
-        "-INF" => Some(f64::NEG_INFINITY),
-        "NaN" => Some(f64::NAN),
-        text if text.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) => text.parse().ok(),
-        _ => None,
-    }
-}
-
-/// An `xs:dateTime`: `[-]YYYY-MM-DDThh:mm:ss[.f][Z|(+|-)hh:mm]`.
-fn date_time(text: &str) -> bool {
-    let text = trimmed(text);
-    let text = text.strip_prefix('-').unwrap_or(text);
-    let Some((date, rest)) = text.split_once('T') else { return false };
-    let (time, zone) = match rest.find(['Z', '+', '-']) {
-        Some(at) => rest.split_at(at),
-        None => (rest, ""),
-    };
-    let parts: Vec<&str> = date.split('-').collect();
-    let [year, month, day] = parts[..] else { return false };
-    let dated = year.len() >= 4
-        && number(year).is_some_and(|year| year > 0)
-        && within(month, 1, 12)
-        && within(day, 1, days_in_month(number(year).unwrap_or(0), number(month).unwrap_or(0)));
-    let (time, fraction) = time.split_once('.').unwrap_or((time, "0"));
-    let parts: Vec<&str> = time.split(':').collect();
-    let [hour, minute, second] = parts[..] else { return false };
-    let timed = (within(hour, 0, 23) && within(minute, 0, 59) && within(second, 0, 59)
-        || (hour, minute, second) == ("24", "00", "00"))
-        && !fraction.is_empty()
-        && fraction.bytes().all(|b| b.is_ascii_digit());
-    let zoned = matches!(zone, "" | "Z")
-        || zone.get(1..).and_then(|zone| zone.split_once(':')).is_some_and(|(hour, minute)| {
-            within(hour, 0, 13) && within(minute, 0, 59) || (hour, minute) == ("14", "00")
-        }) && !zone.starts_with('Z');
-    dated && timed && zoned
-}
-
-fn number(text: &str) -> Option<u64> {
-    if text.bytes().all(|b| b.is_ascii_digit()) { text.parse().ok() } else { None }
-}
-
-/// Two digits between the bounds.
-fn within(text: &str, least: u64, most: u64) -> bool {
-    text.len() == 2 && number(text).is_some_and(|number| (least..=most).contains(&number))
-}
-
-fn days_in_month(year: u64, month: u64) -> u64 {
-    let leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    match month {
-        2 => 28 + u64::from(leap),
-        4 | 6 | 9 | 11 => 30,
-        _ => 31,
     }
 }
 

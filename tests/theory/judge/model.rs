@@ -5,9 +5,9 @@ use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
-use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
 use crate::chains::Chain;
 

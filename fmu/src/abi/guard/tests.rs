@@ -1,9 +1,8 @@
 //! A panic cannot be caused from outside; here it is caused inside.
 
-use std::ffi::c_int;
+use punctual_modeldescription::fmi2::{self, CallbackFunctions, Environment};
 
 use super::super::logger::Logger;
-use super::super::types::{CallbackFunctions, Environment, LoggerFunction};
 use super::*;
 use crate::configuration::Configuration;
 use crate::product::Product;
@@ -11,16 +10,16 @@ use crate::product::Product;
 /// Keeps messages in the `Vec<String>` that the environment points to.
 extern "C" fn keep(
     environment: Environment,
-    _instance: StringPointer,
-    status: c_int,
-    _category: StringPointer,
-    message: StringPointer,
+    _instance: Text,
+    status: Status,
+    _category: Text,
+    message: Text,
 ) {
     // SAFETY: `handle` passes such a vector, and nothing else refers to it during a call.
     let messages = unsafe { environment.cast::<Vec<String>>().as_mut() };
     // SAFETY: the logger passes a string.
     let message = unsafe { text(message) };
-    messages.unwrap().push(format!("{status} {}", message.unwrap()));
+    messages.unwrap().push(format!("{} {}", status.0, message.unwrap()));
 }
 
 fn handle(messages: &mut Vec<String>) -> Handle {
@@ -28,12 +27,12 @@ fn handle(messages: &mut Vec<String>) -> Handle {
     let guid = Product::new(configuration.clone()).unwrap().guid;
     // SAFETY: the caller passes exactly the five fixed arguments. That a function with five fixed
     // arguments may be called as a variadic one holds on x86-64 and AArch64, not by the language.
-    let logger = unsafe { std::mem::transmute::<*const (), LoggerFunction>(keep as *const ()) };
+    let logger = unsafe { std::mem::transmute::<*const (), fmi2::Logger>(keep as *const ()) };
     let callbacks = CallbackFunctions {
         logger: Some(logger),
-        allocate_memory: std::ptr::null(),
-        free_memory: std::ptr::null(),
-        step_finished: std::ptr::null(),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
         environment: std::ptr::from_mut(messages).cast(),
     };
     Handle {
@@ -61,15 +60,15 @@ fn a_panic_becomes_an_error_and_poisons_the_instance() {
     let component: Component = std::ptr::from_mut(&mut handle).cast();
     // SAFETY: the component is a handle that lives until the end of this function.
     let status = unsafe { guarded(component, "fmi2DoStep", |_| panic!("100% wrong\nat line 2")) };
-    assert_eq!(status, Status::Error);
+    assert_eq!(status, Status::ERROR);
     let mut ran = false;
     let body = |_: &mut Handle| {
         ran = true;
-        Ok(Status::Ok)
+        Ok(Status::OK)
     };
     // SAFETY: as above.
     let again = unsafe { guarded(component, "fmi2GetReal", body) };
-    assert_eq!((again, ran), (Status::Error, false), "a poisoned instance does nothing");
+    assert_eq!((again, ran), (Status::ERROR, false), "a poisoned instance does nothing");
     assert!(handle.poisoned);
     drop(handle);
 
@@ -90,7 +89,7 @@ fn a_panic_becomes_an_error_and_poisons_the_instance() {
 fn null_is_an_error_and_runs_nothing() {
     // SAFETY: NULL is allowed.
     let status = unsafe { guarded(std::ptr::null_mut(), "fmi2Reset", |_| panic!("ran")) };
-    assert_eq!(status, Status::Error);
+    assert_eq!(status, Status::ERROR);
 }
 
 #[test]

@@ -8,9 +8,9 @@
 
 #![allow(dead_code)]
 
-use std::ffi::{c_char, c_void, CStr};
+use std::ffi::{CStr, c_char, c_void};
 use std::ops::{Add, Div, Mul, Neg, Sub};
-use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null;
 
 /// The version of the interface.
@@ -23,9 +23,9 @@ const LITERAL: u32 = u32::MAX;
 /// What computes.
 #[repr(C)]
 pub struct Calculator {
-    host: *mut c_void,
-    apply: unsafe extern "C" fn(*mut c_void, u32, u32, u32, f64) -> u32,
-    value: unsafe extern "C" fn(*mut c_void, u32) -> f64,
+    pub(super) host: *mut c_void,
+    pub(super) apply: unsafe extern "C" fn(*mut c_void, u32, u32, u32, f64) -> u32,
+    pub(super) value: unsafe extern "C" fn(*mut c_void, u32) -> f64,
 }
 
 /// A number that is computed with.
@@ -162,12 +162,12 @@ impl Output<'_> {
 /// A state, input, parameter or barrier.
 #[repr(C)]
 pub struct Variable {
-    name: *const c_char,
-    unit: *const c_char,
-    description: *const c_char,
-    minimum: f64,
-    maximum: f64,
-    start: f64,
+    pub(super) name: *const c_char,
+    pub(super) unit: *const c_char,
+    pub(super) description: *const c_char,
+    pub(super) minimum: f64,
+    pub(super) maximum: f64,
+    pub(super) start: f64,
 }
 
 // SAFETY: the texts are constants.
@@ -221,22 +221,29 @@ pub trait Model {
     fn barrier<'c>(index: usize, parameters: &[f64], t: Number<'c>, x: &[Number<'c>]) -> Number<'c>;
 }
 
+/// Calculator, parameters, x, f, g.
+pub(super) type PlantFunction =
+    unsafe extern "C" fn(*const Calculator, *const f64, *const u32, *mut u32, *mut u32);
+/// Calculator, index, parameters, t, x.
+pub(super) type BarrierFunction =
+    unsafe extern "C" fn(*const Calculator, u32, *const f64, u32, *const u32) -> u32;
+
 /// What the host reads: `punctual_model_description`.
 #[repr(C)]
 pub struct Description {
-    abi: u32,
-    size: u32,
-    states: u32,
-    inputs: u32,
-    parameters: u32,
-    barriers: u32,
-    state: *const Variable,
-    input: *const Variable,
-    parameter: *const Variable,
-    barrier: *const Variable,
-    initialize: Option<unsafe extern "C" fn() -> *const c_char>,
-    plant: Option<unsafe extern "C" fn(*const Calculator, *const f64, *const u32, *mut u32, *mut u32)>,
-    barrier_value: Option<unsafe extern "C" fn(*const Calculator, u32, *const f64, u32, *const u32) -> u32>,
+    pub(super) abi: u32,
+    pub(super) size: u32,
+    pub(super) states: u32,
+    pub(super) inputs: u32,
+    pub(super) parameters: u32,
+    pub(super) barriers: u32,
+    pub(super) state: *const Variable,
+    pub(super) input: *const Variable,
+    pub(super) parameter: *const Variable,
+    pub(super) barrier: *const Variable,
+    pub(super) initialize: Option<unsafe extern "C" fn() -> *const c_char>,
+    pub(super) plant: Option<PlantFunction>,
+    pub(super) barrier_value: Option<BarrierFunction>,
 }
 
 // SAFETY: what it points to are constants.

@@ -1,6 +1,6 @@
 //! The values of controllers are those of `core`, bit for bit, whenever and however often asked.
 
-use punctual_core::nominal::{Heading, damping};
+use punctual_reference::nominal::{Heading, damping};
 
 use super::*;
 use crate::block::build;
@@ -19,7 +19,7 @@ impl Bench {
         let product = Configuration::parse(&text).and_then(Product::new).unwrap_or_else(|e| panic!("{e}"));
         let mut values = Values::zeros(product.variables.len());
         for (i, variable) in product.variables.iter().enumerate() {
-            if let punctual_modeldescription::VariableKind::Real { start: Some(start), .. } = variable.kind {
+            if let Some(start) = variable.kind.start_number() {
                 values.reals[i] = start;
             }
         }

@@ -1,0 +1,188 @@
+//! A barrier on its way into a filter: its derivatives along the plant.
+
+use punctual_core::Error;
+use punctual_core::barrier::Barrier;
+use punctual_core::dynamics::{ControlAffine, WithPoint};
+use punctual_core::filter::FilterBuilder;
+use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
+use punctual_reference::plants::{PointMass, Signal, Unicycle};
+
+use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName};
+
+/// A barrier of a configuration, and the filter that it goes into.
+pub(super) struct Adding<'a> {
+    pub(super) configuration: &'a FilterConfiguration,
+    pub(super) builder: FilterBuilder,
+    /// Which barrier.
+    pub(super) index: usize,
+    /// The first of the filter's states that are inputs of this barrier.
+    pub(super) first: usize,
+}
+
+impl Adding<'_> {
+    fn section(&self) -> &BarrierSection {
+        &self.configuration.barrier[self.index]
+    }
+
+    /// The core's refusal, in the words of the configuration.
+    fn refused(&self, error: &Error) -> ConfigurationError {
+        self.configuration.refused(self.index, error)
+    }
+
+    /// The same of an error that does not say whose it is.
+    fn named(&self, error: Error) -> ConfigurationError {
+        self.refused(&error.within(&self.section().name))
+    }
+
+    /// A region, which `barrier` makes for a plant with these states, along a reference plant.
+    pub(super) fn along<B>(
+        self,
+        barrier: impl FnOnce(&'static [Signal]) -> Result<B, Error>,
+    ) -> Result<FilterBuilder, ConfigurationError>
+    where
+        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
+    {
+        let Some(plant) = self.configuration.plant.reference() else {
+            let field = format!("barrier[{}].shape", self.index);
+            return Err(ConfigurationError::new(field, "is for the plants that have a name"));
+        };
+        let barrier = barrier(plant.model.states()).map_err(|e| self.named(e))?;
+        match plant.model {
+            ModelName::PointMass => self.along_plant::<_, _, 4, 8>(PointMass, barrier),
+            ModelName::Unicycle => self.along_plant::<_, _, 4, 8>(Unicycle, barrier),
+            ModelName::Bicycle => self.along_plant::<_, _, 4, 8>(plant.bicycle()?, barrier),
+            ModelName::BicycleSmallSlip => self.along_plant::<_, _, 4, 8>(plant.small_slip()?, barrier),
+            ModelName::BicycleSmallSlipRate => {
+                self.along_plant::<_, _, 5, 9>(plant.small_slip()?.with_rate(), barrier)
+            }
+            ModelName::BicycleKinematic => self.along_plant::<_, _, 5, 9>(plant.kinematic()?, barrier),
+            ModelName::BicycleKinematicAngle | ModelName::BicycleKinematicSlip => {
+                Err(not_affine(plant.model))
+            }
+        }
+    }
+
+    /// `EXTENDED` = `NX` + 4 states where the barrier follows a point.
+    fn along_plant<P, B, const NX: usize, const EXTENDED: usize>(
+        self,
+        plant: P,
+        barrier: B,
+    ) -> Result<FilterBuilder, ConfigurationError>
+    where
+        P: ControlAffine<NX, 2> + Send + 'static,
+        B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
+    {
+        let dim = NX + self.configuration.barrier_inputs().len();
+        let source = if self.section().shape.followed().is_none() {
+            lie::detected(&plant, &barrier)
+                .require(None)
+                .and_then(|n| lie::along(plant, barrier, n))
+                .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i)))
+        } else {
+            let (plant, first) = (WithPoint::<_, NX>(plant), self.first);
+            let picks = std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
+            lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier)
+                .require(None)
+                .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
+                .and_then(|source| lie::embedded(source, dim, &picks))
+        };
+        self.source(source)
+    }
+
+    /// An expression, along any plant.
+    pub(super) fn expression(self, text: &str) -> Result<FilterBuilder, ConfigurationError> {
+        let plant = &self.configuration.plant;
+        let barrier = plant.expressions()?.barrier(text).map_err(|e| self.of_model(&e))?;
+        let found = barrier.relative_degree(&plant.ranges());
+        self.model(found, |n| barrier.source(n))
+    }
+
+    /// The barrier of the plant's plug-in that is called `output`.
+    pub(super) fn plugin(self, output: &str) -> Result<FilterBuilder, ConfigurationError> {
+        let plant = &self.configuration.plant;
+        let position = plant.plugin_barriers().iter().position(|b| b.name == output);
+        let barrier = plant.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
+        let found = barrier.relative_degree(&plant.ranges());
+        self.model(found, |n| barrier.source(n))
+    }
+
+    /// A barrier whose derivatives are the filter's states from [`Self::first`] on.
+    pub(super) fn external(self, degree: usize) -> Result<FilterBuilder, ConfigurationError> {
+        let c = self.configuration;
+        let dim = c.plant.states().len() + c.barrier_inputs().len();
+        let own: Vec<usize> = (self.first..self.first + self.section().inputs(&c.plant).len()).collect();
+        let source = lie::external(degree, c.plant.inputs().len());
+        self.source(source.and_then(|source| lie::embedded(source, dim, &own)))
+    }
+
+    /// A barrier of the relative degree `found`; `source` makes its derivatives.
+    fn model(
+        self,
+        found: RelativeDegree,
+        source: impl FnOnce(usize) -> Result<Box<dyn DerivativeSource>, punctual_models::Error>,
+    ) -> Result<FilterBuilder, ConfigurationError> {
+        let n = found.require(None).map_err(|e| self.named(e))?;
+        let own: Vec<usize> = (0..self.configuration.plant.states().len()).collect();
+        let dim = own.len() + self.configuration.barrier_inputs().len();
+        let source = source(n).map_err(|e| self.of_model(&e))?;
+        self.source(lie::embedded(source, dim, &own))
+    }
+
+    fn source(
+        self,
+        source: Result<Box<dyn DerivativeSource>, Error>,
+    ) -> Result<FilterBuilder, ConfigurationError> {
+        let (configuration, index) = (self.configuration, self.index);
+        let settings = self.section().settings().map_err(|e| self.named(e))?;
+        let source = source.map_err(|e| self.named(e))?;
+        let added = self.builder.source(&configuration.barrier[index].name, source, settings);
+        added.map_err(|e| configuration.refused(index, &e))
+    }
+
+    /// The refusal of a model or its barrier.
+    fn of_model(&self, error: &punctual_models::Error) -> ConfigurationError {
+        ConfigurationError::new(format!("barrier[{}].{}", self.index, error.field()), error.message())
+    }
+}
+
+impl FilterConfiguration {
+    /// The core's refusal of barrier `index` in the words of the configuration.
+    pub(super) fn refused(&self, index: usize, error: &Error) -> ConfigurationError {
+        if let Some(found) = error.relative_degree() {
+            let inputs = self.plant.inputs();
+            let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
+            let advice = match (self.plant.model, found) {
+                (Some(ModelName::BicycleSmallSlip), _) => {
+                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself"
+                }
+                (None, RelativeDegree::Mixed(_)) => {
+                    "; one constraint cannot use both, so make the input that enters first a state whose derivative is the new input"
+                }
+                (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)",
+                _ => "",
+            };
+            let message = format!("its relative degree along {} {found_in_words}{advice}", self.plant.name());
+            return ConfigurationError::new(format!("barrier[{index}]"), message);
+        }
+        let field = error.field().split_once('.').map_or(error.field(), |(_, field)| field);
+        ConfigurationError::new(format!("barrier[{index}].{field}"), error.message())
+    }
+}
+
+/// Why a filter cannot have `model`, which is not affine in its inputs.
+pub(super) fn not_affine(model: ModelName) -> ConfigurationError {
+    let (angle, advice) = match model {
+        ModelName::BicycleKinematicAngle => {
+            ("delta", "take the model bicycle_kinematic with `[integrator] state = \"delta\"`")
+        }
+        _ => (
+            "beta",
+            "take bicycle, or bicycle_small_slip_rate with `[integrator] state = \"beta\"`, which nearly are it",
+        ),
+    };
+    let message = format!(
+        "is {:?}, which is a plant only: {angle} does not enter linearly, as a filter needs it; {advice}",
+        model.name()
+    );
+    ConfigurationError::new("plant.model", message)
+}

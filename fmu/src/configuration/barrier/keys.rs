@@ -1,0 +1,366 @@
+//! The keys of `[[barrier]]`, and the parameters of the FMU that their numbers are.
+
+use punctual_core::MAX_RELATIVE_DEGREE;
+
+use super::super::key::{
+    Key, Section,
+    Unit::{self, Is, OfH, OfHighestDerivative},
+    Value::{self, Count, Flag, Name, Number, Numbers, Pair, Text, Word},
+};
+use super::super::{FilterConfiguration, Parameter, PlantSection, Range};
+use super::BarrierSection;
+use super::shape::NAMES;
+
+const S: Unit = Is("s");
+const M: Unit = Is("m");
+
+/// A key with the parameters that it gives.
+struct Row {
+    key: Key,
+    /// In the order of its components. Those that reach a number are parameters of that barrier.
+    parameters: &'static [Part],
+}
+
+/// A number behind a key.
+struct Part {
+    /// What follows the key in its name: `[1]` of a first component.
+    index: &'static str,
+    /// Where it is narrower than that of the key.
+    range: Option<Range>,
+    /// Meaning, as the FMU says it.
+    description: &'static str,
+    access: fn(&mut BarrierSection) -> Option<&mut f64>,
+}
+
+/// The part that is the whole number.
+const fn whole(description: &'static str, access: fn(&mut BarrierSection) -> Option<&mut f64>) -> Part {
+    part("", description, access)
+}
+
+const fn part(
+    index: &'static str,
+    description: &'static str,
+    access: fn(&mut BarrierSection) -> Option<&mut f64>,
+) -> Part {
+    Part { index, range: None, description, access }
+}
+
+/// A key without parameters.
+const fn plain(
+    name: &'static str,
+    value: Value,
+    default: Option<&'static str>,
+    meaning: &'static str,
+) -> Row {
+    Row { key: Key::new(name, value, default, meaning), parameters: &[] }
+}
+
+static KEYS: [Row; 33] = [
+    plain("name", Name, None, "unique; the prefix of its variables"),
+    plain(
+        "shape",
+        Word(&NAMES),
+        Some("`disc`; `expression`, `plugin` or `external` as the plant and `expression` say"),
+        "see the next table",
+    ),
+    Row {
+        key: Key {
+            name: "deadline",
+            value: Number(S, Range::POSITIVE),
+            default: Some("none"),
+            meaning: "after the first step: to be inside from then on. Without one the barrier is to be kept from a start \
+                      inside it; one outside is promised nothing, and `check` and `run` say so",
+        },
+        parameters: &[whole("time from the first step to be inside and to stay so", |b| b.deadline.as_mut())],
+    },
+    plain(
+        "method",
+        Word(&["reference_profile", "repeated_root"]),
+        Some("`reference_profile`"),
+        "`reference_profile` (ours) or `repeated_root` (the paper's, where it has an admissible rate)",
+    ),
+    plain(
+        "profile",
+        Word(&["hermite", "low_peak"]),
+        Some("`hermite`"),
+        "`hermite`, or `low_peak`: least peak, 4d/T² from rest in place of 6d/T²",
+    ),
+    Row {
+        key: Key {
+            name: "rate",
+            value: Number(Is("1/s"), Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "decay of an error against the profile; 0 means 20/`deadline`, without a deadline what the bounds \
+                      can brake; at most 0.5/step",
+        },
+        parameters: &[
+            whole("decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step", |b| {
+                b.deadline.map(|_| &mut b.rate.0)
+            }),
+            whole("how fast h may go to the margin; 0: what the bounds can brake, at most 0.5 / step", |b| {
+                if b.deadline.is_none() { Some(&mut b.rate.0) } else { None }
+            }),
+        ],
+    },
+    plain(
+        "rates",
+        Numbers(Is("1/s"), Range::POSITIVE),
+        Some("none"),
+        "as many rates as the relative degree, in place of `rate`",
+    ),
+    Row {
+        key: Key {
+            name: "stay_rate",
+            value: Number(Is("1/s"), Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "after the deadline; 0 means as `rate`",
+        },
+        parameters: &[whole("rate of the constraint that keeps it inside; 0: as rate", |b| {
+            Some(&mut b.stay_rate.0)
+        })],
+    },
+    Row {
+        key: Key {
+            name: "margin",
+            value: Number(OfH, Range::NON_NEGATIVE),
+            default: Some("a hundredth of the radius, half axis or half side; else 0"),
+            meaning: "less than h ever is: h ≥ margin is what is aimed at; what held inputs are expected to cost is added",
+        },
+        parameters: &[whole("h to arrive and stay above", |b| Some(&mut b.margin))],
+    },
+    Row {
+        key: Key {
+            name: "recovery",
+            value: Number(S, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "a new deadline after leaving the set; 0: leaving is reported only",
+        },
+        parameters: &[whole("deadline for coming back after leaving; 0: none", |b| Some(&mut b.recovery.0))],
+    },
+    Row {
+        key: Key {
+            name: "disturbance",
+            value: Number(OfHighestDerivative, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "what the model does not know of h⁽ⁿ⁾; the promise holds for all within it",
+        },
+        parameters: &[whole(
+            "bound on what the model does not know of the derivative of h with an input",
+            |b| b.disturbance.as_mut(),
+        )],
+    },
+    plain(
+        "when_infeasible",
+        Word(&["report", "soonest"]),
+        Some("`report`"),
+        "`report`, or `soonest`: give up a deadline that the bounds certainly do not allow for a later one",
+    ),
+    plain(
+        "priority",
+        Count(0, u32::MAX as u64),
+        Some("0 where the start is inside, else 1"),
+        "where not all can be met, smaller numbers go first, of equal ones the one above",
+    ),
+    Row {
+        key: Key {
+            name: "penalty",
+            value: Number(Is("1"), Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "makes it soft: it yields where it would cost more than this ‖u − u_ref‖; 0: hard",
+        },
+        parameters: &[Part {
+            index: "",
+            range: Some(Range::POSITIVE),
+            description: "distance in u beyond which it yields",
+            access: |b| b.penalty.as_mut(),
+        }],
+    },
+    Row {
+        key: Key {
+            name: "begin",
+            value: Number(S, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "after the first step, before `deadline`: enforced from then on. Without a deadline the state must \
+                      be inside then",
+        },
+        parameters: &[whole("time from the first step to be enforced from", |b| b.begin.as_mut())],
+    },
+    plain(
+        "after",
+        Name,
+        Some("none"),
+        "the name of a barrier above: enforced once that has been reached. Without a deadline the state must be inside then",
+    ),
+    Row {
+        key: Key {
+            name: "end",
+            value: Number(S, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "after the first step, after `begin`: let go then; 0: never",
+        },
+        parameters: &[whole("time from the first step to be let go; 0: never", |b| b.end.as_mut())],
+    },
+    plain("until_arrival", Flag, Some("`false`"), "let go once it has been reached"),
+    Row {
+        key: Key {
+            name: "centre",
+            value: Pair(M, Range::FINITE),
+            default: Some(""),
+            meaning: "the centre, of a moving disc where it is at time 0; a point of the line of a half-plane",
+        },
+        parameters: &[
+            part("[1]", "x of a point of the line", |b| b.shape.line().map(|(centre, _)| &mut centre[0])),
+            part("[2]", "y of a point of the line", |b| b.shape.line().map(|(centre, _)| &mut centre[1])),
+            part("[1]", "centre along x, at time 0", |b| b.shape.centre().map(|c| &mut c[0])),
+            part("[2]", "centre along y, at time 0", |b| b.shape.centre().map(|c| &mut c[1])),
+        ],
+    },
+    plain(
+        "centre_input",
+        Flag,
+        Some("`false`"),
+        "centre and velocity are inputs of the FMU, such as another FMU's outputs, that start with the values here \
+         ([`escort.toml`](../examples/vehicles/escort.toml))",
+    ),
+    Row {
+        key: Key {
+            name: "velocity",
+            value: Pair(Is("m/s"), Range::FINITE),
+            default: Some("0"),
+            meaning: "the velocity of the centre",
+        },
+        parameters: &[
+            part("[1]", "velocity of the centre along x", |b| b.shape.point().map(|p| &mut p.velocity[0])),
+            part("[2]", "velocity of the centre along y", |b| b.shape.point().map(|p| &mut p.velocity[1])),
+        ],
+    },
+    Row {
+        key: Key {
+            name: "radius",
+            value: Number(M, Range::POSITIVE),
+            default: Some(""),
+            meaning: "the radius of the disc",
+        },
+        parameters: &[whole("radius of the disc", |b| b.shape.radius())],
+    },
+    Row {
+        key: Key {
+            name: "smoothing",
+            value: Number(M, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "rounding of the distance at the centre; 0: the radius",
+        },
+        parameters: &[whole("rounding of the distance at the centre; 0: the radius", |b| {
+            b.shape.smoothing()
+        })],
+    },
+    Row {
+        key: Key {
+            name: "half_axes",
+            value: Pair(M, Range::POSITIVE),
+            default: Some(""),
+            meaning: "the one at the angle, and the one across",
+        },
+        parameters: &[
+            part("[1]", "half axis at the angle", |b| b.shape.half_axes().map(|a| &mut a[0])),
+            part("[2]", "half axis across", |b| b.shape.half_axes().map(|a| &mut a[1])),
+        ],
+    },
+    Row {
+        key: Key {
+            name: "half_sides",
+            value: Pair(M, Range::POSITIVE),
+            default: Some(""),
+            meaning: "the one at the angle, and the one across",
+        },
+        parameters: &[
+            part("[1]", "half side at the angle", |b| b.shape.half_sides().map(|a| &mut a[0])),
+            part("[2]", "half side across", |b| b.shape.half_sides().map(|a| &mut a[1])),
+        ],
+    },
+    Row {
+        key: Key {
+            name: "angle",
+            value: Number(Is("rad"), Range::FINITE),
+            default: Some("0"),
+            meaning: "the angle from the x axis",
+        },
+        parameters: &[whole("from the x axis", |b| b.shape.angle())],
+    },
+    Row {
+        key: Key {
+            name: "normal",
+            value: Pair(Is("1"), Range::FINITE),
+            default: Some(""),
+            meaning: "a vector into the half-plane, of any length but 0",
+        },
+        parameters: &[
+            part("[1]", "x of a vector into the half-plane", |b| b.shape.line().map(|(_, n)| &mut n[0])),
+            part("[2]", "y of a vector into the half-plane", |b| b.shape.line().map(|(_, n)| &mut n[1])),
+        ],
+    },
+    plain("state", Name, Some(""), "the state that is bounded"),
+    Row {
+        key: Key {
+            name: "bound",
+            value: Number(OfH, Range::FINITE),
+            default: Some(""),
+            meaning: "the bound; of a `speed_limit` > 0",
+        },
+        parameters: &[
+            whole("the bound", |b| b.shape.bound()),
+            Part {
+                index: "",
+                range: Some(Range::POSITIVE),
+                description: "the bound",
+                access: |b| b.shape.speed(),
+            },
+        ],
+    },
+    plain("expression", Text, Some(""), "h, of states, parameters of the plant and the time `t`"),
+    plain("output", Name, Some("the barrier's name"), "its name in the plug-in"),
+    plain("unit", Text, Some("`1`; that of the plug-in"), "the unit of h, such as `m/s2`"),
+    plain(
+        "relative_degree",
+        Count(1, MAX_RELATIVE_DEGREE as u64),
+        Some(""),
+        "the order of the derivative of h that the inputs enter; nobody checks it",
+    ),
+];
+
+/// `[[barrier]]`.
+pub(in super::super) static SECTION: Section =
+    Section { name: "barrier", keys: || KEYS.iter().map(|row| &row.key).collect() };
+
+impl BarrierSection {
+    /// Its numbers that are parameters of the FMU: of barrier `index` of a filter for `plant`, of relative
+    /// degree `degree` where that is known.
+    pub(in super::super) fn parameters(
+        &self,
+        index: usize,
+        plant: &PlantSection,
+        degree: Option<usize>,
+    ) -> Vec<Parameter<FilterConfiguration>> {
+        let mut reached = self.clone();
+        let mut parameters = Vec::new();
+        for row in &KEYS {
+            let (Number(unit, range) | Pair(unit, range)) = row.key.value else { continue };
+            let unit = unit.of_barrier(&self.unit(plant), degree.unwrap_or_default());
+            for part in row.parameters.iter().filter(|part| (part.access)(&mut reached).is_some()) {
+                // Files count barriers from 0, as the error messages of serde do; FMI counts the components
+                // of a vector from 1.
+                let name = format!("{}{}", row.key.name, part.index);
+                let names = (format!("{}.{name}", self.name), format!("barrier[{index}].{name}"));
+                let range = part.range.unwrap_or(range);
+                parameters.push(Parameter::new(
+                    names,
+                    unit.clone(),
+                    range,
+                    part.description,
+                    move |c: &mut FilterConfiguration| c.barrier.get_mut(index).and_then(part.access),
+                ));
+            }
+        }
+        parameters
+    }
+}

@@ -1,0 +1,228 @@
+//! `[[barrier]]`: a safe set, the deadline for reaching it if it has one, and when that is in force.
+//!
+//! A file has every key of every shape ([`raw`]). What is read from it has one [`Shape`] with the numbers of that
+//! shape. The table in [`keys`] says what the keys mean and which of them are parameters of the FMU.
+
+mod keys;
+mod raw;
+mod reader;
+mod shape;
+
+pub use shape::{Point, SHAPES, Shape, ShapeRow};
+
+pub(super) use keys::SECTION;
+pub(super) use raw::RawBarrier;
+
+use punctual_core::convergence::operator::Operator;
+use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
+use serde::{Deserialize, Serialize};
+
+use super::names::check_identifier;
+use super::{BarrierInput, ConfigurationError, PlantSection, external};
+
+/// Default margin as a part of the radius, or of the smaller half axis or side.
+const MARGIN_OF_SIZE: f64 = 0.01;
+
+/// How the deadline is met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MethodName {
+    /// [`Method::ReferenceProfile`].
+    #[default]
+    ReferenceProfile,
+    /// [`Method::RepeatedRoot`], the paper's.
+    RepeatedRoot,
+}
+
+/// The profile that `reference_profile` follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProfileName {
+    /// [`ProfileKind::Hermite`].
+    #[default]
+    Hermite,
+    /// [`ProfileKind::LowPeak`]: of least peak.
+    LowPeak,
+}
+
+/// What is done where the bounds certainly do not allow the deadline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InfeasibleName {
+    /// [`Infeasible::Report`].
+    #[default]
+    Report,
+    /// [`Infeasible::Soonest`].
+    Soonest,
+}
+
+/// A number of which 0 means that the filter chooses, or does without: a parameter of an FMU cannot be left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Automatic(pub f64);
+
+impl Automatic {
+    /// The number, unless it is 0.
+    pub fn given(self) -> Option<f64> {
+        given(self.0)
+    }
+}
+
+/// A number that a file leaves out or sets to 0.
+fn given(value: f64) -> Option<f64> {
+    (value != 0.0).then_some(value)
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// `[[barrier]]`: a safe set, to be reached by a deadline, or to be kept. docs/configuration.md has units, ranges
+/// and defaults.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BarrierSection {
+    /// Its name, a C identifier, unique; prefix of its variables.
+    pub name: String,
+    /// The set.
+    #[serde(flatten)]
+    pub shape: Shape,
+    /// Deadline T in s after the first step, > 0; none for a set that is only to be kept from a start inside it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deadline: Option<f64>,
+    /// How it is met.
+    pub method: MethodName,
+    /// The profile of `reference_profile`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub profile: ProfileName,
+    /// What is done where the bounds certainly do not allow the deadline.
+    #[serde(skip_serializing_if = "is_default")]
+    pub when_infeasible: InfeasibleName,
+    /// Rate a of the profile method in 1/s, ≥ 0; without it 20 / deadline, without a deadline what the bounds can
+    /// brake; at most 0.5 / step.
+    pub rate: Automatic,
+    /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`; else empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rates: Vec<f64>,
+    /// Rate of the stay constraint in 1/s, ≥ 0; without it `rate`, and the default of that where there are `rates`.
+    pub stay_rate: Automatic,
+    /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added.
+    pub margin: f64,
+    /// Time in s to be inside again after leaving, ≥ 0; without it leaving is reported only.
+    pub recovery: Automatic,
+    /// A bound on what the model does not know of h⁽ⁿ⁾ (a disturbance), in the unit of h per sⁿ, ≥ 0: the promise
+    /// holds for all within it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<f64>,
+    /// Where not all barriers can be met: those of smaller numbers go first, of equal ones the one above. Without
+    /// it 0 for one whose set the start is in, 1 for the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<u32>,
+    /// Makes it soft: it yields where it would cost more than this ‖u − u_ref‖, in units of u, > 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub penalty: Option<f64>,
+    /// Time in s after the first step from which it is enforced, ≥ 0, < deadline if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub begin: Option<f64>,
+    /// The barrier, above in the file, whose arrival it waits for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after: Option<String>,
+    /// Time in s after the first step at which it is let go, > begin; 0: never.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<f64>,
+    /// Whether it is let go when it has been reached.
+    #[serde(skip_serializing_if = "is_default")]
+    pub until_arrival: bool,
+}
+
+impl BarrierSection {
+    /// What `raw` says, a barrier of a filter for `plant`; `path` names it in errors.
+    pub(super) fn parse(
+        raw: RawBarrier,
+        path: &str,
+        plant: &PlantSection,
+    ) -> Result<Self, ConfigurationError> {
+        check_identifier(&format!("{path}.name"), &raw.name)?;
+        let shape = Shape::parse(&raw, path, plant)?;
+        // A size out of range is refused by its own name.
+        let margin = MARGIN_OF_SIZE * shape.size().unwrap_or(0.0).max(0.0);
+        Ok(Self {
+            name: raw.name,
+            shape,
+            deadline: raw.deadline,
+            method: raw.method,
+            profile: raw.profile,
+            when_infeasible: raw.when_infeasible,
+            rate: Automatic(raw.rate),
+            rates: raw.rates,
+            stay_rate: Automatic(raw.stay_rate),
+            margin: raw.margin.unwrap_or(margin),
+            recovery: Automatic(raw.recovery),
+            disturbance: given(raw.disturbance),
+            priority: raw.priority,
+            penalty: given(raw.penalty),
+            begin: given(raw.begin),
+            after: raw.after,
+            end: given(raw.end),
+            until_arrival: raw.until_arrival,
+        })
+    }
+
+    /// The unit of h.
+    pub fn unit(&self, plant: &PlantSection) -> String {
+        self.shape.unit(plant)
+    }
+
+    /// The settings of its promise.
+    ///
+    /// # Errors
+    ///
+    /// Rates out of range.
+    pub fn settings(&self) -> Result<BarrierSettings, punctual_core::Error> {
+        let rates = match &self.rates[..] {
+            [] => None,
+            rates => Some(Operator::new(rates)?),
+        };
+        Ok(BarrierSettings {
+            deadline: self.deadline,
+            method: match self.method {
+                MethodName::ReferenceProfile => Method::ReferenceProfile,
+                MethodName::RepeatedRoot => Method::RepeatedRoot,
+            },
+            profile: match self.profile {
+                ProfileName::Hermite => ProfileKind::Hermite,
+                ProfileName::LowPeak => ProfileKind::LowPeak,
+            },
+            infeasible: match self.when_infeasible {
+                InfeasibleName::Report => Infeasible::Report,
+                InfeasibleName::Soonest => Infeasible::Soonest,
+            },
+            rate: self.rate.given(),
+            rates,
+            stay_rate: self.stay_rate.given(),
+            margin: self.margin,
+            recovery: self.recovery.given(),
+            disturbance: self.disturbance.unwrap_or(0.0),
+        })
+    }
+
+    /// Its variables that are inputs: the point that it follows, or the derivatives that it is given.
+    pub fn inputs(&self, plant: &PlantSection) -> Vec<BarrierInput> {
+        if let Shape::External { unit, relative_degree } = &self.shape {
+            return external::inputs(&self.name, unit, *relative_degree, plant);
+        }
+        let Some(point) = self.shape.followed() else { return Vec::new() };
+        [
+            ("centre[1]", "m", point.centre[0], "where the centre is, along x"),
+            ("centre[2]", "m", point.centre[1], "where the centre is, along y"),
+            ("velocity[1]", "m/s", point.velocity[0], "velocity of the centre along x"),
+            ("velocity[2]", "m/s", point.velocity[1], "velocity of the centre along y"),
+        ]
+        .map(|(field, unit, start, description)| BarrierInput {
+            name: format!("{}.{field}", self.name),
+            unit: unit.to_owned(),
+            start,
+            description: description.to_owned(),
+        })
+        .into()
+    }
+}

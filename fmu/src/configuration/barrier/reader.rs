@@ -1,0 +1,163 @@
+//! From the keys of a `[[barrier]]` to its shape: which shape it is, and what its keys say.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, EnumAccess, VariantAccess, Visitor};
+
+use super::super::{ConfigurationError, PlantSection, check_unit};
+use super::Automatic;
+use super::raw::RawBarrier;
+use super::shape::{NAMES, Point, SHAPES, Shape, ShapeRow};
+
+/// A shape by its name.
+#[derive(Clone, Copy)]
+pub(super) struct Kind(&'static ShapeRow);
+
+impl<'de> Deserialize<'de> for Kind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Word;
+        impl<'de> Visitor<'de> for Word {
+            type Value = Kind;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("enum ShapeName")
+            }
+            fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<Kind, A::Error> {
+                let (name, nothing) = data.variant::<String>()?;
+                let row = SHAPES.iter().find(|row| row.name == name);
+                nothing.unit_variant()?;
+                row.map(Kind).ok_or_else(|| serde::de::Error::unknown_variant(&name, &NAMES))
+            }
+        }
+        deserializer.deserialize_enum("ShapeName", &NAMES, Word)
+    }
+}
+
+/// A `[[barrier]]` of which the shape is read.
+pub(super) struct Reader<'a> {
+    pub(super) raw: &'a RawBarrier,
+    row: &'static ShapeRow,
+    /// Names the barrier in errors.
+    pub(super) path: &'a str,
+    plant: &'a PlantSection,
+}
+
+impl Reader<'_> {
+    fn refuse<T>(&self, key: &str, message: impl Into<String>) -> Result<T, ConfigurationError> {
+        Err(ConfigurationError::new(format!("{}.{key}", self.path), message))
+    }
+
+    fn missing<T>(&self, key: &str) -> Result<T, ConfigurationError> {
+        self.refuse(key, format!("missing, {} needs it", self.row.name))
+    }
+
+    pub(super) fn need<T>(&self, key: &str, value: Option<T>) -> Result<T, ConfigurationError> {
+        value.map_or_else(|| self.missing(key), Ok)
+    }
+
+    /// Refuses keys of other shapes, and what is missing.
+    fn check_keys(&self) -> Result<(), ConfigurationError> {
+        for (key, given) in self.raw.of_shape() {
+            let (required, optional) = (self.row.required.contains(&key), self.row.optional.contains(&key));
+            if given && !required && !optional {
+                return self.refuse(key, format!("{} has none", self.row.name));
+            }
+            if !given && required {
+                return self.missing(key);
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a shape that the plant has no states or no positions for.
+    fn check_plant(&self) -> Result<(), ConfigurationError> {
+        let (shape, plant) = (self.row.name, self.plant);
+        let own = ["expression", "external", "plugin"].contains(&shape);
+        let message = if plant.is_external() && shape != "external" {
+            format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"")
+        } else if plant.plugin.is_some() && !["plugin", "external"].contains(&shape) {
+            format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")")
+        } else if plant.plugin.is_none() && shape == "plugin" {
+            format!("is {shape:?}, but the plant is none")
+        } else if plant.reference().is_none() && !own {
+            format!("is {shape:?}, which is for the plants that have a name; give an `expression`")
+        } else {
+            return Ok(());
+        };
+        self.refuse("shape", message)
+    }
+
+    pub(super) fn centre(&self) -> Result<[f64; 2], ConfigurationError> {
+        self.need("centre", self.raw.centre)
+    }
+
+    pub(super) fn point(&self) -> Result<Point, ConfigurationError> {
+        let velocity = self.raw.velocity.unwrap_or_default();
+        Ok(Point { centre: self.centre()?, velocity, centre_input: self.raw.centre_input })
+    }
+
+    pub(super) fn smoothing(&self) -> Automatic {
+        Automatic(self.raw.smoothing.unwrap_or_default())
+    }
+
+    pub(super) fn angle(&self) -> f64 {
+        self.raw.angle.unwrap_or_default()
+    }
+
+    /// A state of the plant.
+    pub(super) fn state(&self) -> Result<String, ConfigurationError> {
+        let state = self.need("state", self.raw.state.clone())?;
+        let names: Vec<_> = self.plant.states().into_iter().map(|s| s.name).collect();
+        if names.contains(&state) {
+            return Ok(state);
+        }
+        self.refuse("state", format!("is {state:?}, must be one of {}", names.join(", ")))
+    }
+
+    /// The unit of h.
+    pub(super) fn unit(&self, default: &str) -> Result<String, ConfigurationError> {
+        let unit = self.raw.unit.as_deref().unwrap_or(default);
+        check_unit(&format!("{}.unit", self.path), unit)?;
+        Ok(unit.to_owned())
+    }
+
+    /// The name of a barrier of the plug-in, and its unit.
+    pub(super) fn output(&self) -> Result<(String, String), ConfigurationError> {
+        let output = self.raw.output.as_ref().unwrap_or(&self.raw.name);
+        let known = self.plant.plugin_barriers();
+        let Some(barrier) = known.iter().find(|b| b.name == *output) else {
+            let names: Vec<_> = known.iter().map(|b| b.name.as_str()).collect();
+            let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let message = "which is no barrier of the plug-in; its barriers are";
+            return self.refuse("output", format!("is {output:?}, {message} {names}"));
+        };
+        match &self.raw.unit {
+            Some(unit) if *unit != barrier.unit => {
+                self.refuse("unit", format!("is {unit:?}, but the plug-in gives {:?}", barrier.unit))
+            }
+            _ => Ok((output.clone(), barrier.unit.clone())),
+        }
+    }
+}
+
+impl Shape {
+    /// The shape that `raw` says, of a barrier of `plant`; `path` names the barrier in errors.
+    pub(super) fn parse(
+        raw: &RawBarrier,
+        path: &str,
+        plant: &PlantSection,
+    ) -> Result<Self, ConfigurationError> {
+        let unstated = match raw.expression {
+            _ if plant.plugin.is_some() => "plugin",
+            _ if plant.is_external() => "external",
+            Some(_) => "expression",
+            None => "disc",
+        };
+        let by_name = |name: &str| SHAPES.iter().find(|row| row.name == name).unwrap_or(&SHAPES[0]);
+        let row = raw.shape.map_or_else(|| by_name(unstated), |kind| kind.0);
+        let reader = Reader { raw, row, path, plant };
+        reader.check_plant()?;
+        reader.check_keys()?;
+        (row.read)(&reader)
+    }
+}

@@ -1,0 +1,99 @@
+//! The keys that a file may have: name, kind of value, unit, range, default and meaning, a row each.
+//!
+//! The checks read their ranges here, the tables of docs/configuration.md and the schema for editors
+//! (docs/punctual.schema.json) are made of it, and `tests/tidy` compares it with what is read.
+
+use super::{Range, over_seconds};
+
+/// The unit of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// This one; `1` where it has none.
+    Is(&'static str),
+    /// That of the barrier's h.
+    OfH,
+    /// That of the derivative of h which the inputs enter.
+    OfHighestDerivative,
+    /// That of something else, in words.
+    Of(&'static str),
+}
+
+impl Unit {
+    /// Its name at a barrier with h in the unit `h` and of relative degree `degree`.
+    pub fn of_barrier(self, h: &str, degree: usize) -> String {
+        match self {
+            Self::Is(unit) | Self::Of(unit) => unit.to_owned(),
+            Self::OfH => h.to_owned(),
+            Self::OfHighestDerivative => over_seconds(h, degree),
+        }
+    }
+}
+
+/// What stands behind a key.
+#[derive(Clone, Copy, Debug)]
+pub enum Value {
+    /// A number.
+    Number(Unit, Range),
+    /// Two numbers, `[1.0, 2.0]`.
+    Pair(Unit, Range),
+    /// Numbers, as many as there are.
+    Numbers(Unit, Range),
+    /// Pairs of numbers, as many as there are.
+    Pairs(Unit, Range),
+    /// A table of numbers by name.
+    NumberByName(Unit, Range),
+    /// A table of pairs by name.
+    PairByName(Unit),
+    /// A whole number, from the first to the last.
+    Count(u64, u64),
+    /// `true` or `false`.
+    Flag,
+    /// Any text.
+    Text,
+    /// A C identifier.
+    Name,
+    /// One of these texts.
+    Word(&'static [&'static str]),
+    /// A table of texts by name.
+    TextByName,
+    /// A text, or a table of texts by name.
+    TextOrByName,
+    /// A table.
+    Table(&'static Section),
+    /// A list of tables.
+    Tables(&'static Section),
+}
+
+/// A key of a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// The key.
+    pub name: &'static str,
+    /// What stands behind it.
+    pub value: Value,
+    /// What holds without it, in words; empty where that depends on other keys. `None`: it must be given.
+    pub default: Option<&'static str>,
+    /// Meaning, in Markdown of docs/configuration.md.
+    pub meaning: &'static str,
+}
+
+impl Key {
+    /// A key in one line.
+    pub(super) const fn new(
+        name: &'static str,
+        value: Value,
+        default: Option<&'static str>,
+        meaning: &'static str,
+    ) -> Self {
+        Self { name, value, default, meaning }
+    }
+}
+
+/// A table of a file.
+#[derive(Debug)]
+pub struct Section {
+    /// Its name in docs/configuration.md and in the schema.
+    pub name: &'static str,
+    /// Its keys, in the order of the documentation.
+    pub keys: fn() -> Vec<&'static Key>,
+}

@@ -1,0 +1,59 @@
+//! Names that a configuration gives: what they are made of, and which are taken.
+
+use punctual_models::is_identifier;
+
+use super::ConfigurationError;
+
+/// Longest name that can stand in variable names and file names.
+const LONGEST: usize = 64;
+
+/// Refuses a name that is no C identifier of at most 64 characters, by the path of its field.
+pub(super) fn check_identifier(field: &str, name: &str) -> Result<(), ConfigurationError> {
+    if is_identifier(name) && name.len() <= LONGEST {
+        return Ok(());
+    }
+    let message =
+        format!("is {name:?}, must be letters, digits and underscores, not starting with a digit (1 to 64)");
+    Err(ConfigurationError::new(field, message))
+}
+
+/// Who must leave a name to the FMU's own variables.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Named {
+    /// A barrier, the first part of the names of its variables.
+    Barrier,
+    /// A parameter of a model.
+    Parameter,
+}
+
+/// Names, and first parts of names, of the FMU's own variables.
+const RESERVED: [(&str, &[Named]); 13] = {
+    const BOTH: &[Named] = &[Named::Barrier, Named::Parameter];
+    [
+        ("x", BOTH),
+        ("u", BOTH),
+        ("u_ref", BOTH),
+        ("u_min", BOTH),
+        ("u_max", BOTH),
+        ("status", BOTH),
+        ("rearm", BOTH),
+        ("integrator", BOTH),
+        ("measurement_error", BOTH),
+        // Models with parameters of their own have no other lengths.
+        ("l_r", &[Named::Barrier]),
+        ("l_f", &[Named::Barrier]),
+        // A plant has no barriers.
+        ("x0", &[Named::Parameter]),
+        ("inner_step", &[Named::Parameter]),
+    ]
+};
+
+/// Whether the FMU has a variable for which `who` cannot be called `name`.
+pub(super) fn is_reserved(name: &str, who: Named) -> bool {
+    RESERVED.iter().any(|(reserved, whose)| *reserved == name && whose.contains(&who))
+}
+
+/// The refusal of a name that something else has, by the path of its field.
+pub(super) fn taken(field: impl Into<String>, name: &str) -> ConfigurationError {
+    ConfigurationError::new(field, format!("is {name:?}, which is already the name of something else"))
+}

@@ -1,0 +1,384 @@
+//! A model description from its XML, whatever is wrong with it.
+//!
+//! Nothing is refused here. What is missing, or no value of its type, is absent or at its default in the
+//! model, and noted, so that no rule takes it for what the file says. Elements and attributes that the
+//! model has no field for are passed over: a check against the schema is another's.
+
+use crate::rules::{Check, Place, UnknownList, Unread, Violation};
+use crate::xsd::{boolean, double, int, unsigned, words};
+use crate::{
+    BaseUnit, Causality, CoSimulation, DefaultExperiment, DisplayUnit, EnumerationItem, Initial, Integer,
+    LogCategory, ModelDescription, ModelStructure, NamingConvention, Plain, Real, ScalarType, SimpleType,
+    Unit, Unknown, Variability, Variable, VariableKind,
+};
+use roxmltree::{Document, Node};
+use std::collections::HashMap;
+
+/// A model description with where its parts stand in the text.
+///
+/// The dependencies of variables stay `None`: they are in the structure.
+#[derive(Debug, Default)]
+pub struct Located {
+    /// What it says. Without a co-simulation interface that part is empty.
+    pub description: ModelDescription,
+    /// Its `ModelStructure`.
+    pub structure: ModelStructure,
+    /// How many co-simulation interfaces it has; the model's is the first.
+    pub interfaces: usize,
+    /// The start values of the variables as written.
+    pub starts: Vec<Option<String>>,
+    positions: HashMap<Place, usize>,
+    unread: Unread,
+}
+
+impl Located {
+    /// Reads a document.
+    pub fn read(document: &Document<'_>) -> Self {
+        let mut read = Self::default();
+        read.root(document.root_element());
+        read
+    }
+
+    /// Where a part begins, in bytes from the beginning of the text. Of what is not there: where the part
+    /// begins that should have it.
+    pub fn position(&self, place: Place) -> usize {
+        let outer = match place {
+            Place::Start(v) => Place::Variable(v),
+            _ => Place::Root,
+        };
+        [place, outer].iter().find_map(|place| self.positions.get(place)).copied().unwrap_or(0)
+    }
+
+    /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
+    pub fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
+        self.unread.contains(&(place, attribute))
+    }
+
+    /// The co-simulation interface, if there is one.
+    pub fn co_simulation(&self) -> Option<&CoSimulation> {
+        (self.interfaces > 0).then_some(&self.description.co_simulation)
+    }
+
+    /// The name that the libraries have, if one is given.
+    pub fn model_identifier(&self) -> Option<&str> {
+        let given = !self.is_unread(Place::Interface(0), "modelIdentifier");
+        given.then_some(&self.description.co_simulation.model_identifier)
+    }
+
+    /// Tells every rule of [`RULES`](crate::RULES) that is broken, in their order.
+    pub fn check(&self, report: &mut dyn FnMut(Violation)) {
+        let add = |place, message: &str| Violation {
+            rule: "interface.co-simulation",
+            place,
+            message: message.to_owned(),
+        };
+        if self.interfaces == 0 {
+            let message = "there is no CoSimulation element; this program looks at co-simulation only";
+            report(add(Place::Root, message));
+        }
+        for i in 1..self.interfaces {
+            report(add(Place::Interface(i), "CoSimulation is there again; must be there once"));
+        }
+        let mut check = Check { description: &self.description, unread: &self.unread, report };
+        check.description();
+        check.structure(&self.structure);
+    }
+
+    fn root(&mut self, root: Node<'_, '_>) {
+        self.positions.insert(Place::Root, root.range().start);
+        let mut at = At { read: self, place: Place::Root, node: Some(root) };
+        let description = ModelDescription {
+            model_name: at.text("modelName"),
+            guid: at.required("guid", |text| Some(text.to_owned())),
+            description: at.text("description"),
+            author: at.text("author"),
+            version: at.text("version"),
+            copyright: at.text("copyright"),
+            license: at.text("license"),
+            generation_tool: at.text("generationTool"),
+            generation_date_and_time: at.optional("generationDateAndTime"),
+            variable_naming_convention: at
+                .value("variableNamingConvention", NamingConvention::parse)
+                .unwrap_or_default(),
+            ..ModelDescription::default()
+        };
+        self.description = description;
+        let interfaces: Vec<_> = children(root, "CoSimulation").collect();
+        self.interfaces = interfaces.len();
+        if interfaces.is_empty() {
+            self.unread.insert((Place::Interface(0), "modelIdentifier"));
+        }
+        for (i, node) in interfaces.into_iter().enumerate() {
+            let place = Place::Interface(i);
+            let at = node.attribute_node("modelIdentifier").map_or(node.range().start, |a| a.range().start);
+            self.positions.insert(place, at);
+            if i == 0 {
+                self.description.co_simulation = self.interface(place, node);
+            }
+        }
+        self.description.units =
+            list(root, "UnitDefinitions", "Unit").enumerate().map(|(u, node)| self.unit(u, node)).collect();
+        self.description.types = list(root, "TypeDefinitions", "SimpleType")
+            .enumerate()
+            .map(|(t, node)| self.simple_type(t, node))
+            .collect();
+        self.description.log_categories = list(root, "LogCategories", "Category")
+            .map(|node| {
+                let text = |name| node.attribute(name).unwrap_or_default().to_owned();
+                LogCategory { name: text("name"), description: text("description") }
+            })
+            .collect();
+        if let Some(node) = children(root, "DefaultExperiment").next() {
+            let mut at = self.enter(Place::Experiment, node);
+            self.description.default_experiment = Some(DefaultExperiment {
+                start_time: at.value("startTime", double),
+                stop_time: at.value("stopTime", double),
+                tolerance: at.value("tolerance", double),
+                step_size: at.value("stepSize", double),
+            });
+        }
+        self.description.variables = list(root, "ModelVariables", "ScalarVariable")
+            .enumerate()
+            .map(|(v, node)| self.variable(v, node))
+            .collect();
+        let structure = children(root, "ModelStructure").next();
+        self.structure = ModelStructure {
+            outputs: self.unknowns(root, structure, UnknownList::Outputs),
+            derivatives: self.unknowns(root, structure, UnknownList::Derivatives),
+            initial_unknowns: self.unknowns(root, structure, UnknownList::InitialUnknowns),
+        };
+    }
+
+    /// The attributes of an element, which stands at a place.
+    fn enter<'r, 'n, 'i>(&'r mut self, place: Place, node: Node<'n, 'i>) -> At<'r, 'n, 'i> {
+        self.positions.insert(place, node.range().start);
+        At { read: self, place, node: Some(node) }
+    }
+
+    fn interface(&mut self, place: Place, node: Node<'_, '_>) -> CoSimulation {
+        let mut at = At { read: self, place, node: Some(node) };
+        let files = node.descendants().filter(|n| n.has_tag_name("File"));
+        CoSimulation {
+            model_identifier: at.required("modelIdentifier", |text| Some(text.to_owned())),
+            needs_execution_tool: at.flag("needsExecutionTool"),
+            can_handle_variable_step: at.flag("canHandleVariableCommunicationStepSize"),
+            can_interpolate_inputs: at.flag("canInterpolateInputs"),
+            max_output_derivative_order: at.value("maxOutputDerivativeOrder", unsigned).unwrap_or(0),
+            can_run_asynchronously: at.flag("canRunAsynchronuously"),
+            can_be_instantiated_only_once_per_process: at.flag("canBeInstantiatedOnlyOncePerProcess"),
+            can_not_use_memory_management_functions: at.flag("canNotUseMemoryManagementFunctions"),
+            can_get_and_set_state: at.flag("canGetAndSetFMUstate"),
+            can_serialize_state: at.flag("canSerializeFMUstate"),
+            provides_directional_derivative: at.flag("providesDirectionalDerivative"),
+            source_files: files.map(|n| n.attribute("name").unwrap_or_default().to_owned()).collect(),
+        }
+    }
+
+    fn unit(&mut self, u: usize, node: Node<'_, '_>) -> Unit {
+        let name = self.enter(Place::Unit(u), node).text("name");
+        let base = children(node, "BaseUnit").next().map(|base| {
+            let mut at = At { read: self, place: Place::Unit(u), node: Some(base) };
+            let mut exponent = |name| at.value(name, int).unwrap_or(0);
+            let [kg, m, s, a, k, mol, cd, rad] =
+                ["kg", "m", "s", "A", "K", "mol", "cd", "rad"].map(&mut exponent);
+            let factor = at.value("factor", double).unwrap_or(1.0);
+            BaseUnit {
+                kg,
+                m,
+                s,
+                a,
+                k,
+                mol,
+                cd,
+                rad,
+                factor,
+                offset: at.value("offset", double).unwrap_or(0.0),
+            }
+        });
+        // One without a name can be nobody's.
+        let named = children(node, "DisplayUnit").filter(|n| n.has_attribute("name"));
+        let display = named.enumerate().map(|(d, node)| {
+            let mut at = self.enter(Place::DisplayUnit(u, d), node);
+            DisplayUnit {
+                name: at.text("name"),
+                factor: at.value("factor", double).unwrap_or(1.0),
+                offset: at.value("offset", double).unwrap_or(0.0),
+            }
+        });
+        Unit { name, base, display_units: display.collect() }
+    }
+
+    fn simple_type(&mut self, t: usize, node: Node<'_, '_>) -> SimpleType {
+        let place = Place::Type(t);
+        let at = self.enter(place, node);
+        let (name, description) = (at.text("name"), at.text("description"));
+        let (kind, of) = self.kind(place, node);
+        if of.is_none() {
+            self.unread.insert((place, "type"));
+        }
+        // One without a value stands for nothing.
+        let valued = of.into_iter().flat_map(|of| children(of, "Item"));
+        let valued = valued.filter_map(|n| Some((n, n.attribute("value").and_then(int)?)));
+        let items = valued.enumerate().map(|(i, (node, value))| {
+            let at = self.enter(Place::Item(t, i), node);
+            EnumerationItem { name: at.text("name"), value, description: at.text("description") }
+        });
+        let items = items.collect();
+        SimpleType { name, description, kind, items }
+    }
+
+    /// The element with the type of a variable or declared type; without one it counts as Real.
+    fn kind<'n, 'i>(&mut self, place: Place, node: Node<'n, 'i>) -> (VariableKind, Option<Node<'n, 'i>>) {
+        let found = node.children().find_map(|n| {
+            let of = ScalarType::ALL.iter().find(|of| n.has_tag_name(of.as_str()))?;
+            Some((*of, n))
+        });
+        let (of, node) = found.map_or((ScalarType::Real, None), |(of, n)| (of, Some(n)));
+        if let (Place::Variable(v), Some(attribute)) = (place, node.and_then(|n| n.attribute_node("start"))) {
+            self.positions.insert(Place::Start(v), attribute.range().start);
+        }
+        let mut at = At { read: self, place, node };
+        let kind = match of {
+            ScalarType::Real => VariableKind::Real(Real {
+                declared_type: at.optional("declaredType"),
+                quantity: at.optional("quantity"),
+                unit: at.optional("unit"),
+                display_unit: at.optional("displayUnit"),
+                min: at.value("min", double),
+                max: at.value("max", double),
+                nominal: at.value("nominal", double),
+                start: at.start(double),
+                derivative: at.value("derivative", unsigned),
+            }),
+            ScalarType::Integer => VariableKind::Integer(at.integer()),
+            ScalarType::Enumeration => VariableKind::Enumeration(at.integer()),
+            ScalarType::Boolean => VariableKind::Boolean(at.plain(boolean)),
+            ScalarType::String => VariableKind::String(at.plain(|text| Some(text.to_owned()))),
+        };
+        (kind, node)
+    }
+
+    fn variable(&mut self, v: usize, node: Node<'_, '_>) -> Variable {
+        let place = Place::Variable(v);
+        let (kind, of) = self.kind(place, node);
+        self.starts.push(of.and_then(|n| n.attribute("start")).map(str::to_owned));
+        let mut at = self.enter(place, node);
+        Variable {
+            name: at.required("name", |text| Some(text.to_owned())),
+            value_reference: at.required("valueReference", unsigned),
+            description: at.text("description"),
+            causality: at.value("causality", Causality::parse).unwrap_or(Causality::Local),
+            variability: at.value("variability", Variability::parse).unwrap_or(Variability::Continuous),
+            initial: at.value("initial", Initial::parse),
+            kind,
+            dependencies: None,
+            initial_dependencies: None,
+        }
+    }
+
+    fn unknowns(
+        &mut self,
+        root: Node<'_, '_>,
+        structure: Option<Node<'_, '_>>,
+        list: UnknownList,
+    ) -> Vec<Unknown> {
+        let found = structure.and_then(|n| children(n, list.as_str()).next());
+        self.positions.insert(Place::Unknowns(list), found.or(structure).unwrap_or(root).range().start);
+        // One without an index stands for nothing.
+        let indexed = found.into_iter().flat_map(|n| children(n, "Unknown"));
+        let indexed = indexed.filter_map(|n| Some((n, n.attribute("index").and_then(unsigned)?)));
+        let unknown = |(u, (node, index)): (usize, (Node<'_, '_>, u32))| {
+            let place = Place::Unknown(list, u);
+            self.positions.insert(place, node.range().start);
+            // Each word counts, also one that is no index.
+            let dependencies = node.attribute("dependencies").map(|text| {
+                let index = |word| {
+                    unsigned(word).unwrap_or_else(|| {
+                        self.unread.insert((place, "dependencies"));
+                        0
+                    })
+                };
+                words(text).map(index).collect()
+            });
+            let kinds = node.attribute("dependenciesKind");
+            let dependency_kinds = kinds.map(|text| words(text).map(str::to_owned).collect());
+            Unknown { index, dependencies, dependency_kinds }
+        };
+        indexed.enumerate().map(unknown).collect()
+    }
+}
+
+fn children<'n, 'i>(node: Node<'n, 'i>, name: &'static str) -> impl Iterator<Item = Node<'n, 'i>> {
+    node.children().filter(move |n| n.has_tag_name(name))
+}
+
+fn list<'n, 'i>(
+    root: Node<'n, 'i>,
+    outer: &'static str,
+    inner: &'static str,
+) -> impl Iterator<Item = Node<'n, 'i>> {
+    children(root, outer).flat_map(move |n| children(n, inner))
+}
+
+/// The attributes of an element, if it is there.
+struct At<'r, 'n, 'i> {
+    read: &'r mut Located,
+    place: Place,
+    node: Option<Node<'n, 'i>>,
+}
+
+impl<'n> At<'_, 'n, '_> {
+    fn attribute(&self, name: &str) -> Option<&'n str> {
+        self.node?.attribute(name)
+    }
+
+    /// A value; one that cannot be read is noted.
+    fn value<T>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
+        let text = self.attribute(name)?;
+        let value = parse(text);
+        if value.is_none() {
+            self.read.unread.insert((self.place, name));
+        }
+        value
+    }
+
+    /// A value that must be there; one that is missing is noted too.
+    fn required<T: Default>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> T {
+        if self.attribute(name).is_none() {
+            self.read.unread.insert((self.place, name));
+        }
+        self.value(name, parse).unwrap_or_default()
+    }
+
+    fn flag(&mut self, name: &'static str) -> bool {
+        self.value(name, boolean).unwrap_or(false)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.optional(name).unwrap_or_default()
+    }
+
+    fn optional(&self, name: &str) -> Option<String> {
+        self.attribute(name).map(str::to_owned)
+    }
+
+    /// The start value of a variable; one that cannot be read is noted as the variable's.
+    fn start<T>(&mut self, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
+        let Place::Variable(v) = self.place else { return None };
+        At { read: &mut *self.read, place: Place::Start(v), node: self.node }.value("start", parse)
+    }
+
+    fn integer(&mut self) -> Integer {
+        Integer {
+            declared_type: self.optional("declaredType"),
+            quantity: self.optional("quantity"),
+            min: self.value("min", int),
+            max: self.value("max", int),
+            start: self.start(int),
+        }
+    }
+
+    fn plain<T>(&mut self, parse: impl FnOnce(&str) -> Option<T>) -> Plain<T> {
+        Plain { declared_type: self.optional("declaredType"), start: self.start(parse) }
+    }
+}

@@ -1,0 +1,268 @@
+//! What the standard says of a description beyond the schema (FMI 2.0.4, sections 2.2 and 4.3): one list
+//! for descriptions that are about to be written and for those that were read.
+//!
+//! A description that is written must keep all rules on the description; its structure follows from its
+//! variables. One that was read ([`Located`](crate::Located)) may break any rule, and some of its attributes may
+//! not be values of their type at all: the model has nothing there, and rules that would need it are silent.
+
+// The structure of a description that is written follows from its variables.
+#[cfg(feature = "read")]
+mod structure;
+mod variables;
+
+use crate::{ModelDescription, NamingConvention, ScalarType, is_c_identifier};
+use serde::{Deserialize, Serialize};
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+
+/// How bad it is to break a rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The standard is broken, or the FMU does not work.
+    Error,
+    /// Allowed, but some importers will stumble over it.
+    Warning,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        })
+    }
+}
+
+use Severity::{Error, Warning};
+
+/// Every rule on descriptions: its name, how bad it is to break it, and what it asks. A rule's name never
+/// changes its meaning.
+pub const RULES: &[(&str, Severity, &str)] = &[
+    ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
+    ("interface.identifier", Error, "modelIdentifier is a C identifier"),
+    ("interface.guid", Error, "guid is not empty"),
+    ("interface.flags", Warning, "the capability flags do not contradict each other"),
+    ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
+    ("unit.unique", Error, "no unit or display unit is defined twice"),
+    ("unit.defined", Error, "units and display units used are defined"),
+    ("type.unique", Error, "no type is defined twice or named like a variable"),
+    ("type.defined", Error, "declaredType names a type of the same kind"),
+    ("type.items", Error, "the items of an enumeration have different names and values"),
+    ("variable.unique", Error, "variable names are unique"),
+    ("variable.name", Error, "variable names follow the naming convention"),
+    ("variable.alias", Warning, "variables with the same value reference agree in start value and unit"),
+    ("variable.alias-set", Error, "at most one variable of an alias set can be set from outside"),
+    ("variable.combination", Error, "causality, variability and initial go together"),
+    ("variable.continuous", Error, "only Real variables are continuous"),
+    ("variable.start", Error, "start values are there where they must be, and only there"),
+    ("variable.range", Error, "min <= start <= max"),
+    ("variable.enumeration", Error, "start values of enumerations are values of their items"),
+    ("variable.independent", Error, "there is at most one independent variable, and it is Real"),
+    ("variable.derivative", Error, "derivative is the index of a Real variable"),
+    ("structure.outputs", Error, "ModelStructure/Outputs lists every output exactly once"),
+    ("structure.derivatives", Error, "ModelStructure/Derivatives lists derivatives"),
+    ("structure.initial-unknowns", Error, "ModelStructure/InitialUnknowns is complete, without others"),
+    ("structure.order", Error, "ModelStructure/InitialUnknowns is sorted by index"),
+    ("structure.index", Error, "indices are those of variables, from 1"),
+    ("structure.dependencies", Error, "dependencies name variables; dependenciesKind has as many words"),
+    ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
+];
+
+/// A list of [`ModelStructure`](crate::ModelStructure).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum UnknownList {
+    /// `Outputs`.
+    Outputs,
+    /// `Derivatives`.
+    Derivatives,
+    /// `InitialUnknowns`.
+    InitialUnknowns,
+}
+
+crate::words::words!(UnknownList: Outputs "Outputs", Derivatives "Derivatives", InitialUnknowns "InitialUnknowns");
+
+/// A place in a description; numbers are positions in its lists, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// The whole.
+    Root,
+    /// A co-simulation interface: the model's is the first.
+    Interface(usize),
+    /// The default experiment.
+    Experiment,
+    /// A unit.
+    Unit(usize),
+    /// A unit, and one of its display units.
+    DisplayUnit(usize, usize),
+    /// A declared type.
+    Type(usize),
+    /// A declared type, and one of its items.
+    Item(usize, usize),
+    /// A variable.
+    Variable(usize),
+    /// The start value of a variable.
+    Start(usize),
+    /// A list of the structure.
+    Unknowns(UnknownList),
+    /// One of a list of the structure.
+    Unknown(UnknownList, usize),
+}
+
+/// A rule that is broken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Violation {
+    /// The name of one of [`RULES`].
+    pub rule: &'static str,
+    /// Where.
+    pub place: Place,
+    /// What is wrong, with the values and those allowed.
+    pub message: String,
+}
+
+/// Attributes that are missing though they must be there, or are no value of their type.
+pub(crate) type Unread = HashSet<(Place, &'static str)>;
+
+/// What rules look at, and whom they tell.
+pub(crate) struct Check<'a> {
+    pub(crate) description: &'a ModelDescription,
+    pub(crate) unread: &'a Unread,
+    pub(crate) report: &'a mut dyn FnMut(Violation),
+}
+
+impl Check<'_> {
+    /// Checks every rule on the description.
+    pub(crate) fn description(&mut self) {
+        self.interface();
+        self.experiment();
+        self.units();
+        self.types();
+        self.variables();
+    }
+
+    /// Checks every rule on the structure.
+    #[cfg(feature = "read")]
+    pub(crate) fn structure(&mut self, structure: &crate::ModelStructure) {
+        structure::check(self, structure);
+    }
+
+    fn add(&mut self, rule: &'static str, place: Place, message: impl Into<String>) {
+        (self.report)(Violation { rule, place, message: message.into() });
+    }
+
+    fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
+        self.unread.contains(&(place, attribute))
+    }
+
+    fn interface(&mut self) {
+        let description = self.description;
+        if description.guid.trim().is_empty() && !self.is_unread(Place::Root, "guid") {
+            self.add("interface.guid", Place::Root, "guid is empty; must be a text that no other FMU has");
+        }
+        let (interface, place) = (&description.co_simulation, Place::Interface(0));
+        let name = &interface.model_identifier;
+        if !is_c_identifier(name) && !self.is_unread(place, "modelIdentifier") {
+            let message = format!(
+                "modelIdentifier is {name:?}; must be a C identifier (letters, digits, underscores, no digit first), \
+                 since it names the library"
+            );
+            self.add("interface.identifier", place, message);
+        }
+        if interface.can_serialize_state && !interface.can_get_and_set_state {
+            let message = "canSerializeFMUstate is true, so canGetAndSetFMUstate must be true; it is false";
+            self.add("interface.flags", place, message);
+        }
+    }
+
+    fn experiment(&mut self) {
+        let Some(experiment) = self.description.default_experiment else { return };
+        let mut complain = |message: String| self.add("experiment.times", Place::Experiment, message);
+        let named = [("startTime", experiment.start_time), ("stopTime", experiment.stop_time)];
+        for (name, value) in named {
+            if let Some(value) = value.filter(|value| !value.is_finite()) {
+                complain(format!("{name} is {value}; must be finite"));
+            }
+        }
+        let start = experiment.start_time.unwrap_or(0.0);
+        if let Some(stop) = experiment.stop_time.filter(|stop| *stop <= start) {
+            complain(format!("stopTime is {stop}; must be greater than startTime = {start}"));
+        }
+        for (name, value) in [("stepSize", experiment.step_size), ("tolerance", experiment.tolerance)] {
+            if let Some(value) = value.filter(|value| !value.is_finite() || *value <= 0.0) {
+                complain(format!("{name} is {value}; must be finite and > 0"));
+            }
+        }
+    }
+
+    fn units(&mut self) {
+        let mut seen = HashSet::new();
+        for (u, unit) in self.description.units.iter().enumerate() {
+            if !seen.insert(unit.name.as_str()) {
+                let message = format!("the unit {:?} is defined twice", unit.name);
+                self.add("unit.unique", Place::Unit(u), message);
+            }
+            let mut displayed = HashSet::new();
+            for (d, display) in unit.display_units.iter().enumerate() {
+                if !displayed.insert(display.name.as_str()) {
+                    let message =
+                        format!("the unit {:?} has the display unit {:?} twice", unit.name, display.name);
+                    self.add("unit.unique", Place::DisplayUnit(u, d), message);
+                }
+            }
+        }
+    }
+
+    fn types(&mut self) {
+        let description = self.description;
+        let variables: HashSet<&str> = description.variables.iter().map(|v| v.name.as_str()).collect();
+        let units = variables::Units::new(description);
+        let mut seen = HashSet::new();
+        for (t, declared) in description.types.iter().enumerate() {
+            let (name, place) = (declared.name.as_str(), Place::Type(t));
+            if !seen.insert(name) {
+                self.add("type.unique", place, format!("the type {name:?} is defined twice"));
+            }
+            if variables.contains(name) {
+                let message = format!("the type {name:?} has the name of a variable; names must differ");
+                self.add("type.unique", place, message);
+            }
+            units.check(declared.kind.unit(), declared.kind.display_unit(), place, self);
+            if let (Some(min), Some(max)) = declared.kind.range()
+                && (min.is_nan() || max.is_nan() || min > max)
+            {
+                let message =
+                    format!("the type {name:?} has min = {min} and max = {max}; must be min <= max");
+                self.add("variable.range", place, message);
+            }
+            if declared.kind.scalar_type() == ScalarType::Enumeration {
+                let (mut names, mut values) = (HashSet::new(), HashMap::new());
+                for (i, item) in declared.items.iter().enumerate() {
+                    if !names.insert(item.name.as_str()) {
+                        let message = format!("the type {name:?} has the item {:?} twice", item.name);
+                        self.add("type.items", Place::Item(t, i), message);
+                    }
+                    if let Some(other) = values.insert(item.value, item.name.as_str()) {
+                        let message = format!(
+                            "the items {other:?} and {:?} of {name:?} have the same value {}",
+                            item.name, item.value
+                        );
+                        self.add("type.items", Place::Item(t, i), message);
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_structured(&self) -> bool {
+        self.description.variable_naming_convention == NamingConvention::Structured
+    }
+}
+
+/// The beginning of a long text, for messages.
+pub fn brief(text: &str) -> String {
+    const LENGTH: usize = 80;
+    if text.chars().count() <= LENGTH {
+        return text.to_owned();
+    }
+    text.chars().take(LENGTH).chain("...".chars()).collect()
+}

@@ -1,0 +1,36 @@
+//! Constraints of the literature, to compare with: each a [`Condition`] that
+//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) puts in the place of this project's methods.
+//!
+//! | condition | h⁽ⁿ⁾ ≥ φ such that | deadline | source |
+//! |---|---|---|---|
+//! | [`Exponential`] | Π (D + a_i) h ≥ 0 | none | Nguyen and Sreenath 2016 |
+//! | [`Chain`], linear | ψ_n ≥ 0, ψ_i = ψ̇_{i−1} + p_i ψ_{i−1} | none | Xiao and Belta 2019, 2022 |
+//! | [`Chain`], powers | ψ_n ≥ 0, ψ_i = ψ̇_{i−1} + p_i \|ψ_{i−1}\|^{q_i} sign ψ_{i−1} | a bound that depends on the start | Xiao, Belta and Cassandras 2021 |
+//! | [`FirstOrderFixedTime`] | ḣ + α \|h\|^p sign h ≥ 0 | T, for n = 1 | Bhat and Bernstein 2000; order n ours |
+//! | [`Tube`] | h + s(t) ≥ 0 kept, s shrinking to 0 | T | arXiv:2603.17003 for n = 1; order n ours |
+//!
+//! All but the tube are time-invariant. None says what a held input costs; the filter enforces them at the
+//! samples. With a margin μ in the settings all of them are conditions on h − μ.
+
+mod chain;
+mod exponential;
+mod first_order;
+mod tube;
+
+pub use chain::{Chain, ClassK};
+pub use exponential::Exponential;
+pub use first_order::FirstOrderFixedTime;
+pub use punctual_core::convergence::condition::{Bound, Condition, Sample};
+pub use tube::Tube;
+
+use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::error::{Error, ErrorKind};
+
+/// `n`, a possible number of links.
+fn checked_order(field: &str, n: usize) -> Result<usize, Error> {
+    if (1..=MAX_RELATIVE_DEGREE).contains(&n) {
+        return Ok(n);
+    }
+    let message = format!("has {n} components, must have 1 to {MAX_RELATIVE_DEGREE}");
+    Err(Error::new(ErrorKind::Dimension, field, message))
+}

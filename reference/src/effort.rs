@@ -1,0 +1,317 @@
+//! The cost of a filter: the smallest number with which a closed loop works, such as an input bound or a
+//! deadline, and profiles and rates compared by it.
+//!
+//! Both are found by running the closed loop, so they are facts about one start, one plant and one u_ref,
+//! and upper bounds: another filter may do with less.
+
+use crate::simulation::Schedule;
+use punctual_core::MAX_INPUTS;
+use punctual_core::dynamics::DynPlant;
+use punctual_core::error::{Error, non_negative, positive};
+use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
+use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+
+/// A closed loop to run.
+#[derive(Clone, Copy)]
+pub struct Loop<'a> {
+    /// The plant; its states are the first of the filter's.
+    pub plant: &'a dyn DynPlant,
+    /// Time in s and the filter's state; the part after the plant's states stays as it is.
+    pub start: (f64, &'a [f64]),
+    /// h is looked at after each of its substeps, and at the deadlines themselves.
+    pub schedule: Schedule,
+    /// Deadlines of the barriers, in s from the start; infinite where there is none.
+    pub deadlines: &'a [f64],
+    /// Time in s from a sample until its input acts, ≥ 0, at most a step; until the first does, 0 acts.
+    pub delay: f64,
+    /// Time in s after the start from which a run ends once a promise has been broken.
+    pub until: f64,
+}
+
+/// The result of a closed loop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Whether no promise was broken, and each barrier had one.
+    pub kept: bool,
+    /// Time in s from the start of the last first arrival; `None` where a barrier has not arrived.
+    pub arrival: Option<f64>,
+    /// Largest |u_i| of each input; zeros above the number of inputs.
+    pub peak: [f64; MAX_INPUTS],
+    /// Steps that did not satisfy every constraint.
+    pub unmet: usize,
+    /// The result for each barrier.
+    pub barriers: Vec<Seen>,
+    /// Smallest and largest value of each of the plant's states; not a number where one became so.
+    pub states: Vec<[f64; 2]>,
+    /// The last instant in s.
+    pub end: f64,
+}
+
+/// The result for one barrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Its promise, by h itself.
+    pub judgement: Judgement,
+    /// Steps that did not meet its constraint.
+    pub unmet: usize,
+    /// The first of them, in s.
+    pub first_unmet: Option<f64>,
+}
+
+/// A closed loop on its way.
+struct Running<'a> {
+    setting: &'a Loop<'a>,
+    judges: Vec<Judge>,
+    run: Run,
+    /// Scratch: h of each barrier.
+    h: Vec<f64>,
+}
+
+impl Running<'_> {
+    /// Takes a sample.
+    fn sample(&mut self, t: f64, x: &[f64], u: &[f64], report: &Report) {
+        let run = &mut self.run;
+        run.unmet += usize::from(!report.status.is_satisfied());
+        for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
+            judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
+            let enforced = standing(b.phase) == Standing::InForce;
+            if b.unmet_steps > 0 || enforced && report.status as u8 >= Status::InvalidInput as u8 {
+                seen.unmet += 1;
+                seen.first_unmet.get_or_insert(t);
+            }
+        }
+        for (peak, u) in run.peak.iter_mut().zip(u) {
+            *peak = peak.max(u.abs());
+        }
+        self.bound(x);
+        self.run.end = t;
+    }
+
+    /// Takes an instant between two samples.
+    fn instant(&mut self, filter: &mut SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
+        filter.barrier_values(t, x, &mut self.h)?;
+        let barriers = &filter.report().barriers;
+        for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
+            judge.see(t, *h, standing(b.phase), b.deadline_unreachable);
+        }
+        self.bound(x);
+        Ok(())
+    }
+
+    fn bound(&mut self, x: &[f64]) {
+        for (ends, x) in self.run.states.iter_mut().zip(x) {
+            // Not a number stays so.
+            if x.is_nan() || *x < ends[0] {
+                ends[0] = *x;
+            }
+            if x.is_nan() || *x > ends[1] {
+                ends[1] = *x;
+            }
+        }
+    }
+
+    fn is_broken(&self) -> bool {
+        let lost = |judge: &Judge| matches!(judge.judgement().verdict(), Verdict::Broken | Verdict::Nothing);
+        self.judges.iter().any(lost)
+    }
+
+    /// Moves the plant over the period that begins at `t`, `last` being the input of the one before.
+    fn advance(
+        &mut self,
+        filter: &mut SafetyFilter,
+        t: f64,
+        x: &mut [f64],
+        [last, u]: [&[f64]; 2],
+    ) -> Result<(), Error> {
+        let Loop { plant, schedule, deadlines, delay, start, .. } = *self.setting;
+        let (step, substeps) = (schedule.step, schedule.substeps.max(1));
+        let (same, mut at) = (1e-9 * step, 0.0);
+        for j in 1..=substeps {
+            let end = step * (j as f64 / substeps as f64);
+            while at < end {
+                let cuts = deadlines.iter().map(|deadline| start.0 + deadline - t).chain([delay]);
+                let to = cuts.filter(|cut| *cut > at + same && *cut < end - same).fold(end, f64::min);
+                let u = if to <= delay + same { last } else { u };
+                plant.rk4_step(&mut x[..plant.state_dim()], u, to - at)?;
+                at = to;
+                if at < step {
+                    self.instant(filter, t + at, x)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn standing(phase: Phase) -> Standing {
+    match phase {
+        Phase::Waiting => Standing::Waiting,
+        Phase::Released => Standing::Released,
+        _ => Standing::InForce,
+    }
+}
+
+/// Runs `filter` in the closed loop that `setting` describes. `nominal(x, u_ref)` writes u_ref.
+///
+/// # Errors
+///
+/// A step that is not finite or ≤ 0, and misuse of the filter.
+pub fn run(
+    filter: &mut SafetyFilter,
+    setting: &Loop<'_>,
+    mut nominal: impl FnMut(&[f64], &mut [f64]),
+) -> Result<Run, Error> {
+    let step = positive("step", setting.schedule.step)?;
+    non_negative("delay", setting.delay)?;
+    let (states, inputs) = (setting.plant.state_dim(), setting.plant.input_dim());
+    let (t0, x0) = setting.start;
+    let mut x = x0.to_vec();
+    let (mut u_ref, mut u, mut last) = (vec![0.0; inputs], vec![0.0; inputs], vec![0.0; inputs]);
+    let count = setting.deadlines.len();
+    let judge = |deadline: &f64| Judge::new(Some(*deadline), Course::Straight);
+    let run = Run {
+        kept: false,
+        arrival: None,
+        peak: [0.0; MAX_INPUTS],
+        unmet: 0,
+        barriers: vec![Seen::default(); count],
+        states: x0.iter().take(states).map(|x| [*x; 2]).collect(),
+        end: t0,
+    };
+    let judges = setting.deadlines.iter().map(judge).collect();
+    let mut running = Running { setting, judges, run, h: vec![0.0; count] };
+    for k in 0..=setting.schedule.steps {
+        let t = t0 + k as f64 * step;
+        nominal(&x, &mut u_ref);
+        let report = filter.step(t, &x, &u_ref, &mut u)?;
+        running.sample(t, &x, &u, report);
+        let lost = t - t0 >= setting.until && running.is_broken();
+        if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
+            break;
+        }
+        running.advance(filter, t, &mut x, [&last, &u])?;
+        last.copy_from_slice(&u);
+    }
+    let mut run = running.run;
+    for (seen, judge) in run.barriers.iter_mut().zip(&running.judges) {
+        seen.judgement = judge.judgement();
+    }
+    let lost = |seen: &Seen| matches!(seen.judgement.verdict(), Verdict::Broken | Verdict::Nothing);
+    run.kept = !run.barriers.iter().any(lost) && run.states.iter().flatten().all(|x| x.is_finite());
+    let arrivals = run.barriers.iter().map(|seen| seen.judgement.arrival);
+    run.arrival = arrivals.into_iter().try_fold(0.0, |last: f64, arrival| Some(last.max(arrival? - t0)));
+    Ok(run)
+}
+
+/// The smallest number between `low` and `high` (0 < low ≤ high) with which `works` is true, to a factor of
+/// `1 + tolerance`, by bisection of the ratio. Where `works` is not true for all larger numbers, it is one next to
+/// a number with which it is not. `low` where it works there; `None` where it does not work at `high`, or the
+/// limits are not numbers as above.
+///
+/// ```
+/// let found = punctual_reference::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
+/// assert!(found.is_ok_and(|x| x.is_some_and(|x| (7.0..7.01).contains(&x))));
+/// ```
+///
+/// # Errors
+///
+/// Those of `works`.
+pub fn smallest<E>(
+    [mut low, mut high]: [f64; 2],
+    tolerance: f64,
+    mut works: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<Option<f64>, E> {
+    let valid = low > 0.0 && low <= high && high.is_finite();
+    if !valid || !works(high)? {
+        return Ok(None);
+    }
+    if works(low)? {
+        return Ok(Some(low));
+    }
+    while high > low * (1.0 + tolerance) {
+        let middle = low * (high / low).sqrt();
+        if middle <= low || middle >= high {
+            break;
+        }
+        if works(middle)? {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Ok(Some(high))
+}
+
+/// A profile and a rate to try.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The profile.
+    pub profile: ProfileKind,
+    /// Rate times deadline.
+    pub rate_times_deadline: f64,
+}
+
+/// The candidates that [`compare`] tries: both profiles with rates from slow to the default. Slower ones follow the
+/// profile less tightly, so an error costs less at once. Faster ones ask for more input than the profile.
+pub const CANDIDATES: [Candidate; 8] = {
+    const fn of(profile: ProfileKind, rate_times_deadline: f64) -> Candidate {
+        Candidate { profile, rate_times_deadline }
+    }
+    use ProfileKind::{Hermite, LowPeak};
+    [
+        of(Hermite, 20.0),
+        of(Hermite, 10.0),
+        of(Hermite, 5.0),
+        of(Hermite, 2.5),
+        of(LowPeak, 20.0),
+        of(LowPeak, 10.0),
+        of(LowPeak, 5.0),
+        of(LowPeak, 2.5),
+    ]
+};
+
+impl Candidate {
+    /// `settings` with this profile and rate in place of theirs.
+    pub fn applied(&self, settings: BarrierSettings) -> BarrierSettings {
+        let rate = settings.deadline.map(|deadline| self.rate_times_deadline / deadline);
+        BarrierSettings { profile: self.profile, rate, rates: None, ..settings }
+    }
+}
+
+/// The input that a candidate needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rating {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Its peak input without a bound; `None` where its deadlines are not kept even then.
+    pub peak: Option<f64>,
+    /// The smallest bound on the input with which the deadlines are kept, to a hundredth.
+    pub bound: Option<f64>,
+}
+
+/// Rates every one of `candidates`: `try_out(candidate, bound)` runs the closed loop with the input bounded to
+/// ±`bound` (infinite: unbounded) and returns whether the deadlines are kept, and the peak input.
+///
+/// The bound is looked for between `1e-2` of the peak and the peak itself, with which the unbounded run is
+/// its own proof. Best first: by bound, then by peak.
+///
+/// # Errors
+///
+/// Those of `try_out`.
+pub fn compare<E>(
+    candidates: &[Candidate],
+    mut try_out: impl FnMut(&Candidate, f64) -> Result<(bool, f64), E>,
+) -> Result<Vec<Rating>, E> {
+    let mut ratings = Vec::with_capacity(candidates.len());
+    for candidate in candidates {
+        let (kept, peak) = try_out(candidate, f64::INFINITY)?;
+        let mut rating = Rating { candidate: *candidate, peak: kept.then_some(peak), bound: None };
+        if kept && peak > 0.0 {
+            rating.bound = smallest([1e-2 * peak, peak], 1e-2, |bound| Ok(try_out(candidate, bound)?.0))?;
+        }
+        ratings.push(rating);
+    }
+    let key = |r: &Rating| (r.bound.unwrap_or(f64::INFINITY), r.peak.unwrap_or(f64::INFINITY));
+    ratings.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+    Ok(ratings)
+}

@@ -1,0 +1,18 @@
+//! Reference material beside [`punctual_core`]: to try a filter on, and to compare it with.
+//!
+//! | module | owns |
+//! |---|---|
+//! | [`plants`] | point mass, unicycle, bicycles: written once against the traits of the core |
+//! | [`nominal`] | controllers that want an input, for a filter to change |
+//! | [`baselines`] | the constraints of the literature, as conditions of a promise |
+//! | [`simulation`] | a closed loop of a plant and a filter |
+//! | [`effort`] | a closed loop that is watched: what filters need, compared |
+//!
+//! Nothing of a filter depends on this crate.
+#![forbid(unsafe_code)]
+
+pub mod baselines;
+pub mod effort;
+pub mod nominal;
+pub mod plants;
+pub mod simulation;

@@ -1,0 +1,72 @@
+//! Closed loops in process, for studies and tests: a filter, a plant integrated by RK4, held inputs.
+
+use nalgebra::SVector;
+
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::error::{Error, positive};
+use punctual_core::filter::{Report, SafetyFilter};
+
+/// Step size and length of a closed-loop run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Schedule {
+    /// Sampling period in s, finite, > 0: the input is held over it.
+    pub step: f64,
+    /// Number of sampling periods.
+    pub steps: usize,
+    /// Runge-Kutta steps per sampling period, ≥ 1.
+    pub substeps: usize,
+}
+
+/// Runs `filter` and `plant` in closed loop from `x0` at time 0. At every sample `nominal(t, x)`
+/// gives u_ref, and `observe(t, x, u, report)` sees the result before the plant moves; it is called
+/// once more at the end. Sample k is at time k · step.
+///
+/// # Errors
+///
+/// A step that is not finite or ≤ 0, and misuse of the filter.
+pub fn closed_loop<P, const NX: usize, const NU: usize>(
+    filter: &mut SafetyFilter,
+    plant: &P,
+    x0: SVector<f64, NX>,
+    schedule: Schedule,
+    nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
+    observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+) -> Result<(), Error>
+where
+    P: ControlAffine<NX, NU>,
+{
+    closed_loop_by(filter, |x, u, dt| rk4_step(plant, x, u, dt), x0, schedule, nominal, observe)
+}
+
+/// As [`closed_loop`], with a plant that moves by `advance(x, u, dt)` over `dt` seconds: for other ways to
+/// integrate.
+///
+/// # Errors
+///
+/// As for [`closed_loop`].
+pub fn closed_loop_by<const NX: usize, const NU: usize>(
+    filter: &mut SafetyFilter,
+    mut advance: impl FnMut(&SVector<f64, NX>, &SVector<f64, NU>, f64) -> SVector<f64, NX>,
+    x0: SVector<f64, NX>,
+    schedule: Schedule,
+    mut nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
+    mut observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+) -> Result<(), Error> {
+    let step = positive("step", schedule.step)?;
+    let substeps = schedule.substeps.max(1);
+    let dt = step / substeps as f64;
+    let mut x = x0;
+    let mut u = SVector::<f64, NU>::zeros();
+    for k in 0..=schedule.steps {
+        let t = k as f64 * step;
+        let u_ref = nominal(t, &x);
+        let report = filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice())?;
+        observe(t, &x, &u, report);
+        if k < schedule.steps {
+            for _ in 0..substeps {
+                x = advance(&x, &u, dt);
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,175 @@
+//! The constraints of the literature in closed loop, against solutions in closed form.
+//!
+//! On a chain of n integrators with h = x₁ the least input is the floor itself, so the state follows the
+//! constraint with equality. Inputs held for `STEP` seconds leave an error of first order in it.
+
+use punctual_core::barrier::Barrier;
+use punctual_core::convergence::first_order::Exponent;
+use punctual_core::convergence::operator::Operator;
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{BarrierSettings, Method, Phase, SafetyFilter, Status};
+use punctual_core::lie;
+use punctual_core::nalgebra::{SMatrix, SVector, vector};
+use punctual_core::scalar::Scalar;
+use punctual_reference::baselines::{
+    Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Sample, Tube,
+};
+use punctual_reference::simulation::{Schedule, closed_loop};
+
+/// ẋ₁ = x₂, …, ẋ_N = u.
+#[derive(Clone, Copy)]
+struct Integrators<const N: usize>;
+
+impl<const N: usize> ControlAffine<N, 1> for Integrators<N> {
+    fn drift<S: Scalar>(&self, x: &SVector<S, N>) -> SVector<S, N> {
+        SVector::from_fn(|i, _| if i + 1 < N { x[i + 1] } else { S::zero() })
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, N>) -> SMatrix<S, N, 1> {
+        SMatrix::from_fn(|i, _| if i + 1 == N { S::one() } else { S::zero() })
+    }
+}
+
+/// h = x₁.
+struct First;
+
+impl<const N: usize> Barrier<N> for First {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, N>) -> S {
+        x[0]
+    }
+}
+
+const STEP: f64 = 1e-4;
+const DEADLINE: f64 = 2.0;
+
+/// h at every sample until `end` s, the phase, and the time of the arrival. u_ref is far below every floor.
+fn follow<const N: usize>(
+    condition: impl Condition + Send + Sync + 'static,
+    x0: SVector<f64, N>,
+    end: f64,
+) -> (Vec<f64>, Phase, Option<f64>) {
+    let source = lie::along(Integrators::<N>, First, N).expect("a source");
+    let mut filter = SafetyFilter::builder(N, 1)
+        .source("line", source, BarrierSettings::within(DEADLINE))
+        .and_then(|b| b.condition(condition))
+        .and_then(|b| b.build())
+        .expect("a filter");
+    let (mut h, mut phase, mut arrival) = (Vec::new(), Phase::Waiting, None);
+    let schedule = Schedule { step: STEP, steps: (end / STEP).round() as usize, substeps: 1 };
+    closed_loop(
+        &mut filter,
+        &Integrators::<N>,
+        x0,
+        schedule,
+        |_, _| vector![-1e5],
+        |_, x, _, report| {
+            assert!(report.status == Status::Filtered && !report.predicted, "{report:?}");
+            assert!(!report.barriers[0].guaranteed);
+            h.push(x[0]);
+            (phase, arrival) = (report.barriers[0].phase, report.barriers[0].arrival_time);
+        },
+    )
+    .expect("a run");
+    (h, phase, arrival)
+}
+
+#[track_caller]
+fn assert_follows(found: &[f64], wanted: impl Fn(f64) -> f64, tolerance: f64) {
+    for (k, h) in found.iter().enumerate() {
+        let wanted = wanted(k as f64 * STEP);
+        assert!((h - wanted).abs() < tolerance, "{h} at {}, wanted {wanted}", k as f64 * STEP);
+    }
+}
+
+/// (D + a)h = 0: h₀ e^{−at}; (D + 2)(D + 3)h = 0 from h₀, ḣ₀ = 0: h₀ (3 e^{−2t} − 2 e^{−3t}). Never there.
+#[test]
+fn exponential_conditions_decay_and_do_not_arrive() {
+    let (h, phase, arrival) = follow(Exponential::repeated(1, 1.5).unwrap(), vector![-4.0], 4.0);
+    assert_follows(&h, |t| -4.0 * (-1.5 * t).exp(), 10.0 * STEP);
+    assert_eq!((phase, arrival), (Phase::Late, None));
+    let rates = Operator::new(&[2.0, 3.0]).unwrap();
+    let exact = |t: f64| -4.0 * (3.0 * (-2.0 * t).exp() - 2.0 * (-3.0 * t).exp());
+    let (h, _, arrival) = follow(Exponential::new(rates), vector![-4.0, 0.0], 4.0);
+    assert_follows(&h, exact, 10.0 * STEP);
+    assert_eq!(arrival, None);
+    // The chain of linear functions is the same constraint.
+    let (h, _, _) = follow(Chain::linear(&[2.0, 3.0]).unwrap(), vector![-4.0, 0.0], 4.0);
+    assert_follows(&h, exact, 10.0 * STEP);
+}
+
+/// ḣ = p |h|^{1/2}: h = −(√|h₀| − p t/2)², zero at the reach time 2√|h₀|/p.
+#[test]
+fn a_power_arrives_at_its_reach_time() {
+    let chain = Chain::finite_time(&[2.0], &[0.5]).unwrap();
+    let bound = chain.reach_time(&[-4.0]);
+    assert_eq!(bound, 2.0);
+    let (h, _, arrival) = follow(chain, vector![-4.0], 1.95);
+    assert_follows(&h, |t| -(2.0 - t).powi(2), 10.0 * STEP);
+    assert_eq!(arrival, None);
+    // Within ten steps the input of one of them passes zero.
+    let (_, _, arrival) = follow(chain, vector![-4.0], 2.1);
+    assert!((arrival.unwrap() - bound).abs() < 10.0 * STEP, "{arrival:?}");
+}
+
+/// From rest, the first link is outside too: it is there after |ψ_1|^{1/2}/(p/2), and h no later than after
+/// the time that the first link alone then needs. h falls at no time from rest, so |h| ≤ |h₀| throughout.
+#[test]
+fn a_chain_of_powers_arrives_within_the_sum_of_its_reach_times() {
+    for (p, q, h0) in [([2.0, 4.0], [0.5, 0.5], -4.0), ([3.0, 2.0], [0.75, 0.4], -9.0)] {
+        let chain = Chain::finite_time(&p, &q).unwrap();
+        let bound = chain.reach_time(&[h0, 0.0]);
+        let (_, _, arrival) = follow(chain, vector![h0, 0.0], bound + 0.01);
+        assert!(arrival.is_some_and(|t| t <= bound), "{arrival:?} for {bound}");
+    }
+}
+
+/// With ψ_1(0) = 0 the first-order condition of any order arrives at T: h = −(1 − t/T)² for p = 1/2.
+#[test]
+fn the_first_order_condition_arrives_at_the_deadline() {
+    let condition = FirstOrderFixedTime::new(1, Exponent::default(), 5.0).unwrap();
+    let (_, _, arrival) = follow(condition, vector![-4.0], DEADLINE + 0.01);
+    assert!((arrival.unwrap() - DEADLINE).abs() < 0.01, "{arrival:?}");
+    let condition = FirstOrderFixedTime::new(2, Exponent::default(), 5.0).unwrap();
+    let (h, _, _) = follow(condition, vector![-1.0, 2.0 / DEADLINE], DEADLINE - 0.1);
+    assert_follows(&h, |t| -(1.0 - t / DEADLINE).powi(2), 20.0 * STEP);
+    // From rest it is late: ψ_1(0) < 0.
+    let (_, phase, arrival) = follow(condition, vector![-1.0, 0.0], DEADLINE);
+    assert_eq!((phase, arrival), (Phase::Late, None));
+}
+
+/// h ≥ −s, and h = −s where the start is on it; at the deadline the tube is the set.
+#[test]
+fn a_tube_is_kept_until_it_is_the_set() {
+    let (h, _, _) = follow(Tube::new(1, 1, 5.0).unwrap(), vector![-4.0], 3.0);
+    assert_follows(&h, |t| -4.0 * (1.0 - t / DEADLINE).max(0.0), 10.0 * STEP);
+    let tube = Tube::new(3, 3, 10.0).unwrap();
+    let start = [-4.0, 0.0, 0.0];
+    let (h, _, _) = follow(tube, start.into(), 3.0);
+    for (k, h) in h.iter().enumerate() {
+        let bound = tube.bound(&Sample::new(&start, DEADLINE, k as f64 * STEP, &start)).lower;
+        // What held inputs cost.
+        assert!(*h >= bound - STEP, "{h} below {bound} at {}", k as f64 * STEP);
+    }
+}
+
+#[test]
+fn settings_that_a_condition_would_replace_are_refused() {
+    let build = |settings: BarrierSettings| {
+        let source = lie::along(Integrators::<1>, First, 1).expect("a source");
+        let builder = SafetyFilter::builder(1, 1).source("line", source, settings).expect("settings");
+        builder.condition(Chain::new(&[ClassK::Linear(1.0)]).unwrap()).err().map(|e| e.to_string())
+    };
+    let settings = BarrierSettings::within(1.0);
+    assert_eq!(build(settings), None);
+    let method = Method::FirstOrder(Exponent::default());
+    assert_eq!(
+        build(BarrierSettings { method, ..settings }).unwrap(),
+        "line.method: a constraint of one's own takes the place of method and profile"
+    );
+    assert_eq!(
+        build(BarrierSettings { recovery: Some(1.0), ..settings }).unwrap(),
+        "line.recovery: a constraint of one's own knows no recovery"
+    );
+    let none = SafetyFilter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
+    assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");
+}

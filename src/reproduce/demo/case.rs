@@ -1,0 +1,161 @@
+//! The cases of the demonstration, as the TOML files that a user would write.
+
+use punctual_core::filter::Sampling;
+
+use crate::reproduce::baseline::Baseline;
+use crate::reproduce::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Shape, Vehicle};
+
+/// A vehicle with a method in its setting, from rest in the origin.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// The plant.
+    pub vehicle: Vehicle,
+    /// How the deadline is to be met.
+    pub baseline: Baseline,
+    /// Barrier, nominal controller, margin and times.
+    pub setup: Setup,
+    /// The method's name in configurations and file names.
+    pub method: &'static str,
+    /// The method's name in tables and pictures.
+    pub title: &'static str,
+}
+
+impl Case {
+    /// The paper's method and ours for `vehicle`.
+    pub fn of(vehicle: Vehicle) -> [Self; 2] {
+        let paper = Self {
+            vehicle,
+            baseline: Baseline::RepeatedRoot,
+            setup: Setup::paper(DEADLINE, STEP),
+            method: "repeated_root",
+            title: "repeated root (paper)",
+        };
+        let ours = Self {
+            baseline: Baseline::Profile,
+            setup: Setup::advised(DEADLINE, STEP),
+            method: "reference_profile",
+            title: "reference profile",
+            ..paper
+        };
+        [paper, ours]
+    }
+
+    /// Whether the method is the paper's, which is expected to be late.
+    pub fn is_the_papers(&self) -> bool {
+        self.baseline == Baseline::RepeatedRoot
+    }
+
+    /// The plant's files, without ending.
+    pub(super) fn plant_stem(&self) -> String {
+        format!("{}-plant", self.vehicle.key())
+    }
+
+    /// The filter's files, without ending.
+    pub(super) fn filter_stem(&self) -> String {
+        format!("{}-filter", self.stem())
+    }
+
+    /// The coupled run's files, without ending.
+    pub(super) fn stem(&self) -> String {
+        format!("{}-{}", self.vehicle.key(), self.method)
+    }
+
+    /// The plant's configuration.
+    pub(super) fn plant(&self) -> String {
+        let (title, key) = (self.vehicle.title(), self.vehicle.key());
+        let Setup { end, step, .. } = self.setup;
+        format!(
+            r#"# A {title} at rest in the origin.
+kind = "plant"
+name = "{key}"
+
+[plant]
+model = "{key}"
+
+[experiment]
+stop_time = {end:?} # s
+step_size = {step:?} # s
+"#
+        )
+    }
+
+    /// The filter's configuration.
+    pub(super) fn filter(&self) -> String {
+        let Self { method, title, .. } = self;
+        let (vehicle, key) = (self.vehicle.title(), self.vehicle.key());
+        let Setup { shape, margin, deadline, end, step, .. } = self.setup;
+        let shape = match shape {
+            Shape::Quadratic => r#""quadratic_disc" # h = R² − d²"#,
+            Shape::Distance => r#""disc" # h = √(R² + ε²) − √(d² + ε²)"#,
+        };
+        let margin = if margin > 0.0 { format!("margin = {margin:?} # m\n") } else { String::new() };
+        let sampling = match self.baseline.sampling(step) {
+            Sampling::Pointwise => "sampling = \"pointwise\" # as in the paper\n",
+            // The default.
+            _ => "",
+        };
+        format!(
+            r#"# Brings a {vehicle} into the disc within the deadline: {title}.
+kind = "filter"
+name = "{key}_filter"
+{sampling}
+[plant]
+model = "{key}"
+
+[[barrier]]
+name = "goal"
+centre = {CENTRE:?} # m
+radius = {RADIUS:?} # m
+deadline = {deadline:?} # s
+shape = {shape}
+method = "{method}"
+{margin}
+[experiment]
+stop_time = {end:?} # s
+step_size = {step:?} # s
+"#
+        )
+    }
+
+    /// The system file that couples the two; their FMUs lie beside it.
+    pub(super) fn system(&self) -> String {
+        let (vehicle, title) = (self.vehicle.title(), self.title);
+        let (filter, plant) = (self.filter_stem(), self.plant_stem());
+        let Setup { nominal, end, step, .. } = self.setup;
+        let mut text = format!(
+            r#"# {vehicle} and its filter: {title}.
+[experiment]
+stop_time = {end:?} # s
+step = {step:?} # s
+
+[[component]]
+name = "filter"
+fmu = "{filter}.fmu"
+
+[[component]]
+name = "plant"
+fmu = "{plant}.fmu"
+
+# x.* of the plant to the filter, u.* of the filter to the plant.
+[[connect_by_name]]
+components = ["filter", "plant"]
+"#
+        );
+        if nominal == Nominal::Damping {
+            text += "\n# The nominal controller: damping.\n";
+            let [states, inputs] = self.vehicle.signals();
+            for (input, speed) in inputs.iter().zip(self.vehicle.damped()) {
+                let Some(speed) = speed else { continue };
+                let (speed, input) = (states[speed].name, input.name);
+                text += &format!(
+                    r#"[[connection]]
+from = "plant.x.{speed}"
+to = "filter.u_ref.{input}"
+factor = -1.0
+"#
+                );
+            }
+        }
+        text
+    }
+}
