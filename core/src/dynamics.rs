@@ -33,8 +33,8 @@ use crate::scalar::Scalar;
 /// f and g are smooth where the filter is used; derivatives up to the relative degree are taken by
 /// running these functions on Taylor series.
 pub trait ControlAffine<const NX: usize, const NU: usize> {
-    /// No output of the state has a larger relative degree along this plant. Default: the number of states,
-    /// which is true of every plant; what lies above is not compiled.
+    /// An upper limit of the relative degree of any output along this plant. Default: the number of states,
+    /// which is one for every plant. Larger degrees are not compiled.
     const LARGEST_DEGREE: usize = NX;
 
     /// f(x): the rate of change of the state at u = 0, per second.
@@ -56,9 +56,9 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
         dx
     }
 
-    /// Where the position, the first two states, can be between `time[0]` and `time[1]` s (0 ≤ first ≤
-    /// second) after the state `x`, under any input with `bounds[0]` ≤ u ≤ `bounds[1]` (`NU` components): a
-    /// region that contains every such position. `None`, the default, where that is not known.
+    /// A region that contains every position, the first two states, between `time[0]` and `time[1]` s (0 ≤ first ≤
+    /// second) after the state `x`, under any input with `bounds[0]` ≤ u ≤ `bounds[1]` (`NU` components). `None`,
+    /// the default, where none is known.
     fn region(&self, _x: &SVector<f64, NX>, _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<Region> {
         None
     }
@@ -69,7 +69,7 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
 pub struct Region {
     /// The box: smallest and largest coordinate along x, and along y, in m.
     pub sides: [[f64; 2]; 2],
-    /// In m, ≥ 0.
+    /// Distance in m, ≥ 0.
     pub radius: f64,
 }
 
@@ -96,9 +96,9 @@ impl Region {
     }
 }
 
-/// Where a chain of integrators can be between `time[0]` and `time[1]` s after its output had the
-/// derivatives `from` (of order 0 to n − 1), while its n-th one lies within `input`: an interval that contains
-/// every value, and exactly the values that can be had where the two times are one.
+/// An interval that contains every output of a chain of integrators between `time[0]` and `time[1]` s after it
+/// had the derivatives `from` (of order 0 to n − 1), while its n-th one lies within `input`. Where the two times
+/// are one, it holds exactly the values that can be had.
 ///
 /// ```
 /// // n = 2 from rest: ±u τ²/2.
@@ -211,6 +211,7 @@ where
 /// With the position and velocity of each sample a barrier on these states knows where the point is then,
 /// and expects it to go on like that until the next one. `NX` is the number of states of the plant
 /// inside; the extended one has `NX` + 4, which is checked at compile time.
+/// `docs/theory.md#measured-set` says what a point that accelerates costs.
 ///
 /// ```
 /// use punctual_core::barriers::{DistanceDisc, Outside};
@@ -233,7 +234,7 @@ impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<E
 where
     P: ControlAffine<NX, NU>,
 {
-    /// A point that moves by itself is to the plant what time is.
+    /// The point moves by itself, so no input reaches it: to the plant it is what time is.
     const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
 
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {

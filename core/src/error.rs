@@ -1,4 +1,4 @@
-//! Misuse: the one error type of the crate. Numerical outcomes are statuses, not errors.
+//! The crate's one error type, for misuse. Numerical outcomes are statuses, not errors.
 
 mod degree;
 
@@ -6,7 +6,7 @@ use std::fmt;
 
 pub use degree::RelativeDegree;
 
-/// What kind of misuse an [`Error`] reports.
+/// The kind of misuse that an [`Error`] reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ErrorKind {
@@ -20,7 +20,7 @@ pub enum ErrorKind {
     Unsupported,
 }
 
-/// Misuse of the library: which field, what was given, what is allowed.
+/// Misuse of the library: the field, the value given and the range allowed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error {
     kind: ErrorKind,
@@ -40,7 +40,7 @@ impl Error {
         self
     }
 
-    /// The relative degree found, where that is what is wrong.
+    /// The relative degree found, where that is the defect.
     pub fn relative_degree(&self) -> Option<&RelativeDegree> {
         self.degree.as_deref()
     }

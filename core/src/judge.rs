@@ -1,9 +1,9 @@
-//! What became of a barrier's promise, by h itself and not by what the filter says of it.
+//! The verdict on a barrier's promise, by h itself and not by what the filter says of it.
 //!
 //! A barrier that began inside is to have h ≥ 0 at all times; one that began outside, from its deadline on.
-//! [`Judge`] sees h at instants, and judges at the deadline itself where that lies between two of them:
+//! [`Judge`] sees h at instants, and judges at the deadline itself where that lies between two of them. It goes
 //! along a straight line where h has relative degree 1 (exact for an integrator and a linear h), else along the
-//! cubic through the last four. Between two instants that are both inside nothing is looked for.
+//! cubic through the last four. Between two instants that are both inside it looks for nothing.
 
 /// Round-off of h, as a part of the largest |h| seen.
 pub const TOLERANCE: f64 = 1e-9;
@@ -11,10 +11,10 @@ pub const TOLERANCE: f64 = 1e-9;
 const LEAST_TOLERANCE: f64 = 1e-12;
 /// Round-off of a time that is a sum of steps, as a part of it.
 const SAME_TIME: f64 = 1e-9;
-/// Instants that a cubic goes through, but for the newest.
+/// Instants that a cubic goes through, besides the newest.
 const BEFORE: usize = 3;
 
-/// How h goes from one instant to the next.
+/// The course of h from one instant to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
     /// Along a straight line: relative degree 1, or instants that are close.
@@ -23,7 +23,7 @@ pub enum Course {
     Smooth,
 }
 
-/// Where a barrier stands at an instant.
+/// The standing of a barrier at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// Not enforced yet.
@@ -34,34 +34,34 @@ pub enum Standing {
     Released,
 }
 
-/// What a promise came to.
+/// The verdict on a promise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verdict {
     /// On time, and inside from then on; always inside where it began inside.
     Kept,
     /// Late, or left.
     Broken,
-    /// What was seen ends before the deadline, or before it was enforced.
+    /// Not decided: the instants seen end before the deadline, or before it was enforced.
     #[default]
     Open,
     /// It began outside and has no deadline: there is no promise.
     Nothing,
 }
 
-/// What was seen of a barrier.
+/// The facts seen of a barrier, and the verdict that follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Judgement {
-    /// When it was enforced first, in s.
+    /// Time in s at which it was enforced first.
     pub began: Option<f64>,
     /// Whether h ≥ 0 held then.
     pub began_inside: bool,
     /// The instant of its deadline in s; `None` where it has none, or nothing was seen.
     pub deadline: Option<f64>,
-    /// When h ≥ 0 held first, in s.
+    /// Time in s at which h ≥ 0 held first.
     pub arrival: Option<f64>,
-    /// When it was known in s that the deadline is missed.
+    /// Time in s at which it was known that the deadline is missed.
     pub late: Option<f64>,
-    /// When it was left in s after it had been inside, and was to stay so.
+    /// Time in s at which it was left after it had been inside, and was to stay so.
     pub left: Option<f64>,
     /// Least h while it was to be inside: from the deadline on, from the start where it began inside.
     pub least: Option<f64>,
@@ -84,7 +84,7 @@ impl Judgement {
         self.reached && !self.outside
     }
 
-    /// What the promise came to.
+    /// The verdict on the promise.
     pub fn verdict(&self) -> Verdict {
         match () {
             () if self.began.is_some() && !self.began_inside && self.deadline.is_none() => Verdict::Nothing,
@@ -100,7 +100,7 @@ impl Judgement {
     }
 }
 
-/// Judges one barrier by what h is at instants.
+/// A judge of one barrier, by h at instants.
 ///
 /// ```
 /// use punctual_core::judge::{Course, Judge, Standing, Verdict};
@@ -116,7 +116,7 @@ impl Judgement {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Judge {
-    /// In s after the first instant.
+    /// T in s after the first instant.
     deadline: Option<f64>,
     course: Course,
     /// The last instants, the newest first.
@@ -124,9 +124,9 @@ pub struct Judge {
     count: usize,
     /// Largest |h| seen.
     size: f64,
-    /// When it was left last before the deadline.
+    /// Time in s at which it was left last before the deadline.
     left_before: Option<f64>,
-    /// When the filter knew first that the deadline is lost.
+    /// Time in s at which the filter knew first that the deadline is lost.
     certain: Option<f64>,
     /// Whether the deadline has been judged.
     due: bool,
@@ -135,7 +135,7 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// For a deadline in s after the first instant (`None` or infinite: none).
+    /// A judge for a deadline in s after the first instant (`None` or infinite: none).
     pub fn new(deadline: Option<f64>, course: Course) -> Self {
         Self {
             deadline: deadline.filter(|deadline| deadline.is_finite()),
@@ -171,14 +171,14 @@ impl Judge {
         self.judge_deadline(t, h);
         self.count_in(t, h, standing);
         self.released = standing == Standing::Released;
-        // Let go after it arrived: there is nothing more to reach.
+        // Released after it arrived: there is nothing more to reach.
         self.seen.reached |= self.released && self.seen.arrival.is_some();
         self.before.rotate_right(1);
         self.before[0] = (t, h);
         self.count += 1;
     }
 
-    /// What was seen until now.
+    /// The judgement of the instants seen so far.
     pub fn judgement(&self) -> Judgement {
         let mut seen = self.seen;
         if !self.due && seen.late.is_none() && !seen.began_inside {
@@ -187,7 +187,7 @@ impl Judge {
         seen
     }
 
-    /// A number that is none is not inside.
+    /// Whether h counts as inside; not-a-number does not.
     fn is_inside(&self, h: f64) -> bool {
         h >= -(TOLERANCE * self.size).max(LEAST_TOLERANCE)
     }
@@ -204,7 +204,7 @@ impl Judge {
         (self.count > 0).then_some(self.before[0])
     }
 
-    /// Arrivals, and what is left before the deadline.
+    /// Notes arrivals, and when the set is left before the deadline.
     fn follow(&mut self, t: f64, h: f64) {
         let inside = self.is_inside(h);
         let was_inside = self.last().map(|(_, h)| self.is_inside(h));
@@ -218,7 +218,7 @@ impl Judge {
         }
     }
 
-    /// h at the deadline, where that has passed now.
+    /// Judges h at the deadline, where that has passed now.
     fn judge_deadline(&mut self, t: f64, h: f64) {
         let Some(deadline) = self.seen.deadline.filter(|_| !self.due) else { return };
         let same = SAME_TIME * deadline.abs().max(1.0);
@@ -245,7 +245,7 @@ impl Judge {
         }
     }
 
-    /// The instant itself, where it is to be inside then.
+    /// Counts the instant itself, where it is to be inside then.
     fn count_in(&mut self, t: f64, h: f64, standing: Standing) {
         let always = self.seen.began_inside && standing != Standing::Waiting;
         if standing == Standing::Released || !(always || self.due) {
@@ -264,14 +264,14 @@ impl Judge {
         self.seen.least = Some(self.seen.least.map_or(h, |least| least.min(h)));
     }
 
-    /// When h changes its sign on the way to `h` at `t`.
+    /// The time at which h changes its sign on the way to `h` at `t`.
     fn crossing(&self, t: f64, h: f64) -> f64 {
         let Some((mut from, first)) = self.last() else { return t };
         let (mut to, rising) = (t, h > first);
         if !(first.is_finite() && h.is_finite()) || (first < 0.0) == (h < 0.0) {
             return t;
         }
-        // As far as a number goes.
+        // Bisection to the last bit.
         for _ in 0..64 {
             let middle = 0.5 * (from + to);
             if (self.between(middle, t, h) < 0.0) == rising {

@@ -41,6 +41,8 @@
 //! | e = h − μ − r | `error` | `[h]` | scalar |
 //! | r | `profile` | `[h]` | scalar |
 //! | τ = t − t₀ | `elapsed` | s | scalar ≥ 0 |
+//! | ψ = (D + a_1) ⋯ (D + a_{n−1}) e | `weights` of a [`PeriodBound`](convergence::sampled::PeriodBound) | `[h]`/s^(n−1) | scalar |
+//! | δ | `period`, `hold` | s | scalar ≥ 0 |
 //!
 //! # Layers
 //!
@@ -54,8 +56,8 @@
 //!
 //! Janani S K and S. Kolathaya, *Fixed time convergence guarantees for Higher Order Control Barrier
 //! Functions*, arXiv:2507.13888 ("the paper" throughout). The comparison lemma for any order, the
-//! reference profile and the stay constraint go beyond it; their derivations open the modules of
-//! [`convergence`].
+//! reference profile and the stay constraint go beyond it. Their proofs are in `docs/theory.md`; formulas
+//! have the same labels there and here.
 #![forbid(unsafe_code)]
 
 pub mod barrier;

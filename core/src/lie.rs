@@ -13,8 +13,8 @@
 //! \end{align}
 //! ```
 //!
-//! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off; (3) is checked at
-//! every evaluation, since an input that enters earlier invalidates every constraint built for n.
+//! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off. The filter checks (3) at every
+//! evaluation, since an input that enters earlier invalidates every constraint built for n.
 
 mod ahead;
 mod degree;
@@ -67,7 +67,7 @@ where
 }
 
 /// Coefficient `J` of the state from those below: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where
-/// products of u with derivatives of g along u vanish. All series are cut off at what they are known to.
+/// products of u with derivatives of g along u vanish. Every series is cut off after its last known coefficient.
 #[inline]
 fn extend<P, const NX: usize, const NU: usize, const K: usize, const J: usize>(
     plant: &P,
@@ -109,8 +109,8 @@ impl Derivatives {
     }
 }
 
-/// Anything that supplies the derivatives of one barrier: [`along`] makes one from the traits, [`external`] takes
-/// them from whoever computes them, a user's own code can be another.
+/// A supplier of the derivatives of one barrier. [`along`] makes one from the traits, [`external()`] takes the
+/// derivatives from whoever computes them, and a user's own code can be another.
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
@@ -136,9 +136,10 @@ pub trait DerivativeSource: Send {
         false
     }
 
-    /// Writes how what [`Self::ahead`] writes changes along a direction: `state` is x and its direction,
-    /// `input` the held u and its direction; for [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default
-    /// does not know: it returns false.
+    /// Writes the derivative along a direction of what [`Self::ahead`] writes: `state` is x and its direction,
+    /// `input` the held u and its direction. For
+    /// [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default does not know it and
+    /// returns false.
     fn ahead_along(
         &self,
         _t: f64,
@@ -150,8 +151,8 @@ pub trait DerivativeSource: Send {
         false
     }
 
-    /// As [`Self::predict`], and moves the direction `dx` by its derivative. The default does not know: it
-    /// returns false.
+    /// Moves `x` as [`Self::predict`] does, and the direction `dx` by the derivative of that. The default does not
+    /// know it and returns false.
     fn predict_along(&self, _x: &mut [f64], _dx: &mut [f64], _u: &[f64], _duration: f64) -> bool {
         false
     }
@@ -242,8 +243,8 @@ where
 }
 
 /// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the plant's
-/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE); the number of states is always one, since the gradients of
-/// h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
+/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE). The number of states is always such a limit, since the gradients
+/// of h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
 /// # Errors
 ///
@@ -263,7 +264,7 @@ where
     macro_rules! by_degree {
         ($($n:literal => $k:literal),*) => {
             match n {
-                // A constant condition: what cannot be is not compiled.
+                // A constant condition: impossible degrees are not compiled.
                 $($n if const { $n <= P::LARGEST_DEGREE } => {
                     Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
                 })*

@@ -1,18 +1,15 @@
-//! What no input within its bounds can do: how high h can be at a time, and so whether a deadline is lost, and
-//! the soonest time at which h ≥ 0 is not ruled out.
+//! The limits of bounded inputs: how high h can be at a time, whether a deadline is lost, and the soonest time at which
+//! h ≥ 0 is not ruled out.
 //!
-//! # Derivation
+//! A source bounds h over every state that bounded inputs reach between two times ([`DerivativeSource::highest`]).
+//! Where that bound is negative at T, no input has h(T) ≥ 0. Where it is negative on each of the intervals that cover
+//! [0, τ], none has h ≥ 0 before τ (`docs/theory.md#lost-deadline`). [`soonest`] covers by steps that double after a
+//! success and halve after a failure.
 //!
-//! A source bounds h over every state that bounded inputs reach between two times
-//! ([`DerivativeSource::highest`]). Where that bound is negative at T, no input has h(T) ≥ 0; where it is
-//! negative on each of the intervals that cover [0, τ], none has h ≥ 0 before τ. [`soonest`] covers by steps
-//! that double after a success and halve after a failure.
-//!
-//! For a chain of n integrators per axis with bounds per axis the reachable positions at τ are exactly a box:
-//! each coordinate is affine in its own input, smallest for the smallest input throughout, and constant inputs
-//! give all values in between. So for a disc, a half-plane, or a shape along the axes the answer for T is
-//! exact: what is not ruled out can be had. For other plants the region is larger than what can be reached,
-//! and the times found are bounds.
+//! For a chain of n integrators per axis with bounds per axis, the reachable positions are exactly a box
+//! (`docs/theory.md#reachable-box`). So for a disc, a half-plane, or a shape along the axes the answer for T is
+//! exact: what is not ruled out can be had. For other plants the region is larger than what can be reached, and the
+//! times found are bounds.
 
 use crate::MAX_INPUTS;
 use crate::lie::DerivativeSource;

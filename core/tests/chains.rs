@@ -1,17 +1,17 @@
 //! Chains of n = 1 … 8 integrators from random anchors: on time, and never outside until 3T.
 //!
-//! h is the first state, so the floor under h⁽ⁿ⁾ is the floor under the input; the held input moves a
-//! chain along a polynomial, which is evaluated exactly. The promise alone is on trial here: no plant,
-//! no jets, no program; with the constraint at the samples and a margin of 1 %, and with the constraint
-//! over the period and the margin that it chooses itself.
+//! h is the first state, so the floor under h⁽ⁿ⁾ is the floor under the input. The held input moves a chain
+//! along a polynomial, which is evaluated exactly. The promise alone is on trial here: no plant, no jets, no
+//! QP. It is tried with the constraint at the samples and a margin of 1 %, and with the constraint over the
+//! period and the margin that it chooses itself.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
 use punctual_core::convergence::comparison::factorial;
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 
-/// Margin as a part of the largest |h⁽ʲ⁾(0)| Tʲ/j!: what input held over T/100 costs (theory: M δ/aⁿ) is
-/// below it for every order. Without it n = 1 ends a hair below 0, as its profile does in the limit.
+/// Margin as a part of the largest |h⁽ʲ⁾(0)| Tʲ/j!: the cost of inputs held over T/100, M δ/aⁿ
+/// (`docs/theory.md#pointwise`), is below it for every order. Without it n = 1 ends a hair below 0, as its profile does in the limit.
 const MARGIN: f64 = 0.01;
 
 /// Round-off of a time that is a sum of steps, against the deadline.
@@ -38,7 +38,7 @@ fn advance(x: &mut [f64], input: f64, dt: f64) {
     }
 }
 
-/// How held inputs are accounted for.
+/// The account taken of held inputs.
 #[derive(Clone, Copy, PartialEq)]
 enum Scheme {
     /// At the samples, with [`MARGIN`].

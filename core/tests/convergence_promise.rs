@@ -7,7 +7,7 @@ use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::repeated_root::{Deadlines, NoAdmissibleRate, Reason};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase, Refusal};
 
-/// What came of a run.
+/// The result of a run.
 struct Run {
     /// Time of the first sample with h ≥ 0.
     arrival: f64,

@@ -1,4 +1,4 @@
-//! The relative degree that is found, and what the builder refuses.
+//! The relative degree that is found, and the ones that the builder refuses.
 
 mod support;
 

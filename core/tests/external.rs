@@ -1,4 +1,4 @@
-//! A filter that is handed the derivatives against one that computes them: the same bits, and the same
+//! A filter that is handed the derivatives, against one that computes them: the same bits, and the same
 //! derivative of a sample.
 
 use punctual_core::barriers::{DistanceDisc, NormBound};
@@ -13,7 +13,7 @@ const INPUTS: usize = 2;
 const STEP: f64 = 0.01;
 const DEADLINE: f64 = 4.0;
 
-/// What somebody else computes: the goal's derivatives (n = 2) and the speed limit's (n = 1).
+/// Sources that somebody else evaluates: the goal's derivatives (n = 2) and the speed limit's (n = 1).
 fn sources() -> [Box<dyn DerivativeSource>; 2] {
     let goal = DistanceDisc::new([12.0, 5.0], 2.0, 2.0).expect("valid disc");
     let speed = NormBound::of_one(3, 6.0).expect("valid bound");
@@ -54,7 +54,7 @@ fn stacks(t: f64, x: &[f64]) -> Vec<f64> {
     all
 }
 
-/// How they change along `dx`.
+/// The derivative of that along `dx`.
 fn stacks_along(t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
     let (mut all, zero) = (Vec::new(), [0.0; INPUTS]);
     for source in sources() {

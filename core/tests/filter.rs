@@ -183,7 +183,7 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
     .expect("valid schedule");
 }
 
-/// h ≥ profile − Mδ/a² (theory, "Sampling"): (D + a)² e falls from ≥ 0 to at least −Mδ while the input
+/// h ≥ profile − Mδ/a² (`docs/theory.md#pointwise`): (D + a)² e falls from ≥ 0 to at least −Mδ while the input
 /// is held, and Mδ is seen at the next sample as the slack of its row at the input that was held.
 fn follows_its_profile<P>(
     plant: &P,

@@ -1,4 +1,4 @@
-//! Every way in which constraints cannot be met: what is reported and which input comes back. With
+//! Every way in which constraints cannot be met: the report and the input that comes back. With
 //! `PUNCTUAL_TABLES=1` and `--nocapture` the cases are printed as tables.
 
 #![allow(clippy::print_stdout, reason = "the cases are read from the output")]
@@ -31,7 +31,7 @@ struct Case {
     enforcement: Vec<Enforcement>,
     outcome: Outcome,
     u: [f64; 2],
-    /// How far each row is from being met, in its own unit.
+    /// Violation of each row, in its own unit.
     violations: Vec<f64>,
 }
 

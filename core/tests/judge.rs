@@ -1,4 +1,4 @@
-//! What is said of a promise, against courses of h that are known.
+//! The verdict on a promise, against known courses of h.
 
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 
@@ -116,7 +116,7 @@ fn windows() {
     assert_eq!((seen.verdict(), seen.began, seen.least), (Verdict::Kept, Some(2.0), Some(1.0)), "{seen:?}");
 }
 
-/// What is certain counts until the deadline shows it; h has the last word.
+/// A deadline certainly lost counts as missed until it comes; h has the last word.
 #[test]
 fn certainty_and_h() {
     for (end, last, verdict) in

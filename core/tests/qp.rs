@@ -19,7 +19,7 @@ fn met(row: &Row, u: &[f64], u_ref: &[f64]) -> bool {
     row.slack(u) >= -1e-12 * (terms(row, u) + terms(row, u_ref))
 }
 
-/// How much round-off in aᵀu can move u: the largest term over the smallest slope.
+/// Factor by which round-off in aᵀu can move u: the largest term over the smallest slope.
 fn conditioning(row: &Row, b: &Bounds, u_ref: &[f64]) -> f64 {
     let m = u_ref.len();
     let finite = |v: &f64| v.is_finite();
@@ -227,7 +227,7 @@ fn the_correction_limit_divides_filtered_from_ill_conditioned() {
     }
 }
 
-/// What counts is how far u moves, not the multiplier: a component at its bound moves no further.
+/// The distance that u moves counts, not the multiplier: a component at its bound moves no further.
 #[test]
 fn the_correction_limit_does_not_count_components_at_their_bounds() {
     // u₁ stops at 1, then u₂ makes up the missing 1e-3 with a slope of 1e-8: λ = 1e5 · 1e8.

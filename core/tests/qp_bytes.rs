@@ -1,6 +1,6 @@
 //! The quadratic program on arbitrary bytes: every pattern of 64 bits may become a number.
-//! `PUNCTUAL_QP_CASES` programs, some thousand by default. Needs no fuzzing engine: the bytes come
-//! from the test's own generator.
+//! `PUNCTUAL_QP_CASES` is the number of QPs, some thousand by default. No fuzzing engine is needed: the bytes
+//! come from the test's own generator.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 

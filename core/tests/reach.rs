@@ -1,4 +1,4 @@
-//! What bounded inputs rule out, against known answers and against runs; deadlines that are given up; profiles of
+//! The limits of bounded inputs, against known answers and against runs. Deadlines that are given up. Profiles of
 //! least peak.
 
 mod draw;

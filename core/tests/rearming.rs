@@ -1,4 +1,4 @@
-//! After an arrival and at the edges of a deadline: leaving, recovering, a deadline that is past or
+//! Promises after an arrival and at the edges of a deadline: leaving, recovering, a deadline that is past or
 //! shorter than a step, an input that acts late.
 
 mod scenario;

@@ -1,4 +1,4 @@
-//! Held inputs: predictions along the flow, the sampled form of the constraint, and what it changes.
+//! Held inputs: predictions along the flow, the sampled form of the constraint, and its effect.
 
 mod scenario;
 

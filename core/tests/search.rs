@@ -1,9 +1,9 @@
 //! The search for a held input against brute force: where an input exists that meets every row, one is found, and
 //! no other is nearer to u_ref by more than a hundredth.
 //!
-//! The oracle shares no part with the search. It has the rows' demands from the promises, evaluates them with
-//! `DerivativeSource::ahead` over grids of inputs, and refines what is nearest by a pattern search. An input that
-//! leaves a set between two samples in which it is to be kept is no answer. With
+//! The oracle shares no part with the search. It takes the bounds of the rows from the promises, evaluates them with
+//! `DerivativeSource::ahead` over grids of inputs, and refines the nearest by a pattern search. An input that leaves
+//! a set to be kept between two samples is no answer. With
 //! `PUNCTUAL_TABLES=1` and `--nocapture` there are more than 100,000 states, and a table.
 
 #![allow(clippy::print_stdout, reason = "it prints tables")]
@@ -97,7 +97,7 @@ impl Case<'_> {
         worst
     }
 
-    /// How far below its floor h falls between the samples, as a part of its size.
+    /// Fall of h below its floor between the samples, as a part of its size.
     fn dip(&self, u: [f64; 2]) -> f64 {
         let mut worst = 0.0_f64;
         let mut ahead = Ahead::ZERO;
@@ -205,7 +205,7 @@ impl Case<'_> {
     }
 }
 
-/// What became of the samples of one kind.
+/// The results of the samples of one kind.
 #[derive(Default)]
 struct Tally {
     samples: usize,
@@ -476,8 +476,8 @@ fn an_input_is_found_where_one_exists() {
 }
 
 /// A step taken again from the same sample, as masters do that try the size of their steps, gives the same input
-/// although the input before it is another one. What passes the centre of its disc and could turn to either side must not
-/// brake when asked first and turn when asked again.
+/// although the input before it is another one. A vehicle that passes the centre of its disc and could turn to either side
+/// must not brake when asked first and turn when asked again.
 #[test]
 fn a_step_taken_again_gives_the_same_input() {
     const STEP: f64 = 0.01;

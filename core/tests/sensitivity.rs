@@ -35,7 +35,7 @@ struct Sample {
     u_ref: Vec<f64>,
 }
 
-/// What is compared: u, then five numbers per barrier.
+/// The numbers compared: u, then five per barrier.
 fn outputs(filter: &mut SafetyFilter, sample: &Sample) -> (Status, Vec<Phase>, Vec<f64>) {
     let mut values = vec![0.0; sample.u_ref.len()];
     let report = filter.peek(sample.t, &sample.x, &sample.u_ref, &mut values).expect("right lengths");
@@ -60,7 +60,7 @@ fn derivative(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Res
     unknown.map_or(Ok(values), Err)
 }
 
-/// What a comparison came to.
+/// The result of a comparison.
 enum Compared {
     Agrees(Status),
     /// A kink is within a step.
@@ -113,7 +113,7 @@ fn compare(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Compar
     compared
 }
 
-/// How the row is formed.
+/// The form of the row.
 #[derive(Clone, Copy, Debug)]
 enum Form {
     Pointwise,

@@ -1,4 +1,4 @@
-//! Misuse: a valid filter first, then one thing broken at a time, and the message it gives.
+//! Misuse: a valid filter first, then one defect at a time, and the message it gives.
 
 mod scenario;
 

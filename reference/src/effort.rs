@@ -1,4 +1,4 @@
-//! What a filter costs: the smallest number with which a closed loop works, such as an input bound or a
+//! The cost of a filter: the smallest number with which a closed loop works, such as an input bound or a
 //! deadline, and profiles and rates compared by it.
 //!
 //! Both are found by running the closed loop, so they are facts about one start, one plant and one u_ref,
@@ -16,19 +16,19 @@ use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 pub struct Loop<'a> {
     /// The plant; its states are the first of the filter's.
     pub plant: &'a dyn DynPlant,
-    /// Time in s and the filter's state: what follows the plant's states in it stays as it is.
+    /// Time in s and the filter's state; the part after the plant's states stays as it is.
     pub start: (f64, &'a [f64]),
     /// h is looked at after each of its substeps, and at the deadlines themselves.
     pub schedule: Schedule,
-    /// Of the barriers, in s from the start; infinite where there is none.
+    /// Deadlines of the barriers, in s from the start; infinite where there is none.
     pub deadlines: &'a [f64],
-    /// How much later than computed an input acts, in s, ≥ 0, at most a step; 0 acts before.
+    /// Time in s from a sample until its input acts, ≥ 0, at most a step; until the first does, 0 acts.
     pub delay: f64,
-    /// Where a promise has been broken the run ends, not before this many seconds after the start.
+    /// Time in s after the start from which a run ends once a promise has been broken.
     pub until: f64,
 }
 
-/// What a closed loop came to.
+/// The result of a closed loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// Whether no promise was broken, and each barrier had one.
@@ -39,7 +39,7 @@ pub struct Run {
     pub peak: [f64; MAX_INPUTS],
     /// Steps that did not satisfy every constraint.
     pub unmet: usize,
-    /// Of each barrier.
+    /// The result for each barrier.
     pub barriers: Vec<Seen>,
     /// Smallest and largest value of each of the plant's states; not a number where one became so.
     pub states: Vec<[f64; 2]>,
@@ -47,7 +47,7 @@ pub struct Run {
     pub end: f64,
 }
 
-/// What was seen of a barrier.
+/// The result for one barrier.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen {
     /// Its promise, by h itself.
@@ -100,7 +100,7 @@ impl Running<'_> {
 
     fn bound(&mut self, x: &[f64]) {
         for (ends, x) in self.run.states.iter_mut().zip(x) {
-            // Once not a number, always so.
+            // Not a number stays so.
             if x.is_nan() || *x < ends[0] {
                 ends[0] = *x;
             }
@@ -203,10 +203,10 @@ pub fn run(
     Ok(run)
 }
 
-/// A number between `low` and `high` (0 < low ≤ high) with which `works` is true, at most `1 + tolerance`
-/// times one with which it is not: the smallest where it works for all larger ones. By bisection of the
-/// ratio. `None` where it does not work at `high`, or the limits are not numbers as above; `low` where it
-/// works there.
+/// The smallest number between `low` and `high` (0 < low ≤ high) with which `works` is true, to a factor of
+/// `1 + tolerance`, by bisection of the ratio. Where `works` is not true for all larger numbers, it is one next to
+/// a number with which it is not. `low` where it works there; `None` where it does not work at `high`, or the
+/// limits are not numbers as above.
 ///
 /// ```
 /// let found = punctual_reference::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
@@ -251,8 +251,8 @@ pub struct Candidate {
     pub rate_times_deadline: f64,
 }
 
-/// What [`compare`] tries: both profiles with rates from slow to the default. Slower ones follow the profile
-/// less tightly, so that an error costs less at once; faster ones ask for more input than the profile.
+/// The candidates that [`compare`] tries: both profiles with rates from slow to the default. Slower ones follow the
+/// profile less tightly, so an error costs less at once. Faster ones ask for more input than the profile.
 pub const CANDIDATES: [Candidate; 8] = {
     const fn of(profile: ProfileKind, rate_times_deadline: f64) -> Candidate {
         Candidate { profile, rate_times_deadline }
@@ -278,10 +278,10 @@ impl Candidate {
     }
 }
 
-/// What a candidate needs.
+/// The input that a candidate needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rating {
-    /// Which.
+    /// The candidate.
     pub candidate: Candidate,
     /// Its peak input without a bound; `None` where its deadlines are not kept even then.
     pub peak: Option<f64>,

@@ -1,8 +1,8 @@
 //! Nominal controllers: something sensible for u_ref, without any promise.
 //!
-//! A filter changes u_ref as little as its rows ask, so what a closed loop looks like is decided by the
-//! nominal controller: with u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`]
-//! is the least that belongs into every loop; [`Heading`] drives to a goal.
+//! A filter changes u_ref as little as its rows ask, so the nominal controller decides how a closed loop looks: with
+//! u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs into every
+//! loop; [`Heading`] drives to a goal.
 
 use punctual_core::error::{Error, finite, positive};
 use punctual_core::scalar::Scalar;
@@ -158,7 +158,7 @@ impl Heading {
     }
 }
 
-/// Of the discs within `clearance` of the straight way from `position` to `goal` the first: the vector to its
+/// The first of the discs within `clearance` of the straight way from `position` to `goal`: the vector to its
 /// centre, and its radius with the clearance.
 fn first_in_the_way(
     position: [f64; 2],
@@ -186,7 +186,7 @@ fn first_in_the_way(
 /// `goal` is shorter: where a tangent from `position` touches the disc of radius `wide`, a little enlarged;
 /// from within that, as far again along its edge and a little outwards.
 fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2] {
-    /// So that the disc is not in the way of what passes it.
+    /// Enlargement of the disc, so that it is not in the way of a vehicle that passes it.
     const ENLARGED: f64 = 1.1;
     /// Sine of the angle away from the disc within it.
     const OUTWARDS: f64 = 0.3;

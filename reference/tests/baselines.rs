@@ -1,7 +1,7 @@
 //! The constraints of the literature in closed loop, against solutions in closed form.
 //!
 //! On a chain of n integrators with h = x₁ the least input is the floor itself, so the state follows the
-//! constraint with equality; held inputs of `STEP` seconds leave an error of first order in it.
+//! constraint with equality. Inputs held for `STEP` seconds leave an error of first order in it.
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::barrier::Barrier;

@@ -7,12 +7,12 @@ use crate::dynamics::Region;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
-/// Where a disc is.
+/// The place of a disc.
 #[derive(Clone, Copy, Debug)]
 enum Centre {
-    /// It moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
+    /// A point that moves at constant velocity: at `start` at t = 0, at `start + velocity · t` later.
     Given { start: [f64; 2], velocity: [f64; 2] },
-    /// At the two states from this one on.
+    /// The two states from this one on.
     State(usize),
 }
 
@@ -47,7 +47,7 @@ impl Centre {
     /// The least distance in m of the point from a position in `region` between the two times.
     fn nearest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let Self::Given { start, velocity } = self else { return None };
-        // As seen from the point: the region moved against the way of the point.
+        // Seen from the point, the region moves against the way of the point.
         let mut seen = *region;
         for (i, side) in seen.sides.iter_mut().enumerate() {
             let way = time.map(|t| start[i] + t * velocity[i]);
@@ -107,20 +107,20 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
     }
 }
 
-/// Interior of a disc, distance-shaped and smooth: h = √(R² + ε²) − √(d² + ε²), in m.
+/// Interior of a disc, distance-shaped and smooth: h = √(R² + b²) − √(d² + b²), in m.
 ///
 /// The first two states are the position. h has the zero set of the disc, a gradient of length
-/// d/√(d² + ε²) < 1, and curvature at most 1/ε; it vanishes only at the centre.
+/// d/√(d² + b²) < 1, and curvature at most 1/b; it vanishes only at the centre.
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceDisc {
     centre: Centre,
     smoothing: f64,
-    /// √(R² + ε²).
+    /// √(R² + b²).
     level: f64,
 }
 
 impl DistanceDisc {
-    /// A disc around `centre` (m) with `radius` R > 0 (m) and `smoothing` ε > 0 (m; R is a good
+    /// A disc around `centre` (m) with `radius` R > 0 (m) and `smoothing` b > 0 (m; R is a good
     /// choice, smaller is closer to the true distance and sharper at the centre).
     ///
     /// # Errors

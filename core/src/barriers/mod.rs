@@ -25,7 +25,7 @@ use nalgebra::SVector;
 use crate::barrier::Barrier;
 use crate::scalar::Scalar;
 
-/// What lies outside another barrier's set: h = −h of the inside.
+/// The outside of another barrier's set: h = −h of the inside.
 ///
 /// `Outside(DistanceDisc::new(..)?)` is an obstacle: kept clear of if the start is outside, left by the
 /// deadline if not. At the centre of the disc the gradient vanishes.

@@ -138,7 +138,7 @@ impl Rectangle {
         Ok(Self { axes: Axes::new(centre, angle)?, half_sides: lengths("half_sides", half_sides)? })
     }
 
-    /// The like of it that contains the true rectangle.
+    /// The same shape, enlarged until it contains the true rectangle.
     pub fn around(self) -> Self {
         Self { half_sides: self.half_sides.map(|side| side * 2_f64.powf(0.25)), ..self }
     }
@@ -203,7 +203,7 @@ impl<const NX: usize> Barrier<NX> for StateBound {
 }
 
 /// One state of bounded size, or two neighbouring ones of bounded length, such as a speed limit:
-/// h = √(L² + ε²) − √(x_i² + x_{i+1}² + ε²) with ε = L/2, in their unit.
+/// h = √(L² + b²) − √(x_i² + x_{i+1}² + b²) with b = L/2, in their unit.
 #[derive(Clone, Copy, Debug)]
 pub struct NormBound {
     first: usize,

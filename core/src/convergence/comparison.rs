@@ -1,16 +1,15 @@
 //! The comparison lemma, any order.
 //!
-//! For a constant real rate a and e ∈ Cⁿ put p(τ) = e^{aτ} e(τ). Then p⁽ⁿ⁾ = e^{aτ} (D + a)ⁿ e with
-//! D = d/dt, and Taylor's formula with integral remainder gives: if (D + a)ⁿ e ≥ 0 on [0, τ], then
+//! Let (D + a)ⁿ e ≥ 0 on [0, τ] for a real rate a, with D = d/dt. Then
 //!
 //! ```math
 //! \begin{aligned}
-//! e(\tau) &\ge e^{-a\tau} P(\tau), \qquad P(\tau) = \sum_{k<n} c_k \tau^k, \\
+//! e(\tau) &\ge \exp(-a\tau)\, P(\tau), \qquad P(\tau) = \sum_{k<n} c_k \tau^k, \\
 //! c_k &= \frac{1}{k!} \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}(0),
 //! \end{aligned} \tag{L}
 //! ```
 //!
-//! with equality if the constraint is active throughout.
+//! with equality where the constraint is active throughout. The proof is in `docs/theory.md#comparison-lemma`.
 //!
 //! # References
 //!
@@ -83,7 +82,7 @@ pub fn coefficients(rate: f64, e: &[f64]) -> Stack {
     c
 }
 
-/// The lower bound e^{−aτ} P(τ) of (L) at `elapsed` = τ ≥ 0.
+/// The lower bound exp(−aτ) P(τ) of (L) at `elapsed` = τ ≥ 0.
 pub fn lower_bound(rate: f64, e: &[f64], elapsed: f64) -> f64 {
     let c = coefficients(rate, e);
     let p = c[..e.len()].iter().rev().fold(0.0, |sum, &ck| sum * elapsed + ck);

@@ -1,12 +1,12 @@
-//! The seam of every constraint: a floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
+//! The trait that every constraint implements: a floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
 //!
-//! One file per method implements [`Condition`]: [`reference_profile`](super::reference_profile),
+//! One file per method implements [`Condition`]: `reference_profile`,
 //! [`repeated_root`](super::repeated_root), [`first_order`](super::first_order) on the way to the set,
-//! [`stay`](super::stay) inside it. A user's own one takes the place of the first three
+//! [`stay`](super::stay) inside it. A user's own condition takes the place of the first three
 //! ([`FixedTime::with_condition`](super::FixedTime::with_condition)); all else of a filter stays as it is.
 //!
 //! A new method is a file here that implements the trait, a variant of [`Method`](super::Method) and one of
-//! [`Approach`](super::approach::Approach), which makes the one from the other.
+//! `Approach`, which makes the one from the other.
 
 use super::comparison::Stack;
 use super::fixed_time::Refusal;
@@ -14,7 +14,7 @@ use super::operator::Operator;
 use super::profile::Derivatives;
 use crate::MAX_RELATIVE_DEGREE;
 
-/// Nothing is known to be off.
+/// No error of any derivative.
 const EXACT: Stack = [0.0; MAX_RELATIVE_DEGREE];
 
 /// A sample, as a condition sees it. With e = h − μ:
@@ -29,13 +29,13 @@ pub struct Sample<'a> {
     pub elapsed: f64,
     /// e⁽ʲ⁾ now, `[h]`/sʲ, j < n.
     pub e: &'a [f64],
-    /// A bound ≥ 0 on what e⁽ʲ⁾ is off, j < n at least. Default: 0.
+    /// A bound ≥ 0 on the error of e⁽ʲ⁾, j < n at least. Default: 0.
     pub errors: &'a [f64],
     /// μ in `[h]`. Default: 0.
     pub margin: f64,
     /// a in 1/s, as [`Condition::anchor`] chose it. Default: 0.
     pub rate: f64,
-    /// What leads back to a larger margin, `[h]`/sⁿ. Of the stay constraint only. Default: 0.
+    /// The part of the floor that leads back to a larger margin, `[h]`/sⁿ. Of the stay constraint only. Default: 0.
     pub pull: f64,
     /// Whether [`Condition::anchor`] fell back on something else. Default: false.
     pub fallback: bool,
@@ -79,10 +79,10 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// What a condition asks for at a sample.
+/// The floor that a condition sets at a sample, and what it promises.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
-    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ. What is not finite is reported as
+    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ. One that is not finite is reported as
     /// [`Status::Singular`](crate::filter::Status::Singular).
     pub floor: f64,
     /// The lower bound on e that the condition promises now, `[h]`; −∞ where it promises none.
@@ -98,7 +98,7 @@ impl Bound {
     }
 }
 
-/// What is known where a promise is anchored.
+/// The data from which a condition is anchored.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Anchoring<'a> {
@@ -106,7 +106,7 @@ pub struct Anchoring<'a> {
     pub h: &'a [f64],
     /// T in s from now; ≤ 0 where it has passed.
     pub deadline: f64,
-    /// For how long inputs are held, in s; 0 where they are not, or where it is not known.
+    /// The time in s for which inputs are held; 0 where they are not, or where it is not known.
     pub period: f64,
     /// The margin of the settings, `[h]`.
     pub margin: f64,
@@ -133,10 +133,10 @@ impl Anchoring<'_> {
     }
 }
 
-/// What a condition chooses at an anchor.
+/// The choice of a condition at an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchored {
-    /// μ in `[h]`: the settings' margin and what held inputs cost.
+    /// μ in `[h]`: the settings' margin and the expected cost of held inputs.
     pub margin: f64,
     /// a in 1/s.
     pub rate: f64,
@@ -146,30 +146,30 @@ pub struct Anchored {
     pub applies: bool,
 }
 
-/// What else a promise may do with a condition.
+/// Further uses that a promise may make of a condition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Abilities {
     /// The stay constraint takes over inside the set. Without it the condition is enforced for ever, and the phases tell
     /// only what is seen.
     pub hands_over: bool,
-    /// Its margin covers what held inputs cost, and changes where samples turn out to be further apart.
+    /// Its margin covers the cost of held inputs, and changes where samples turn out to be further apart.
     pub covers_holds: bool,
     /// Its bound allows for [errors](Sample::errors) of the derivatives.
     pub allows_errors: bool,
-    /// It may start anew on the way at any time, and has its theorem again.
+    /// It may start anew on the way at any time, and its theorem then applies again.
     pub restarts: bool,
 }
 
-/// What of a promise changes with h at the sample that anchors it.
+/// The derivative of an anchor where h moves at the sample that anchors.
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct AnchorChange {
-    /// Of e⁽ʲ⁾ at the anchor.
+    /// Derivatives of e⁽ʲ⁾ at the anchor.
     pub anchor: Stack,
-    /// Of the margin.
+    /// Derivative of the margin.
     pub margin: f64,
-    /// Of the rate.
+    /// Derivative of the rate.
     pub rate: f64,
 }
 
@@ -188,10 +188,10 @@ pub enum Rates {
 /// [`bound`](Self::bound) is required. The defaults are those of a condition without a theorem, enforced at the
 /// samples only.
 pub trait Condition {
-    /// φ and what it promises, at a sample.
+    /// The floor φ at a sample, and what it promises.
     fn bound(&self, at: &Sample) -> Bound;
 
-    /// What else a promise may do with it.
+    /// Further uses that a promise may make of it.
     fn abilities(&self) -> Abilities {
         Abilities::default()
     }
@@ -201,7 +201,7 @@ pub trait Condition {
         Anchored { margin: at.margin, rate: at.stay_rate, fallback: false, applies: false }
     }
 
-    /// Why it [fell back](Anchored::fallback) at the anchor of `at`.
+    /// The reason why it [fell back](Anchored::fallback) at the anchor of `at`.
     fn refusal(&self, _at: &Sample) -> Option<Refusal> {
         None
     }
@@ -217,19 +217,19 @@ pub trait Condition {
         [0.0; MAX_RELATIVE_DEGREE + 1]
     }
 
-    /// How what [`anchor`](Self::anchor) chose changes where h (`h[0]`) moves along `h[1]`; `None` where it is not known.
-    /// `period` is that of the anchor.
+    /// The derivative of what [`anchor`](Self::anchor) chose where h (`h[0]`) moves along `h[1]`; `None` where it is
+    /// not known. `period` is that of the anchor.
     fn anchor_change(&self, _at: &Sample, _h: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
         None
     }
 
-    /// How the floor and the lower bound on e change where e moves along `de`, and the anchor by `change` if this is its
-    /// sample. `None` where it is not known.
+    /// The derivatives of the floor and of the lower bound on e where e moves along `de`, and the anchor by `change` if
+    /// this is its sample. `None` where they are not known.
     fn bound_change(&self, _at: &Sample, _change: Option<&AnchorChange>, _de: &[f64]) -> Option<[f64; 2]> {
         None
     }
 
-    /// How [`profile`](Self::profile) changes where the anchor changes by `change`; `None` where it is not known.
+    /// The derivative of [`profile`](Self::profile) where the anchor changes by `change`; `None` where it is not known.
     fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
         Some([0.0; MAX_RELATIVE_DEGREE + 1])
     }

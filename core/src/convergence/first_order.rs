@@ -1,17 +1,17 @@
 //! The first-order fixed-time condition, for relative degree 1.
 //!
-//! Below zero, ė ≥ α |e|^p with p in (0, 1) makes |e|^{1−p} fall at least at the rate (1 − p) α:
+//! Let ė ≥ α |e|^p below zero, with p in (0, 1). Then
 //!
 //! ```math
 //! \begin{aligned}
-//! |e(\tau)|^{1-p} &\le |e_0|^{1-p} - (1-p)\,\alpha\tau, \qquad \alpha = \frac{|e_0|^{1-p}}{(1-p)\,T}, \\
-//! e(\tau) &\ge e_0 \left(1 - \frac{\tau}{T}\right)^{1/(1-p)},
+//! |e(\tau)|^{1-p} &\le |e(0)|^{1-p} - (1-p)\,\alpha\tau, \qquad \alpha = \frac{|e(0)|^{1-p}}{(1-p)\,T}, \\
+//! e(\tau) &\ge e(0) \left(1 - \frac{\tau}{T}\right)^{1/(1-p)},
 //! \end{aligned} \tag{F}
 //! ```
 //!
-//! with equality if the condition is active throughout, so e reaches zero at T exactly. It is the
-//! reference profile r = e₀ (1 − τ/T)^{1/(1−p)} made a feedback of e: written with the rate
-//! a = 1/((1 − p) T) in 1/s, α |e|^p = a |e₀| (|e|/|e₀|)^p.
+//! with equality where the condition is active throughout, so e reaches zero at T exactly
+//! (`docs/theory.md#first-order-condition`). The condition is the reference profile r = e(0) (1 − τ/T)^{1/(1−p)} made a
+//! feedback of e. With the rate a = 1/((1 − p) T) in 1/s, α |e|^p = a |e(0)| (|e|/|e(0)|)^p.
 //!
 //! The two differ after a disturbance. The profile pulls a lost error back at a rate of its own, so
 //! that it still arrives near T; (F) forgets it and arrives late by (|e|^{1−p} − |r|^{1−p})/((1 − p) α).
@@ -39,7 +39,7 @@ use crate::error::{Error, ErrorKind};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent(f64);
 
-/// Never not-a-number, so equality is an equivalence.
+/// Equality is an equivalence, as p is never not-a-number.
 impl Eq for Exponent {}
 
 impl Default for Exponent {
@@ -73,7 +73,7 @@ impl Exponent {
         1.0 / ((1.0 - self.0) * deadline)
     }
 
-    /// The least ė allowed at `e` < 0 on the way from `anchor` = e₀ < 0, `[e]`/s; 0 for e ≥ 0.
+    /// The least ė allowed at `e` < 0 on the way from `anchor` = e(0) < 0, `[e]`/s; 0 for e ≥ 0.
     pub fn floor(self, anchor: f64, deadline: f64, e: f64) -> f64 {
         if e >= 0.0 {
             return 0.0;
@@ -90,7 +90,7 @@ impl Exponent {
         [-rate * (1.0 - self.0) * power, -rate * self.0 * power * anchor / e]
     }
 
-    /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e₀ < 0, `[e]`; 0 from T on.
+    /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e(0) < 0, `[e]`; 0 from T on.
     pub fn lower_bound(self, anchor: f64, deadline: f64, elapsed: f64) -> f64 {
         anchor * (1.0 - elapsed / deadline).max(0.0).powf(1.0 / (1.0 - self.0))
     }

@@ -21,7 +21,7 @@ use crate::error::{Error, ErrorKind, positive};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DerivativeBound {
-    /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: what the constraint asks for, and the disturbance on top.
+    /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: the floor of the constraint, and the disturbance on top.
     pub floor: f64,
     /// The lower bound on h that the constraint promises now, `[h]`.
     pub profile: f64,
@@ -30,19 +30,18 @@ pub struct DerivativeBound {
 }
 
 impl DerivativeBound {
-    /// Asks for nothing.
+    /// The bound that asks for nothing.
     pub const NONE: Self = Self { floor: f64::NEG_INFINITY, profile: 0.0, time_left: 0.0 };
 }
 
-/// Why the configured method cannot be used from an anchor.
+/// The reason why the configured method cannot be used from an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate,
-    /// which leads towards the set without a deadline; nothing is guaranteed until the stay constraint
-    /// takes over.
+    /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate. That
+    /// leads towards the set without a deadline, and guarantees nothing until the stay constraint takes over.
     NoAdmissibleRate(NoAdmissibleRate),
-    /// The profile of one's own is not one from this anchor. In its place: the Hermite profile, with its
+    /// The profile of one's own fails its check from this anchor. In its place: the Hermite profile, with its
     /// guarantee.
     Profile(ProfileError),
 }
@@ -100,10 +99,11 @@ impl FixedTime {
         Ok(Self { approach: Approach::Profile(reference.along(Arc::new(profile))), ..self })
     }
 
-    /// A constraint of one's own in place of the settings' method: of these only deadline, margin and
-    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed,
-    /// the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again), and it is enforced at the
-    /// samples only, whatever [`Sampling`](crate::filter::Sampling) says.
+    /// A constraint of one's own in place of the settings' method. Of the settings only deadline, margin and
+    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed
+    /// and the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its
+    /// [rates](Condition::rates), it is enforced at the samples only, under any
+    /// [`Sampling`](crate::filter::Sampling).
     ///
     /// # Errors
     ///
@@ -156,17 +156,17 @@ impl FixedTime {
     }
 
     /// Moves `state` to the sample at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite), and
-    /// returns what the constraint asks for there.
+    /// returns the floor of the constraint there.
     ///
     /// The first call anchors, as [`Self::anchor`] with the configured deadline and no period does. Arrival is
-    /// the first sample with h ≥ 0; the stay constraint takes over at the first sample at which h ≥ μ *and*
-    /// it is invariant from there ([`stay::is_invariant`]): at the anchor itself for a start well inside.
+    /// the first sample with h ≥ 0. The stay constraint takes over at the first sample at which h ≥ μ *and* it is
+    /// invariant from there ([`is_invariant`](super::stay::is_invariant)). A start inside is kept from the anchor on.
     pub fn advance(&self, state: &mut FixedTimeState, t: f64, h: &[f64]) -> DerivativeBound {
         self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
     }
 
-    /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0: what starts a theorem starts from the smallest
-    /// derivatives there can be, and what ends one is h < 0 for certain. Arrival stays that of `h` as it is given.
+    /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0. A theorem starts from the smallest derivatives
+    /// there can be, and ends where h < 0 for certain. Arrival stays that of `h` as it is given.
     pub fn advance_within(
         &self,
         state: &mut FixedTimeState,
@@ -177,8 +177,7 @@ impl FixedTime {
         self.advance_by(state, t, h, errors, &Means { hold: state.period, ..Means::UNKNOWN })
     }
 
-    /// As [`Self::advance_within`], where `means` says what plant and inputs can do: the rate of the stay constraint is
-    /// chosen for that.
+    /// As [`Self::advance_within`], with the stay rate chosen for what plant and inputs can do (`means`).
     pub fn advance_by(
         &self,
         state: &mut FixedTimeState,
@@ -212,15 +211,16 @@ impl FixedTime {
         let h: &[f64; N] = h.first_chunk().expect("n derivatives");
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
+        // Anchor at the first sample, and anew where a set that has a recovery time was left.
         if state.phase == Phase::Waiting {
             self.anchor(state, t, &lowest, self.deadline(), 0.0);
         }
-        // What was promised is broken where the set is left; a new promise is for later samples to give.
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
             self.anchor(state, t, &lowest, recovery, state.period);
             state.recoveries = state.recoveries.saturating_add(1);
         }
+        // Note the arrival, and move on to the phase that begins here.
         let elapsed = state.elapsed(t);
         let is_over = elapsed >= state.deadline;
         if h[0] >= 0.0 && state.arrival.is_none() {
@@ -231,12 +231,13 @@ impl FixedTime {
             let (before, margin) = (state.phase, state.margin);
             state.change_phase(seen, || Stay(&self.settings).can_keep(&lowest, margin, means));
             if (before, state.phase) == (Phase::Approach, Phase::Stay) {
-                // How h can be influenced far outside says nothing of how it can be here.
+                // The largest gain is that of the inside from here on: far outside it may have been another.
                 state.gain *= means.weight;
             }
         } else {
             state.observe(seen);
         }
+        // The floor of the condition in force. Leaving the set breaks its promise, even where a new one begins here.
         let (floor, profile) = self.enforce(state, elapsed, h, &lowest, errors, means);
         state.guaranteed &= !was_left;
         let floor = floor + self.settings.disturbance;
@@ -245,7 +246,7 @@ impl FixedTime {
         DerivativeBound { floor, profile, time_left }
     }
 
-    /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force; whether its theorem applies, to `state`.
+    /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force. Notes in `state` whether its theorem applies.
     #[inline(always)]
     fn enforce<const N: usize>(
         &self,
@@ -323,8 +324,8 @@ impl FixedTime {
         Stay(&self.settings).is_even(state)
     }
 
-    /// Why the configured method is not the one in force since the anchor in `state`, if it is not:
-    /// `None` too before the anchor. Computed anew: not for every step.
+    /// The reason why another method than the configured one is in force since the anchor in `state`. `None` where
+    /// it is the configured one, and before the anchor. Computed anew: not for every step.
     pub fn refusal(&self, state: &FixedTimeState) -> Option<Refusal> {
         if !state.fallback || state.phase == Phase::Waiting {
             return None;
@@ -372,10 +373,10 @@ impl FixedTime {
         };
     }
 
-    /// Takes into account, on the way, that inputs are held for `period` > 0 seconds: margin and default
-    /// rates become what they would have been had it been known at the anchor. With the reference profile
-    /// h − μ − r changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin; other methods
-    /// take none.
+    /// Takes into account, on the way, that inputs are held for `period` > 0 seconds. Margin and default rates
+    /// become what they would have been had it been known at the anchor. With the reference profile h − μ − r
+    /// changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin (`docs/theory.md#period`). Other
+    /// methods take none.
     pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
         if !self.approach.abilities().covers_holds {
             return;
@@ -387,12 +388,12 @@ impl FixedTime {
         (state.arrival, state.guaranteed, state.phase, state.gain) = (arrival, guaranteed, phase, gain);
     }
 
-    /// Starts the condition anew from the sample at time `t` (s) that `state` has been moved to, where `h` holds the smallest
-    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there, if the theorem has been lost on the way to it: with the time that is left until the same
-    /// deadline. The error is zero again, so the theorem applies again. Returns whether it did.
+    /// Starts the condition anew from the sample at time `t` (s) if its theorem has been lost on the way there. `state`
+    /// has been moved to that sample, and `h` holds the smallest h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there. The deadline stays the same. The
+    /// error is zero again, so the theorem applies again. Returns whether it started anew.
     ///
-    /// Not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a profile of
-    /// one's own, whose check takes long.
+    /// It does not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a
+    /// profile of one's own, whose check takes long.
     pub fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
         /// Samples, and part of the configured deadline, that must be left.
         const SAMPLES: f64 = 10.0;

@@ -1,19 +1,18 @@
-//! The reference profile: a polynomial that leaves the anchor with the given derivatives and lands
-//! flat on zero at the deadline.
+//! The reference profile: a polynomial that leaves the anchor with the given derivatives and lands flat on zero at the
+//! deadline.
 //!
 //! With s = τ/T and y_j = e⁽ʲ⁾(0) Tʲ/j!, the two-point Hermite interpolant of degree 2n − 1 is
 //!
 //! ```math
 //! \begin{aligned}
-//! r(\tau) &= (1-s)^n\, q(s), \qquad q(s) = \sum_{k<n} q_k s^k, \\
+//! r(\tau) &= (1-s)^n \sum_{k<n} q_k s^k, \\
 //! q_k &= \sum_{j\le k} y_j \binom{n-1+k-j}{k-j} \qquad \text{for } \tau < T, \qquad r = 0 \text{ from } T \text{ on}.
 //! \end{aligned} \tag{H}
 //! ```
 //!
-//! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n, and r minimises ∫ (r⁽ⁿ⁾)². Enforcing
-//! (D + a)ⁿ (e − r) ≥ 0 with any a > 0 starts from a zero error, so by the comparison lemma e ≥ r for
-//! ever: e(T) ≥ 0 and e ≥ 0 after it, for every n, every T > 0 and all initial data, with no root to find.
-//! The factored form keeps its relative accuracy near s = 1, where the monomial form cancels.
+//! r⁽ʲ⁾(0) = e⁽ʲ⁾(0) and r⁽ʲ⁾(T) = 0 for j < n. Among all such r it has the least ∫ (r⁽ⁿ⁾)². It exists for every n,
+//! every T > 0 and all initial data, with no root to find (`docs/theory.md#hermite-profile`). The factored form keeps
+//! its relative accuracy near s = 1, where the monomial form cancels.
 
 use super::profile::{Derivatives, Profile};
 use crate::MAX_RELATIVE_DEGREE;

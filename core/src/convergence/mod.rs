@@ -14,9 +14,10 @@
 //!
 //! A constraint that is none of these takes their place as a [`condition`].
 //!
-//! The promises hold for the continuous-time constraint. An input that is held between samples
-//! breaks the constraint by up to its change over one period, which the margin μ has to absorb;
-//! [`sampled`] is the form of the constraint for such an input, which loses far less.
+//! The promises hold for the continuous-time constraint. An input that is held between samples breaks it by up to its
+//! change over one period, which the margin μ has to absorb. [`sampled`] is the constraint for such an input, and loses
+//! far less. `docs/theory.md` has the proofs: `docs/theory.md#comparison-lemma` for all methods,
+//! `docs/theory.md#held-inputs` for held inputs.
 
 mod approach;
 pub mod comparison;

@@ -1,19 +1,14 @@
 //! The error dynamics Π (D + a_i) with n positive rates, equal or not.
 //!
-//! # Derivation
-//!
-//! With the elementary symmetric polynomials σ_k of the rates,
-//!
 //! ```math
-//! \prod_{i\le n} (D + a_i)\, e = \sum_{j\le n} \sigma_{n-j}\, e^{(j)}, \qquad \sigma_0 = 1. \tag{O}
+//! \prod_{i\le n} (D + a_i)\, e = \sum_{j\le n} \gamma_j\, e^{(j)}, \qquad \gamma_n = 1, \tag{O}
 //! ```
 //!
-//! Put e_0 = e and e_i = (D + a_i) e_{i−1}. If e_n ≥ 0 and e_i(0) ≥ 0 then e_{i}(τ) ≥ e^{−a_{i+1}τ} e_i(0)
-//! ≥ 0 follows from e_{i+1} ≥ 0, one order at a time: all e_i(0) ≥ 0, i < n, give e ≥ 0 for ever. For
-//! equal rates e_i(0) = i! c_i, the coefficients of the comparison lemma.
-//!
-//! The condition at the start depends on the order of the rates, the constraint does not: e_i ≥ 0 for
-//! one order suffices. From a zero error, as on a reference profile, it holds in any order.
+//! γ_j the elementary symmetric polynomial of degree n − j of the rates. With ψ_0 = e and ψ_i = (D + a_i) ψ_{i−1},
+//! the constraint ψ_n ≥ 0 keeps e ≥ 0 for ever if ψ_i(0) ≥ 0 for all i < n (`docs/theory.md#rates-lemma`). That
+//! condition depends on the order of the rates, the constraint does not: one order suffices. From a zero error, as on
+//! a reference profile, it holds in any order. For equal rates ψ_i(0) = i! c_i, the coefficients of
+//! [`comparison`](super::comparison).
 //!
 //! # References
 //!
@@ -29,7 +24,7 @@ use crate::error::{Error, ErrorKind, positive};
 pub struct Operator {
     n: usize,
     rates: Stack,
-    /// The coefficient of e⁽ʲ⁾, σ_{n−j} in 1/s^{n−j}.
+    /// The coefficient of e⁽ʲ⁾, γ_j in 1/s^{n−j}.
     coefficients: Stack,
 }
 
@@ -49,7 +44,7 @@ fn lower_coefficients(rates: &[f64]) -> Stack {
 /// Π (D + a_i) e = (D + `last`) Σ_k `weights[k]` e⁽ᵏ⁾.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Split {
-    /// Of n − 1 rates, its leading coefficient 1 among them; zeros above.
+    /// Coefficients for n − 1 rates, the leading 1 among them; zeros above.
     pub(super) weights: Stack,
     /// a_n in 1/s.
     pub(super) last: f64,
@@ -89,7 +84,7 @@ impl Operator {
         self.n
     }
 
-    /// The coefficients of e⁽⁰⁾ … e⁽ⁿ⁻¹⁾: σ_n … σ_1. That of e⁽ⁿ⁾ is 1.
+    /// The coefficients of e⁽⁰⁾ … e⁽ⁿ⁻¹⁾: γ_0 … γ_{n−1}. That of e⁽ⁿ⁾ is 1.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients[..self.n]
     }
@@ -108,7 +103,7 @@ impl Operator {
         Split { weights, last }
     }
 
-    /// Whether Π (D + a_i) e ≥ 0 keeps e ≥ 0 for ever from `e`: all e_i ≥ 0, i < n, the rates taken in
+    /// Whether Π (D + a_i) e ≥ 0 keeps e ≥ 0 for ever from `e`: all ψ_i ≥ 0, i < n, the rates taken in
     /// the order given.
     pub fn is_invariant(&self, e: &[f64]) -> bool {
         let mut cascade = [0.0; MAX_RELATIVE_DEGREE];
@@ -134,7 +129,7 @@ impl Operator {
         let (mut least, mut product) = (f64::INFINITY, 1.0);
         for i in 0..self.n {
             let margin = cascade[0] / product;
-            // Not `f64::min`, which would drop what is not a number.
+            // Not `f64::min`, which would drop not-a-number.
             if margin < least || margin.is_nan() {
                 least = margin;
             }

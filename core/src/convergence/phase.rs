@@ -1,8 +1,8 @@
-//! Where a barrier stands with its promise, and what moves it on: docs/theory.md section 5. Knows no method.
+//! The phases of a promise, and the samples that move it on (docs/theory.md, sections 6 and 8). Knows no method.
 
 use super::state::FixedTimeState;
 
-/// Where a barrier stands with its promise.
+/// The phase of a barrier's promise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u8)]
@@ -65,7 +65,7 @@ impl Phase {
     }
 }
 
-/// What a sample shows of h, where h is known to an error.
+/// The side of the set that a sample shows, where h is known to an error.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// h ≥ 0 for certain.
@@ -92,7 +92,7 @@ impl FixedTimeState {
         self.guaranteed &= !matches!(self.phase, Phase::Late | Phase::Left);
     }
 
-    /// The same under a condition that is enforced for ever: what h has done so far.
+    /// Moves on to the phase that h itself shows, under a condition that is enforced for ever.
     pub(super) fn observe(&mut self, seen: Seen) {
         self.phase = match self.arrival {
             _ if seen.is_inside => Phase::Stay,

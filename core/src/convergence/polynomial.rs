@@ -1,9 +1,9 @@
-//! Real roots of polynomials of small degree, all of them, to the accuracy their data allow.
+//! All real roots of polynomials of small degree, to the accuracy that their data allow.
 //!
 //! Between two neighbouring real zeros of p' the polynomial is monotone, so every real zero of p lies
 //! alone in one of the intervals that the zeros of p' cut out, or is one of those zeros (a multiple
 //! root). Going up from the linear derivative, each zero is bracketed by a change of sign and found by
-//! bisection to the last bit; nothing diverges and none is missed, whatever the scales. All real zeros
+//! bisection to the last bit. Nothing diverges and none is missed, whatever the scales. All real zeros
 //! of a polynomial of degree d lie within Fujiwara's bound
 //!
 //! ```math

@@ -1,15 +1,14 @@
 //! Reference profiles of one's own, checked before they are trusted.
 //!
-//! # Derivation
-//!
-//! Let r ∈ Cⁿ⁻¹ with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and r ≥ 0 from T on. Enforcing
+//! Let r be n − 1 times continuously differentiable with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and
+//! r ≥ 0 from T on. Enforcing
 //!
 //! ```math
 //! \prod_{i\le n} (D + a_i)\, (e - r) \ge 0, \qquad a_i > 0 \tag{P}
 //! ```
 //!
-//! starts from a zero error, so e ≥ r for ever ([`super::operator`]): e(T) ≥ 0 and e ≥ 0 after it.
-//! [`Hermite`] is one such r; another may leave faster, arrive inside, or wait.
+//! keeps e ≥ r for ever (`docs/theory.md#profile`), and so e ≥ 0 from T on. [`Hermite`] is one such r. Another may
+//! leave faster, arrive inside, or wait.
 //!
 //! **The check.** Whether a function is the derivative of another is decided by the fundamental
 //! theorem, independently of how either was written: r⁽ᵏ⁻¹⁾(b) − r⁽ᵏ⁻¹⁾(a) against ∫ r⁽ᵏ⁾ by Gauss' rule
@@ -36,9 +35,8 @@ pub trait Profile {
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of what [`Self::evaluate`] gives, where the anchor (`anchor[0]`) moves along a direction
-    /// (`anchor[1]`); for [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not
-    /// know it.
+    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for
+    /// [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not know it.
     fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
         None
     }
@@ -53,16 +51,13 @@ impl<F: Fn(&[f64], f64, f64) -> Derivatives> Profile for F {
 /// The profile of least peak |r⁽ⁿ⁾| that lands flat on zero, for n = 1 and 2; for higher orders the
 /// Hermite profile.
 ///
-/// n = 1: r = e (1 − s) with s = τ/T. n = 2: r″ = A/T² until s₁T and −A/T² from then on. With v = ėT and
-/// w = e + v/2 the two conditions at T are A(2s₁ − 1) = −v and A s₁(1 − s₁) = −w, so A² + 4wA − v² = 0:
+/// n = 1: r = e (1 − s) with s = τ/T. n = 2: r̈ = K/T² until s₁T and −K/T² from then on. With y₀ = e and y₁ = ėT,
 ///
 /// ```text
-/// A = −2 sign(w) (|w| + √(w² + v²/4)),   s₁ = ½ − v/(2A).                               (B)
+/// K = −2 sign(y₀ + y₁/2) (|y₀ + y₁/2| + √((y₀ + y₁/2)² + y₁²/4)),   s₁ = ½ − y₁/(2K).                (B)
 /// ```
 ///
-/// This root has |A| ≥ |v|, and so s₁ in [0, 1]. No other r with these ends has a smaller peak: the
-/// difference d of one with |r″| < |A|/T² has d″ of one sign until s₁T and of the other after it, so that
-/// ∫ (s₁T − τ) d″ dτ ≠ 0; but d and ḋ vanish at both ends, and then it is 0.
+/// `docs/theory.md#least-peak` has the proof.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LowPeak;
 
@@ -90,7 +85,7 @@ impl Profile for LowPeak {
         r
     }
 
-    /// Linear but for n = 2, where (B) gives A' (2A + 4w) = 2vv' − 4Aw'.
+    /// Linear but for n = 2, where (B) gives K' (2K + 4w) = 2y₁y₁' − 4Kw' with w = y₀ + y₁/2.
     fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
         let ([e, de], [e_along, de_along]) = (anchor, direction) else {
             return Some(self.evaluate(direction, deadline, elapsed));
@@ -118,7 +113,7 @@ impl Profile for LowPeak {
 /// any mistake in one.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// What is wrong with a profile.
+/// A defect of a profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ProfileError {
@@ -205,6 +200,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
     let size = |r: &Derivatives| {
         (0..=n).fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * deadline.powi(k as i32)).abs()))
     };
+    // It leaves from the anchor.
     let mut largest = size(&start);
     for (order, (&found, &wanted)) in start.iter().zip(anchor).enumerate() {
         if (found - wanted).abs() * deadline.powi(order as i32) > TOLERANCE * largest {
@@ -220,6 +216,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
         let whole = profile.mean(a, b)?;
         let middle = a + (b - a) / 2.0;
         let (first, second) = (profile.mean(a, middle)?, profile.mean(middle, b)?);
+        // Each derivative has the mean that the one before says.
         for order in 1..=n {
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);

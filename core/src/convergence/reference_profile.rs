@@ -1,7 +1,7 @@
-//! Follow a reference profile: Π (D + a_i)(h − μ − r) ≥ 0, docs/theory.md section 4.
+//! The condition that follows a reference profile: Π (D + a_i)(h − μ − r) ≥ 0.
 //!
-//! The error starts at zero, so by the comparison lemma h ≥ μ + r for ever. The profiles themselves are in
-//! [`profile`](super::profile).
+//! The error starts at zero, so h ≥ μ + r for ever (`docs/theory.md#profile`). The profiles themselves are in
+//! [`profile`].
 
 use std::sync::Arc;
 
@@ -67,7 +67,7 @@ impl ReferenceProfile {
         }
     }
 
-    /// As in [`PeriodBound`](sampled::PeriodBound), for errors against the profile.
+    /// The attenuation of a [`PeriodBound`](sampled::PeriodBound), for errors against the profile.
     fn attenuation(&self, rate: f64, n: usize, time_left: f64) -> f64 {
         match &self.rates {
             Some(rates) => rates.without_last().weights[0],
@@ -91,7 +91,7 @@ impl Condition for ReferenceProfile {
             lowest[k] = error[k] - at.errors[k];
         }
         let (error, lowest) = (&error[..n], &lowest[..n]);
-        // The lemma with what is left of the margin: from this sample on h ≥ r, if the constraint holds.
+        // The lemma applies with what is left of the margin: h ≥ r from this sample on, if the constraint holds.
         let left = at.margin
             + match &self.rates {
                 Some(rates) => rates.affordable_margin(lowest),

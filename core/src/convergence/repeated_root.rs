@@ -1,61 +1,32 @@
-//! The paper's method for any order: (D + a)ⁿ e ≥ 0 with the constant rate a for which the bound
-//! reaches zero at T.
+//! The paper's method for any order: (D + a)ⁿ e ≥ 0 with the constant rate a for which the bound reaches zero at T.
 //!
-//! # Derivation
-//!
-//! P(T) = 0 in the comparison lemma is, with y_j = e⁽ʲ⁾(0) Tʲ/j!, s = aT and E_m(s) = Σ_{i≤m} sⁱ/i!,
+//! P(T) = 0 in the comparison lemma is, with y_j = e⁽ʲ⁾(0) Tʲ/j!, ρ = aT and E_m(ρ) = Σ_{i≤m} ρⁱ/i!,
 //!
 //! ```math
-//! R(s) = \sum_{j<n} y_j\, E_{n-1-j}(s) = \sum_{i<n} (y_0 + \dots + y_{n-1-i})\, \frac{s^i}{i!} = 0. \tag{R}
+//! Y_n(\rho) = \sum_{j<n} y_j\, E_{n-1-j}(\rho) = \sum_{i<n} (y_0 + \dots + y_{n-1-i})\, \frac{\rho^i}{i!} = 0. \tag{R}
 //! ```
 //!
-//! For n = 2: s = −(e₀ + e₁T)/e₀, the paper's c = a/T = (−e₀ − e₁T)/(e₀T²). A root is *admissible* if T
-//! is the last zero of P on τ > 0 and c_{n−1} ≥ 0, so that the bound e^{−aτ} P(τ) stays ≥ 0 after T.
+//! For n = 2: ρ = −(e(0) + ė(0)T)/e(0), the paper's c = a/T. A root is *admissible* if T is the last zero of P on τ > 0
+//! and P is positive after it, so that the bound exp(−aτ) P(τ) stays ≥ 0 after T.
 //!
-//! **Theorem.** Let e₀ < 0. The largest real root of (R) is admissible; so an admissible rate exists
-//! if and only if (R) has a real root.
+//! Let e(0) < 0. The largest real root of (R) is admissible, so an admissible rate exists if and only if (R) has a real
+//! root. For even n every T > 0 has one. For odd n the deadlines that have one are a ray [T_min, ∞), or there is none
+//! ([`deadlines`]); for n = 1 there is none. `docs/theory.md#admissible-rate` has the proof.
 //!
-//! *Proof.* Write e_a(τ) = e^{−aτ} P(τ) for the bound with rate a. Since dE_m/ds = E_{m−1}, the
-//! derivative of P by a at fixed τ is τ (P − c_{n−1} τ^{n−1}), hence
-//! ∂e_a(τ)/∂a = −τⁿ e^{−aτ} C(a) with
-//!
-//! ```math
-//! \begin{aligned}
-//! C(v) &= c_{n-1}(v) = \sum_{j<n} \frac{e^{(j)}(0)\, v^{n-1-j}}{j!\,(n-1-j)!}, \\
-//! e_a(\tau) &= \tau^n \int_a^\infty e^{-v\tau}\, C(v)\, dv \qquad \text{for } \tau > 0,
-//! \end{aligned} \tag{I}
-//! ```
-//!
-//! because e_a(τ) → 0 as a → ∞. Let a be the largest root and H(v) = ∫_v^∞ e^{−wT} C(w) dw; H has the
-//! sign of (R) at v, so H(a) = 0, and H < 0 for v > a as C → −∞. For τ > T integrate (I) by parts:
-//!
-//! ```math
-//! \frac{e_a(\tau)}{\tau^n} = -(\tau - T) \int_a^\infty e^{-v(\tau-T)}\, H(v)\, dv > 0.
-//! ```
-//!
-//! So P has no zero after T and is positive there, which needs c_{n−1} ≥ 0. ∎
-//!
-//! **Choice.** [`rate`] takes the largest root: the least anti-stable one, and always admissible.
-//! [`admissibility`] judges any other.
-//!
-//! **Deadlines.** For even n the degree of (R) is odd: every T > 0 has a root. For odd n, e_a(T) → −∞
-//! as a → −∞ and → 0⁻ as a → ∞; by ∂e_a/∂a its maxima over a are among the real zeros v of C, which do
-//! not depend on T. So a root exists if and only if P with the rate v is ≥ 0 at T for one of them; and
-//! if T has one, so has every longer deadline (the bound e_a is positive after T). The deadlines are a
-//! ray [T_min, ∞), T_min the first zero of those P, or none: [`deadlines`]. For n = 3,
-//! T² (e₁² − e₀e₂) ≥ e₀²; from rest v = 0, P = e₀ < 0, none. For n = 1 (R) is e₀ = 0: none.
+//! [`rate`] takes the largest root: the least anti-stable one, and always admissible. [`admissibility`] judges any
+//! other.
 //!
 //! # Requirements
 //!
-//! From rest the rate is negative (s = −1, −1.59607, −2.18061 for n = 2, 4, 6): the error dynamics are
-//! **anti-stable**. Sampling errors grow like e^{|a|τ}, and the constraint keeps asking e to grow after
-//! T; so it overshoots the deadline by a few samples and must be followed by a stay constraint. It is
-//! here as the paper's method; the reference profile has none of this.
+//! From rest the rate is negative (ρ = −1, −1.59607, −2.18061 for n = 2, 4, 6): the error dynamics are
+//! **anti-stable**. Sampling errors grow like exp(|a|τ), and the constraint keeps asking e to grow after T. So it
+//! overshoots the deadline by a few samples and must be followed by a stay constraint. It is here as the paper's
+//! method; the reference profile has none of this.
 //!
-//! (R) is solved in the dimensionless s, its coefficients divided by the largest, so scales of e and T
-//! do not matter. What remains is the condition of the root, [`uncertainty`]: sums y_0 + … + y_k that
-//! cancel, or two roots that nearly meet (T near T_min, where the root is as uncertain as √ε and its
-//! existence is undecided within round-off).
+//! (R) is solved in the dimensionless ρ, its coefficients divided by the largest, so scales of e and T do not matter.
+//! What remains is the condition of the root, [`uncertainty`]: sums y_0 + … + y_k that cancel, or two roots that
+//! nearly meet. With T near T_min the root is as uncertain as the square root of the unit round-off, and round-off
+//! decides whether it exists.
 //!
 //! # References
 //!
@@ -70,13 +41,13 @@ use super::polynomial::{self, Roots};
 use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
 
-/// Why a repeated root has no admissible rate.
+/// The reason why a repeated root has no admissible rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// n = 1: the bound e₀ e^{−aτ} reaches zero for no rate.
+    /// n = 1: the bound e(0) exp(−aτ) reaches zero for no rate.
     FirstOrder,
-    /// e₀ ≥ 0: there is nothing to reach.
+    /// e(0) ≥ 0: there is nothing to reach.
     Inside,
     /// The polynomial (R) has no real root.
     NoRealRoot,
@@ -98,7 +69,7 @@ pub enum Deadlines {
 /// No admissible rate exists for this anchor and deadline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoAdmissibleRate {
-    /// Why.
+    /// The reason.
     pub reason: Reason,
     /// The deadlines that would have one from the same anchor.
     pub deadlines: Deadlines,
@@ -139,7 +110,7 @@ pub enum Admissibility {
 ///
 /// # Errors
 ///
-/// There is none: n = 1, e₀ ≥ 0, no real root (odd n only), data or a rate that are not finite.
+/// There is none: n = 1, e(0) ≥ 0, no real root (odd n only), data or a rate that are not finite.
 ///
 /// ```
 /// use punctual_core::convergence::repeated_root::{Deadlines, Reason, deadlines, rate};
@@ -147,7 +118,7 @@ pub enum Admissibility {
 /// assert_eq!(rate(&[-5.0, 0.0], 10.0), Ok(-0.1));
 /// let none = rate(&[-5.0, 0.0, 0.0], 10.0).unwrap_err();
 /// assert_eq!((none.reason, none.deadlines), (Reason::NoRealRoot, Deadlines::None));
-/// // T² (e₁² − e₀e₂) ≥ e₀²: from T = 2 on.
+/// // T² (ė(0)² − e(0)ë(0)) ≥ e(0)²: from T = 2 on.
 /// assert_eq!(deadlines(&[-4.0, 2.0, 0.0]), Deadlines::From(2.0));
 /// ```
 pub fn rate(e: &[f64], deadline: f64) -> Result<f64, NoAdmissibleRate> {
@@ -165,7 +136,7 @@ pub fn rate(e: &[f64], deadline: f64) -> Result<f64, NoAdmissibleRate> {
     if rate.is_finite() { Ok(rate) } else { Err(none(Reason::NotFinite)) }
 }
 
-/// All real roots s = aT of (R) in rising order, whatever the sign of e₀; `None` if the data are not
+/// All real roots ρ = aT of (R) in rising order, whatever the sign of e(0); `None` if the data are not
 /// finite.
 pub fn scaled_roots(e: &[f64], deadline: f64) -> Option<Roots> {
     let y = scaled(e, deadline)?;
@@ -185,7 +156,7 @@ pub fn scaled_roots(e: &[f64], deadline: f64) -> Option<Roots> {
 pub fn admissibility(rate: f64, e: &[f64], deadline: f64) -> Admissibility {
     let (n, s) = (e.len(), rate * deadline);
     let y = scaled(e, deadline).unwrap_or([f64::NAN; MAX_RELATIVE_DEGREE]);
-    // P in σ = τ/T, then in z = σ − 1 by repeated synthetic division.
+    // P in s = τ/T, then in z = s − 1 by repeated synthetic division.
     let mut p = [0.0; MAX_RELATIVE_DEGREE];
     for (k, pk) in p[..n].iter_mut().enumerate() {
         *pk = (0..=k).map(|j| y[j] * s.powi((k - j) as i32) / factorial(k - j)).sum();
@@ -225,17 +196,17 @@ pub fn deadlines(e: &[f64]) -> Deadlines {
     if shortest.is_finite() { Deadlines::From(shortest) } else { Deadlines::None }
 }
 
-/// First-order bound on the error of `rate` that round-off causes, in 1/s:
-/// 4nε Σ |y_j| E_{n−1−j}(|s|) / (|R'(s)| T). Infinite at a double root; also if the data are not finite.
+/// First-order bound on the error of `rate` that round-off causes, in 1/s: 4nε Σ |y_j| E_{n−1−j}(|ρ|) / (|Y_n'(ρ)|
+/// T), ε the unit round-off. Infinite at a double root; also if the data are not finite.
 ///
-/// The data, y_j, their partial sums and the value of R each contribute up to about n roundings, of
+/// The data, y_j, their partial sums and the value of Y_n each contribute up to about n roundings, of
 /// half ε each.
 pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
     let (n, s) = (e.len(), rate * deadline);
     let Some(y) = scaled(e, deadline) else { return f64::INFINITY };
     let power = |x: f64, k: usize| x.powi(k as i32) / factorial(k);
     let size: f64 = (0..n).map(|j| y[j].abs() * (0..n - j).map(|i| power(s.abs(), i)).sum::<f64>()).sum();
-    // R' = R − c_{n−1} T^{n−1}, and R = 0.
+    // Y_n' = Y_n − c_{n−1} T^{n−1}, and Y_n = 0.
     let slope: f64 = (0..n).map(|j| y[j] * power(s, n - 1 - j)).sum();
     4.0 * n as f64 * f64::EPSILON * size / (slope.abs() * deadline)
 }
@@ -247,9 +218,9 @@ fn rate_change(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
     let power = |k: usize| s.powi(k as i32) / factorial(k);
     let y = |e: &[f64], j: usize| e[j] * deadline.powi(j as i32) / factorial(j);
     let change: f64 = (0..n).map(|j| y(direction, j) * (0..n - j).map(power).sum::<f64>()).sum();
-    // R' = R − c_{n−1} T^{n−1}, and R = 0.
+    // Y_n' = Y_n − c_{n−1} T^{n−1}, and Y_n = 0.
     let slope: f64 = (0..n).map(|j| y(e, j) * power(n - 1 - j)).sum();
-    // dR/ds = Σ y_j E_{n−2−j} is that sum with the sign changed.
+    // Y_n' = Σ y_j E_{n−2−j} is that sum with the sign changed.
     change / (slope * deadline)
 }
 
@@ -263,7 +234,7 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 impl Condition for RepeatedRoot {
     #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
-        // What the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
+        // The e that the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
         let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));
         let scale = MARGIN_TOLERANCE * (at.anchor[0].abs() + at.margin);
         Bound {

@@ -1,34 +1,30 @@
 //! The constraint in the form for an input that is held over a period δ.
 //!
-//! With ψ = (D + a)ⁿ⁻¹ e the constraint (D + a)ⁿ e ≥ 0 is ψ̇ + aψ ≥ 0. Enforced only at the samples, the
-//! held input lets it fall to −Mδ in between (M bounds |d/dt (D + a)ⁿ e|), and e to −Mδ/aⁿ. Its integral
-//! over the period,
+//! With ψ = (D + a_1) ⋯ (D + a_{n−1}) e the constraint is ψ̇ + a_n ψ ≥ 0. Its integral over the period,
 //!
 //! ```math
-//! \psi(t + \delta) \ge e^{-a\delta}\, \psi(t), \tag{S}
+//! \psi(t + \delta) \ge \exp(-a_n\delta)\, \psi(t), \tag{S}
 //! ```
 //!
-//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every
-//! sample, ψ ≥ 0 at every sample; for n = 1 that is e ≥ 0 at every sample, exactly. Within a period
-//! e^{aτ}ψ can dip below both its ends, where (D + a)ⁿ e is negative first and positive later: a function
-//! of slope at most M whose integral is ≥ 0 dips by at most Mδ²/8. With c₋ = max(0, −(D + a)ⁿ e) at the
-//! start of the period and an even slope, Mδ = 2c₋ and
+//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at
+//! every sample; for n = 1 that is e ≥ 0. In between e dips by what is of second order in δ
+//! (`docs/theory.md#held-inputs`). The pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of
+//! (D + a)ⁿ e. With ψ_n⁻ the shortfall of the pointwise constraint at the start of the period and
+//! Λ = a_1 ⋯ a_{n−1}, the dip is about
 //!
 //! ```math
-//! \psi \ge -\frac{c_-\,\delta}{4}, \qquad e \ge -\frac{c_-\,\delta}{4\,a^{n-1}} \qquad \text{for } a > 0,\ n > 1, \tag{5}
+//! \psi \ge -\frac{\psi_n^-\,\delta}{4}, \qquad e \ge -\frac{\psi_n^-\,\delta}{4\,\Lambda} \qquad \text{for } n > 1. \tag{5}
 //! ```
 //!
-//! of second order in δ where the pointwise constraint loses Mδ/aⁿ. [`PeriodBound::loss`] is (5): an
-//! estimate to leading order, not a bound, since the slope is only seen through its mean.
+//! [`PeriodBound::loss`] is (5): an estimate to leading order, not a bound, as only the mean slope is seen.
 //!
-//! **The margin.** Along the profile c₋ is known beforehand: a held input keeps e⁽ⁿ⁾ constant, so M is
-//! the slope of r⁽ⁿ⁾ and c₋ = Mδ/2. [`margin`] is twice (5) for the steepest part of the profile, and a
-//! part of its size for round-off: what a promise needs on top of the margin it is given. What the plant
-//! adds (its own drift, turning gradients) is only seen on the way, as [`PeriodBound::loss`].
+//! [`margin`] is twice (5) for the steepest part of the profile, and a part of its size for round-off: what a promise
+//! needs on top of the margin it is given (`docs/theory.md#sampling-margin`). What the plant adds (its own drift,
+//! turning gradients) is only seen on the way, as [`PeriodBound::loss`].
 //!
-//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its
-//! samples' average. It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across
-//! the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
+//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its samples' average.
+//! It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is
+//! continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
 use super::condition::{AnchorChange, Condition, Rates, Sample};
@@ -39,30 +35,30 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeriodBound {
-    /// The coefficients of (D + a)ⁿ⁻¹, in 1/s^(n−1−k); zeros from n on.
+    /// The coefficients of ψ, those of (D + a)ⁿ⁻¹ for one rate, in 1/s^(n−1−k); zeros from n on.
     pub weights: Stack,
     /// The least value at the end of the period, `[h]`/sⁿ⁻¹.
     pub floor: f64,
-    /// ψ ≥ −c gives e ≥ −c/`attenuation`, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow, what they
-    /// grow to until the deadline: (n − 1)! e^{aτ}/τⁿ⁻¹ for the time τ until then.
+    /// Λ: ψ ≥ −c gives e ≥ −c/Λ, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow until
+    /// the deadline, (n − 1)! exp(aτ)/τⁿ⁻¹ with the time τ until then.
     pub attenuation: f64,
-    /// e^(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
+    /// exp(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
     pub decay: f64,
 }
 
 /// A [`PeriodBound`] with the derivatives at the end of the period put in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighted {
-    /// By how much it is met, in the unit of h⁽ⁿ⁾.
+    /// Its slack, in the unit of h⁽ⁿ⁾.
     pub value: f64,
-    /// The size of the terms whose sum that is.
+    /// The size of the terms whose sum the slack is.
     pub terms: f64,
     /// Its gradient by the input.
     pub normal: [f64; MAX_INPUTS],
 }
 
 impl PeriodBound {
-    /// Asks for nothing.
+    /// The bound that asks for nothing.
     pub const ZERO: Self =
         Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0, decay: 0.0 };
 
@@ -71,8 +67,8 @@ impl PeriodBound {
         self.weights == [0.0; MAX_RELATIVE_DEGREE]
     }
 
-    /// The row on h⁽ⁿ⁾ that this is at the end of the period, over `divisor`: from h⁽ᵏ⁾ there, k < n, and their gradients by
-    /// so many `inputs`.
+    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their
+    /// gradients by so many `inputs`.
     #[inline]
     pub fn weighted(
         &self,
@@ -104,13 +100,13 @@ impl PeriodBound {
 /// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
 /// `attenuation` as in [`PeriodBound`].
 pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
-    // A profile of a few samples is followed on average only: its own size bounds what that can cost.
+    // A profile of a few samples is followed on average only; the cost is bounded by its own size.
     let (size, _) = size(anchor, deadline);
     let loss = steepest(profile, anchor, deadline).slope.abs() * period / 2.0 * period / 4.0 / attenuation;
     (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
 }
 
-/// Where a profile is steepest.
+/// The panel in which a profile is steepest.
 struct Steepest {
     /// The number of the panel.
     panel: usize,
@@ -177,10 +173,10 @@ pub(super) fn margin_change(
 /// The largest margin that is taken for held inputs, as a part of the anchor's size.
 const LARGEST_MARGIN: f64 = 0.01;
 
-/// The tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
+/// Margin for the tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
 pub(super) const ROUND_OFF: f64 = 1e-8;
 
-/// As in [`PeriodBound`], of (D + a)ⁿ.
+/// The attenuation of a [`PeriodBound`] of (D + a)ⁿ.
 pub(super) fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     if rate > 0.0 {
@@ -241,7 +237,7 @@ pub(super) fn over_period(
 ) -> Option<PeriodBound> {
     let n = at.degree();
     let cascade = Cascade::of(&condition.rates(at)?, n, at.time_left(period));
-    // What h is compared with: μ + r and its derivatives.
+    // The target of h: μ + r and its derivatives.
     let target = |elapsed: f64| {
         let mut r = condition.profile(at, elapsed);
         r[0] += at.margin;
@@ -281,7 +277,7 @@ pub(super) fn over_period_change(
     out.floor = (0..n).map(|k| weights[k] * (then[k] + decay * (dh[k] - now[k]))).sum();
     let by_rate = change.map_or(0.0, |change| change.rate);
     if by_rate != 0.0 {
-        // Of the repeated root only, whose target is the margin alone.
+        // Only the repeated root has a rate that moves, and its target is the margin alone.
         let rate = last;
         for k in 0..n {
             out.weights[k] = power_change(rate, n - 1, k) * by_rate;
@@ -301,8 +297,8 @@ pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
     if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * rate.powi(power as i32 - 1) }
 }
 
-/// By how much Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, may fall below its prediction under disturbances of
-/// h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
+/// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under
+/// disturbances of h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
 fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
     let (n, mut grown, mut sum) = (weights.len(), bound, 0.0);
     for k in (0..n).rev() {

@@ -1,17 +1,18 @@
-//! How what a promise asks for changes with the derivatives of h.
+//! The change of a promise's floors with the derivatives of h.
 //!
-//! At a sample that does not anchor, the floors are what [`FixedTime::advance`] and
-//! [`FixedTime::over_period`] compute from h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are: linear
-//! functions, but for the first-order condition. At a sample that anchors, the anchor is h itself; margin
-//! and the repeated root follow it:
+//! At a sample that does not anchor, [`FixedTime::advance`] and [`FixedTime::over_period`] compute the floors from
+//! h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are. They are linear functions, but for the first-order
+//! condition. At a sample that anchors, the anchor is h itself; margin and the repeated root follow it:
 //!
 //! ```text
-//! e = h − μ(h),   r' = (∂r/∂e₀) e₀',
-//! s' = −Σ_j y_j' E_{n−1−j}(s) / (dR/ds),   dR/ds = −Σ_j y_j s^{n−1−j}/(n−1−j)!   for the root of (R),
+//! e = h − μ(h),   r' = (∂r/∂e(0)) e(0)',
+//! ρ' = −Σ_j y_j' E_{n−1−j}(ρ) / Y_n'(ρ),
+//! Y_n'(ρ) = −Σ_j y_j ρ^{n−1−j}/(n−1−j)!   for the root of (R),
 //! ```
 //!
-//! where the prime is the derivative along a direction. Where a phase changes, a maximum has two candidates or a
-//! profile a kink, it is the derivative of the piece in force.
+//! where the prime is the derivative along a direction, but that of Y_n the one by ρ
+//! (`docs/theory.md#input-sensitivity`). Where a phase changes, a maximum has two candidates or a profile a kink, it
+//! is the derivative of the piece in force.
 
 use super::condition::AnchorChange;
 use super::fixed_time::FixedTime;
@@ -20,24 +21,24 @@ use super::state::FixedTimeState;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// The derivatives of a [`DerivativeBound`](super::DerivativeBound), of the margin and of a [`PeriodBound`] along one
-/// direction: each in the unit of what it is the derivative of, over that of the direction.
+/// direction: each in the unit of its number, over that of the direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BoundDerivative {
-    /// Of the floor under h⁽ⁿ⁾.
+    /// Derivative of the floor under h⁽ⁿ⁾.
     pub floor: f64,
-    /// Of the lower bound on h.
+    /// Derivative of the lower bound on h.
     pub profile: f64,
-    /// Of μ.
+    /// Derivative of μ.
     pub margin: f64,
-    /// Of the sampled form, where a period was given.
+    /// Derivative of the sampled form, where a period was given; else zero.
     pub sampled: PeriodBound,
 }
 
 impl FixedTime {
-    /// The derivative along `dh` of what [`Self::advance`] and, over `period`, [`Self::over_period`] ask for
-    /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and `state` has been moved to; `anchors`: by being
-    /// anchored at this very sample, with a deadline that does not depend on h.
+    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give
+    /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether
+    /// it was anchored there, with a deadline that does not depend on h.
     ///
     /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
     /// [derivative](super::profile::Profile::along), and under most [conditions](super::condition) of one's own.
@@ -69,7 +70,7 @@ impl FixedTime {
         })
     }
 
-    /// How the anchor that `state` has just been given at `h` changes.
+    /// The derivative of the anchor that `state` has just been given at `h`.
     fn anchor_change(&self, state: &FixedTimeState, h: [&[f64]; 2]) -> Option<AnchorChange> {
         let mut change =
             self.approach.condition().anchor_change(&state.at_anchor(self.n), h, state.period)?;

@@ -1,11 +1,11 @@
-//! What a barrier's promise is asked for, with its defaults.
+//! The settings of a barrier's promise, with their defaults.
 
 use super::first_order::Exponent;
 use super::operator::Operator;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, non_negative, positive};
 
-/// How the deadline is met.
+/// The method by which the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Method {
@@ -31,18 +31,18 @@ pub enum ProfileKind {
     LowPeak,
 }
 
-/// What is done where the input bounds certainly do not allow a deadline, at the anchor's sample or at any
+/// The answer to a deadline that the input bounds certainly do not allow, at the anchor's sample or at any
 /// later one ([`reach`](crate::reach)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Infeasible {
-    /// It is reported, and the deadline stays.
+    /// Report it and keep the deadline.
     #[default]
     Report,
-    /// The deadline is given up: the promise starts anew from that sample, with twice the soonest time at
-    /// which h ≥ 0 is not ruled out, and half as much again each further time. A deadline that passes
-    /// outside is given up as well; where no bound is known, for a new one of the configured length.
-    /// Counted in [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
+    /// Give up the deadline. The promise starts anew from that sample, with twice the soonest time at which h ≥ 0 is
+    /// not ruled out; the factor grows by half each further time. A deadline that passes outside is given up as well.
+    /// Where no bound is known, the new one has the configured length. Counted in
+    /// [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
     Soonest,
 }
 
@@ -50,14 +50,14 @@ pub enum Infeasible {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedTimeSettings {
     /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample for
-    /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)); for
-    /// higher ones later. `None`: the set is to be kept, from a start inside it; nothing is promised from one outside.
+    /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)), and later
+    /// for higher ones. `None`: the set is to be kept from a start inside it; from one outside nothing is promised.
     pub deadline: Option<f64>,
-    /// How the deadline is met. Default: [`Method::ReferenceProfile`].
+    /// The method by which the deadline is met. Default: [`Method::ReferenceProfile`].
     pub method: Method,
-    /// Which profile the reference profile follows. Default: [`ProfileKind::Hermite`].
+    /// The profile that [`Method::ReferenceProfile`] follows. Default: [`ProfileKind::Hermite`].
     pub profile: ProfileKind,
-    /// What is done where the deadline certainly cannot be met. Default: [`Infeasible::Report`].
+    /// The answer to a deadline that certainly cannot be met. Default: [`Infeasible::Report`].
     pub infeasible: Infeasible,
     /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`]
     /// of the deadline in force and the sampling period.
@@ -65,19 +65,20 @@ pub struct FixedTimeSettings {
     /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
     pub rates: Option<Operator>,
     /// a of the stay constraint in 1/s, finite, > 0; a larger one is taken where it must be
-    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T; where inputs have bounds and n ≤ 2 at most
-    /// what braking with half of them allows, (b/2e)^{1/n}; without a deadline that alone, else 2/s.
+    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T. Where inputs have bounds and n ≤ 2, it is at
+    /// most what braking with half of φ_max allows, (φ_max/2e)^{1/n}; φ_max is the largest h⁽ⁿ⁾ within the bounds.
+    /// Without a deadline it is that alone, else 2/s.
     pub stay_rate: Option<f64>,
-    /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. What held inputs are expected
-    /// to cost comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
+    /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. The expected cost of held inputs
+    /// comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
     pub margin: f64,
     /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
     /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
     /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
     pub recovery: Option<f64>,
-    /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on what the model does not know of h⁽ⁿ⁾, such as L_wL_f^{n−1}h w for a
-    /// disturbance w. The constraint asks for as much more, so that the promise holds for every disturbance
-    /// within the bound. It is one of h⁽ⁿ⁾ only: a disturbance must not enter an earlier derivative. Default 0.
+    /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on the part of h⁽ⁿ⁾ that the model lacks, such as L_wL_f^{n−1}h w for a
+    /// disturbance w. The constraint asks for as much more, so the promise holds for every disturbance within
+    /// the bound. A disturbance must enter h⁽ⁿ⁾ only, and no earlier derivative. Default: 0.
     pub disturbance: f64,
 }
 
@@ -115,9 +116,9 @@ impl FixedTimeSettings {
     /// The default of both rates in 1/s: the smaller of 20/T and 1/(2δ), for a deadline T > 0 and a period
     /// δ ≥ 0, both in s.
     ///
-    /// An error of order n is gone after some n/a, 0.4 T for n = 8: early enough before the deadline, and
-    /// slow enough that inputs stay of the size the profile itself needs. A rate above 1/(2δ) asks for
-    /// more than two samples can do.
+    /// An error of order n is gone after some n/a, 0.4 T for n = 8. That is early enough before the deadline, and
+    /// slow enough that inputs stay of the size the profile itself needs. A rate above 1/(2δ) asks for more than
+    /// two samples can do.
     pub fn default_rate(deadline: f64, period: f64) -> f64 {
         let by_deadline = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
         if period > 0.0 { by_deadline.min(Self::DEFAULT_RATE_TIMES_PERIOD / period) } else { by_deadline }

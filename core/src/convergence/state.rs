@@ -1,13 +1,13 @@
-//! What a promise remembers between samples.
+//! The memory of a promise between samples.
 
 use super::comparison::Stack;
 use super::condition::Sample;
 use super::phase::Phase;
 
-/// What is remembered between samples: plain data, all that a snapshot needs.
+/// The memory of a promise between samples: plain data, all that a snapshot needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FixedTimeState {
-    /// Where the barrier stands.
+    /// The phase of the promise.
     pub phase: Phase,
     /// Time in s of the sample from which its window counts ([`Begin`](crate::filter::Begin)).
     pub start_time: Option<f64>,
@@ -15,9 +15,10 @@ pub struct FixedTimeState {
     pub anchor_time: f64,
     /// T in s, counted from the anchor; infinite where there is none.
     pub deadline: f64,
-    /// How often leaving the set has anchored anew ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
+    /// Number of times that leaving the set has anchored anew
+    /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
-    /// How often a deadline that the input bounds do not allow was given up for a later one
+    /// Number of deadlines given up for a later one, because the input bounds do not allow them
     /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
     pub postponed: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
@@ -28,11 +29,11 @@ pub struct FixedTimeState {
     pub stay_rate: f64,
     /// The margin of the stay constraint in the unit of h, chosen there too.
     pub stay_margin: f64,
-    /// What leads back from `stay_margin` to `margin`, `[h]`/sⁿ, chosen there too.
+    /// The part of the floor that leads back from `stay_margin` to `margin`, `[h]`/sⁿ, chosen there too.
     pub pull: f64,
     /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, and since the arrival where an approach has ended.
     pub gain: f64,
-    /// μ in the unit of h, chosen at the anchor: the settings' margin and what held inputs cost.
+    /// μ in the unit of h, chosen at the anchor: the settings' margin and the expected cost of held inputs.
     pub margin: f64,
     /// The sampling period in s that was accounted for at the anchor, 0 for none.
     pub period: f64,
@@ -42,16 +43,16 @@ pub struct FixedTimeState {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
-    /// Whoever enforces the row clears this where it is not met, or where the held input breaks the promise on the way.
+    /// Whoever enforces the row clears it where that is not met, or the held input breaks the promise on the way.
     pub guaranteed: bool,
-    /// The steps in a row that did not meet its constraint, until now.
+    /// The steps in a row that did not meet the constraint, until now.
     pub unmet: Option<Unmet>,
 }
 
 /// Steps in a row that did not meet a constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unmet {
-    /// How many, ≥ 1.
+    /// Their number, ≥ 1.
     pub steps: u32,
     /// Time in s of the first, or of the last progress since: a rise of h by a hundredth of its size.
     pub since: f64,
@@ -62,7 +63,7 @@ pub struct Unmet {
 impl Unmet {
     const PROGRESS: f64 = 0.01;
 
-    /// With one more step, at time `t` with the value `h`.
+    /// Counts one more step, at time `t` with the value `h`.
     pub(crate) fn after(before: Option<Self>, t: f64, h: f64) -> Self {
         match before {
             None => Self { steps: 1, since: t, h },
@@ -81,7 +82,7 @@ impl FixedTimeState {
         (t - self.anchor_time).max(0.0)
     }
 
-    /// What the method of the approach sees, with `e` = h − `margin` and its derivatives.
+    /// The sample as the method of the approach sees it, with `e` = h − `margin` and its derivatives.
     #[inline(always)]
     pub(super) fn on_approach<'a>(&'a self, elapsed: f64, e: &'a [f64], errors: &'a [f64]) -> Sample<'a> {
         Sample {
@@ -94,7 +95,7 @@ impl FixedTimeState {
         }
     }
 
-    /// What the stay constraint sees, with `e` = h − `stay_margin` and its derivatives.
+    /// The sample as the stay constraint sees it, with `e` = h − `stay_margin` and its derivatives.
     #[inline(always)]
     pub(super) fn on_stay<'a>(&'a self, elapsed: f64, e: &'a [f64]) -> Sample<'a> {
         Sample {
@@ -106,7 +107,7 @@ impl FixedTimeState {
         }
     }
 
-    /// What the method of the approach sees at the anchor.
+    /// The anchor as the method of the approach sees it.
     pub(super) fn at_anchor(&self, n: usize) -> Sample<'_> {
         self.on_approach(0.0, &self.anchor[..n], &[])
     }

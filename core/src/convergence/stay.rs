@@ -1,32 +1,26 @@
 //! Staying inside: (D + a)ⁿ e ≥ 0 with a > 0 from a start with e ≥ 0.
 //!
-//! By the comparison lemma e ≥ e^{−aτ} P(τ), so e ≥ 0 for ever if every coefficient c_k(a) of P is ≥ 0
-//! at the start. For n = 1 that is e ≥ 0; for n = 2 it is a ≥ −ė/e.
-//!
-//! **The rates that do.** The k! c_k are an Appell sequence in a:
+//! It keeps e ≥ 0 for ever if all coefficients c_k(a) of the comparison lemma are ≥ 0 at the start
+//! (`docs/theory.md#stay-condition`). For n = 1 that is e ≥ 0; for n = 2 it is e ≥ 0 and a ≥ −ė/e. The k! c_k are an
+//! Appell sequence in a,
 //!
 //! ```math
 //! A_k(a) = k!\, c_k(a) = \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}, \qquad \frac{dA_k}{da} = k\, A_{k-1}. \tag{A}
 //! ```
 //!
-//! So where A_0 … A_{k−1} are ≥ 0 on a ray [a_{k−1}, ∞), A_k does not fall on it,
-//! and A_0 … A_k are ≥ 0 on a smaller ray [a_k, ∞), or nowhere if A_k is a negative constant. By
-//! induction the rates ≥ 0 with all c_k ≥ 0 are a ray [a_min, ∞), and there is none if and only if the
-//! first derivative that is not zero is negative. Every rate above [`smallest_rate`] will do as well.
-//!
-//! **The rate of a sample.** Along an active or inactive constraint the A_k stay ≥ 0, so a rate that would do at one
-//! sample does at the next: the rate may be chosen anew at every sample, from what is known there, and h ≥ 0 stays
-//! true. The least h⁽ⁿ⁾ that a rate asks for,
+//! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if
+//! the first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may
+//! be chosen anew at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
 //!
 //! ```math
 //! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
 //! ```
 //!
-//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can, and a larger one
-//! where the gentle one asks for what the inputs cannot give and nothing is about to be left.
+//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger
+//! one where the gentle one asks for what the inputs cannot give and nothing is about to be left.
 //!
-//! **Any margin will do.** With e = h − μ all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n: the least of them,
-//! [`affordable_margin`], is the largest margin with which the lemma holds.
+//! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, [`affordable_margin`], is the
+//! largest margin with which the condition holds.
 
 use std::array::from_fn;
 
@@ -74,7 +68,7 @@ pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     for k in 1..h.len() {
         power *= rate;
         let margin = scaled_coefficient(rate, h, k) / power;
-        // Not `f64::min`, which would drop what is not a number.
+        // Not `f64::min`, which would drop not-a-number.
         if margin < least || margin.is_nan() {
             least = margin;
         }
@@ -82,10 +76,10 @@ pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     least
 }
 
-/// What plant and inputs can do about h⁽ⁿ⁾ at a sample.
+/// The influence of plant and inputs on h⁽ⁿ⁾ at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Means {
-    /// L_fⁿh, `[h]`/sⁿ: what h⁽ⁿ⁾ is without an input.
+    /// L_fⁿh, `[h]`/sⁿ: h⁽ⁿ⁾ without an input.
     pub drift: f64,
     /// The most that inputs within their bounds add to it, `[h]`/sⁿ; infinite without bounds.
     pub reach: f64,
@@ -96,50 +90,53 @@ pub struct Means {
 }
 
 impl Means {
-    /// Nothing is known: every h⁽ⁿ⁾ can be had at once.
+    /// Nothing known: every h⁽ⁿ⁾ can be had at once.
     pub const UNKNOWN: Self = Self { drift: 0.0, reach: f64::INFINITY, weight: 1.0, hold: 0.0 };
 }
 
-/// How the set is kept from a sample: (D + a)ⁿ (h − μ) ≥ pull.
+/// The constraint that keeps the set from a sample on: (D + a)ⁿ (h − μ) ≥ pull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keep {
     /// a in 1/s.
     pub rate: f64,
     /// μ ≥ 0, `[h]`.
     pub margin: f64,
-    /// What leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
+    /// The part of the floor that leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
     pub pull: f64,
     /// Whether the lemma holds with these: h ≥ μ from now on.
     pub is_invariant: bool,
 }
 
-/// Rate times hold that an error can follow: a faster one changes more within two samples than an input can do about it.
+/// Largest rate times hold: a faster error changes more within two samples than an input can do about it.
 pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 
-/// The rate of least peak over the smallest rate, for n = 2: braking from ė then takes ¾ ė²/e, where a constant ½ ė²/e
-/// would just do. (With the smallest rate it takes ė²/e.)
+/// The rate of least peak over the smallest rate, for n = 2. Braking from ė then takes ¾ ė²/e, with the smallest rate
+/// ė²/e; a constant ½ ė²/e would just do.
 const OVER_SMALLEST: f64 = 1.5;
 
 /// The part of the margin that is enough to keep the gentle rate.
 const ENOUGH: f64 = 0.5;
 
-/// Where no period limits the rate: this many times what is asked for.
+/// Largest rate over the one asked for, where no period limits it.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
-/// How to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): `margin` μ and rate `base` > 0 where they will do, what is
-/// needed where they do not.
+/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 where they
+/// will do, with a smaller margin and a larger rate where they do not.
 ///
 /// 1. The rate is `base` where that affords half the margin, with all that it affords.
-/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow, and
-///    the rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. It is raised where the input cannot give what it asks for: beyond what bounds allow (`means.reach`), and where h
-///    can hardly be influenced (`means.weight`) or comes back by itself, by as much as the plant itself pulls h⁽ⁿ⁾ down
-///    there. At the centre of a disc the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is about to be left.
+/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
+///    rate is the smallest that will do, for n = 2 1.5 times that.
+/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be
+///    influenced (`means.weight`) or comes back by itself, it is raised until the floor is lower by what the plant
+///    itself pulls h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is
+///    about to be left.
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
+///
+/// The reasons are in `docs/theory.md#rate-for-every-sample`.
 pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
-    // What small dips have taken of the margin does not change the rate.
+    // 1. The gentle rate, with the margin that it affords. Small dips into the margin do not change the rate.
     let at_base = affordable_margin(base, h);
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
@@ -150,16 +147,17 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let e = &own[..h.len()];
     let is_invariant = affordable >= 0.0;
     if !is_invariant {
-        // As hard as it must be where that can be said, beyond what samples can follow.
+        // Not even the largest rate affords a margin ≥ 0: as hard as it must be, where a rate does it at all.
         let rate = smallest_rate(e).map_or(limit, |rate| rate.max(base));
         return Keep { rate, margin: kept, pull: 0.0, is_invariant };
     }
+    // 2. The smallest rate that will do, where the gentle one does not.
     let over_smallest = if h.len() == 2 { OVER_SMALLEST } else { 1.0 };
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
     let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
     let possible = means.drift + means.reach;
-    // What the plant pulls down is left to later where h can hardly be influenced, or comes back to it by itself.
+    // 3. The plant's own pull is left to later where h can hardly be influenced, or comes back by itself.
     let strength = means.weight.powi(2) * outwards(e, base);
     let eased = |wanted: f64| {
         let relieved = means.drift.min(0.0) + wanted.max(0.0);
@@ -170,24 +168,24 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let rate = if wanted <= most {
         gentle
     } else {
-        // What is eased is so until the end of the hold, the more the less h follows an input until then.
+        // It has to stay that low for a part of the hold: the larger a part, the less h follows an input.
         let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { own };
         let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
         if is_met(limit) { first(gentle, limit, is_met) } else { limit }
     };
-    // The gentle rate with all of the margin, as far as that is possible.
+    // 4. The gentle rate with all of the margin, as far as that is possible.
     let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
     let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
 }
 
 /// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen anew at every sample
-/// ([`Self::choose`]) and are those of the [`Sample`] then.
+/// ([`keep`]) and are those of the [`Sample`] then.
 #[derive(Clone, Copy, Debug)]
 pub struct Stay<'a>(pub &'a FixedTimeSettings);
 
 impl Stay<'_> {
-    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes it to `state`.
+    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes that to `state`.
     pub(super) fn choose<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -204,7 +202,7 @@ impl Stay<'_> {
             chosen = keep_from(lowest);
         }
         (state.stay_rate, state.stay_margin, state.pull) = (chosen.rate, chosen.margin, chosen.pull);
-        // Errors are bounded to first order; what is left of the margin is for the rest.
+        // Errors are bounded to first order: half of the margin has to be left for the rest.
         let is_covered = || is_kept(chosen.rate) && chosen.margin >= ENOUGH * state.margin;
         state.guaranteed = chosen.is_invariant && (is_exact || is_covered());
     }
@@ -239,7 +237,7 @@ impl Stay<'_> {
 
     /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
     fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
-        /// The part of what bounds allow that is used where there is time.
+        /// The part of the largest h⁽ⁿ⁾ within the bounds that is used where there is time.
         const COMFORTABLE: f64 = 0.5;
         let settings = self.0;
         if let Some(rate) = settings.stay_rate.or(settings.rate) {
@@ -277,10 +275,10 @@ impl Condition for Stay<'_> {
     }
 }
 
-/// For n = 2 how much of e is being lost: 0 where ė ≥ a e, 1 where ė ≤ 0.
+/// The part of e that is being lost, for n = 2: 0 where ė ≥ a e, 1 where ė ≤ 0. For other n it is 1.
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
-    // Not `clamp`, which keeps what is not a number: 0/0 at rest on the boundary.
+    // Not `clamp`, which keeps not-a-number: 0/0 at rest on the boundary.
     if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
 }
 

@@ -1,4 +1,4 @@
-//! What relative degree a barrier turned out to have: the finding that a refusal carries.
+//! The relative degree that a barrier turned out to have: the finding that a refusal carries.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Building a filter: every number is checked here, so that a step cannot fail on one.
+//! The builder of a filter. It checks every number, so that no step can fail on one.
 
 use nalgebra::SVector;
 
@@ -17,7 +17,7 @@ use crate::lie::{self, DerivativeSource};
 use crate::qp::{self, Backend, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
-/// Collects barriers and bounds for a [`SafetyFilter`].
+/// A collection of barriers and bounds for a [`SafetyFilter`].
 pub struct FilterBuilder {
     state_dim: usize,
     input_dim: usize,
@@ -32,7 +32,7 @@ pub struct FilterBuilder {
 }
 
 impl FilterBuilder {
-    /// ‖u − u_ref‖ that a single sample may need before its row counts as out of reach of the inputs, in units of u.
+    /// The ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs, in units of u.
     pub const DEFAULT_CORRECTION_LIMIT: f64 = 1e6;
 
     pub(super) fn new(state_dim: usize, input_dim: usize) -> Self {
@@ -191,7 +191,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// When the last barrier added begins and ceases to be enforced. Default: at once and never.
+    /// Sets when the last barrier added begins and ceases to be enforced. Default: at once and never.
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -241,7 +241,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// What becomes of the last barrier added where not all can be met. Default: [`Strictness::KeepFirst`].
+    /// Sets the standing of the last barrier added where not all can be met. Default: [`Strictness::KeepFirst`].
     ///
     /// # Errors
     ///
@@ -261,8 +261,8 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Which method solves programs of several rows. Default: [`Backend::DualActiveSet`], which does not
-    /// allocate; the other is for comparison and knows no priorities.
+    /// Chooses the method for QPs of several rows. Default: [`Backend::DualActiveSet`], which does not allocate;
+    /// the other is for comparison and knows no priorities.
     pub fn backend(mut self, backend: Backend) -> Self {
         self.backend = backend;
         self
@@ -278,7 +278,7 @@ impl FilterBuilder {
     pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
         length("u_min", min.len(), self.input_dim)?;
         length("u_max", max.len(), self.input_dim)?;
-        // More inputs than that are refused by `build`.
+        // `build` refuses more inputs than that.
         for (i, (&low, &high)) in min.iter().zip(max).enumerate().take(MAX_INPUTS) {
             let range = |field: &str, message: String| {
                 Err(Error::new(ErrorKind::Range, format!("{field}[{}]", i + 1), message))
@@ -298,8 +298,8 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// The ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u. Default:
-    /// [`Self::DEFAULT_CORRECTION_LIMIT`].
+    /// Sets the ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u.
+    /// Default: [`Self::DEFAULT_CORRECTION_LIMIT`].
     ///
     /// # Errors
     ///
@@ -309,8 +309,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// How inputs that are held between samples are accounted for. Default:
-    /// [`Sampling::Measured`].
+    /// Chooses the account taken of inputs that are held between samples. Default: [`Sampling::Measured`].
     ///
     /// # Errors
     ///
@@ -320,9 +319,9 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// The longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any length up
-    /// to it. A longer one withdraws them until the next sample shows that they can be given again. Default: the period
-    /// that [`Sampling`] assumes.
+    /// Sets the longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any
+    /// length up to it. A longer one withdraws them until the next sample shows that they can be given again.
+    /// Default: the period that [`Sampling`] assumes.
     ///
     /// # Errors
     ///
@@ -332,13 +331,13 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// The time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
+    /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
     /// master that exchanges all values first (Jacobi). Default: 0.
     ///
-    /// The input of the step before is taken to act until then (0, or the nearest admissible input, before
-    /// the first), so the delay must not exceed the sampling period. The constraint is enforced from the
-    /// predicted state at t + delay on; every barrier report but its [`h`](super::BarrierReport::h) is of
-    /// that time. Deadlines count from the first sample itself.
+    /// The input of the step before is taken to act until then; before the first, 0 or the nearest admissible
+    /// input. So the delay must not exceed the sampling period. The constraint is enforced from the predicted
+    /// state at t + delay on. Every barrier report but its [`h`](super::BarrierReport::h) is of that time.
+    /// Deadlines count from the first sample itself.
     ///
     /// # Errors
     ///
@@ -348,12 +347,12 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Bounds on the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the
-    /// unit of x_i. Rows, anchors and phases are then such that the promises hold for the true state, to first order in
-    /// the errors. Default: none.
+    /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
+    /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
     ///
-    /// Needs the reference profile and a prediction over the period; `deadline_unreachable` then stays false until the deadline
-    /// has passed, and there are no directional derivatives. Some four times the work of a step per measured state.
+    /// Needs the reference profile and a prediction over the period. `deadline_unreachable` then stays false until the
+    /// deadline has passed, and there are no directional derivatives. A step takes some four times the work per
+    /// measured state.
     ///
     /// # Errors
     ///
@@ -367,14 +366,14 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// The filter, not yet anchored.
+    /// Makes the filter, not yet anchored.
     ///
     /// # Errors
     ///
-    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs; an actuation delay that exceeds
-    /// a given sampling period, or that a source cannot predict over; measurement errors with such a delay, without a prediction
-    /// over the period, with another method than the reference profile, or with a source that gives no derivatives along
-    /// a direction.
+    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation
+    /// delay that exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a
+    /// delay, without a prediction over the period, with another method than the reference profile, or with a source
+    /// that gives no derivatives along a direction.
     pub fn build(self) -> Result<SafetyFilter, Error> {
         let Self {
             state_dim,
@@ -388,6 +387,7 @@ impl FilterBuilder {
             errors,
             backend,
         } = self;
+        // Dimensions.
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if slots.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
@@ -404,6 +404,7 @@ impl FilterBuilder {
         if input_dim == 0 || input_dim > MAX_INPUTS {
             return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
         }
+        // The delay: within the period, and every source can predict over it.
         if let Sampling::Period(period) = sampling
             && delay > period
         {
@@ -418,6 +419,7 @@ impl FilterBuilder {
                 return Err(Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&slot.name));
             }
         }
+        // Measurement errors.
         let errors = MeasurementErrors::new(&errors);
         if !errors.is_exact() {
             errors::check_all(&mut slots, sampling, delay, input_dim)?;
@@ -425,6 +427,7 @@ impl FilterBuilder {
         for slot in &mut slots {
             slot.now.slopes = vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count()];
         }
+        // State and workspace, allocated once: a step does not allocate.
         let barriers = vec![FixedTimeState::default(); slots.len()];
         let state = FilterState { barriers, ..FilterState::default() };
         let workspace = Workspace {

@@ -1,8 +1,8 @@
-//! Bounded errors of the measured state: what they can do to the derivatives of h and to a sampled row.
+//! Bounded errors of the measured state: what they can do to the derivatives of h and to a row over the period.
 //!
-//! Everything is a smooth function F of the state, and to first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
-//! derivatives at the measured state. For a sampled row these depend on u, so that it is no longer affine: it is
-//! linearised with the rest of the row.
+//! Everything is a smooth function F of the state. To first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
+//! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u,
+//! so the row is no longer affine: it is linearised with the rest.
 
 use super::Sampling;
 use super::slot::BarrierSlot;
@@ -22,7 +22,7 @@ pub(super) struct MeasurementErrors {
     directions: Vec<f64>,
 }
 
-/// By how much a row may be off, and the derivative of that by u.
+/// The largest error of a row, and its derivative by u.
 pub(super) struct Uncertainty {
     pub(super) size: f64,
     pub(super) gradient: [f64; MAX_INPUTS],
@@ -43,7 +43,7 @@ impl MeasurementErrors {
         self.directions.is_empty()
     }
 
-    /// How many states have one.
+    /// Number of states that have one.
     pub(super) fn count(&self) -> usize {
         self.directions.len() / self.state_dim
     }
@@ -62,7 +62,7 @@ impl MeasurementErrors {
         let zeros = &zeros[..inputs];
         let (mut change, mut sum) = (Ahead::ZERO, [0.0; MAX_RELATIVE_DEGREE]);
         for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
-            // Below n no input is in them.
+            // Derivatives of order below n contain no input.
             let known = source.ahead_along(t, [x, direction], [zeros, zeros], 0.0, &mut change);
             for k in 0..source.relative_degree() {
                 slopes[k] = if known { change.value[k] } else { f64::INFINITY };
@@ -72,7 +72,7 @@ impl MeasurementErrors {
         sum
     }
 
-    /// By how much the sampled row of `demand`, over its divisor, may be off, where `held` is t, x, u and the time
+    /// The largest error of the row over the period of `demand`, divided by its divisor, from t, x, u and the time
     /// ahead. `None` where that is not finite.
     pub(super) fn of_row(
         &self,

@@ -1,12 +1,13 @@
-//! What h does while an input is held: the instants between two samples.
+//! h between two samples, while an input is held (`docs/theory.md#between-samples`).
 //!
-//! Let η(s) = h(t + s) along the model under the held input. The model walks through the hold in parts, and η and η̇ are
-//! read between them. From instants a < m < b the cubic through a and b foresees η(m) and η̇(m). What it is off there bounds
-//! what the cubics of the two halves leave open: less than an eighth of it where η is smooth (max|η⁗| s⁴/384 on a length s),
-//! twice at a kink. The walk is repeated in twice as many parts until that and what two walks differ by decide whether h ≥ 0.
+//! Let η(σ) = h(t + σ) along the model under the held input. The model walks through the hold in parts, and η and η̇
+//! are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer two foresees η and η̇ at the
+//! middle one. Its error there bounds what the cubics of the two halves leave open: less than an eighth of it where η
+//! is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in twice as many
+//! parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
 //!
-//! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What cannot be
-//! decided with [`MOST`] parts, such as an input that turns the plant by a hundred radians within the hold, counts as h < 0.
+//! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What [`MOST`]
+//! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
 
 use crate::MAX_RELATIVE_DEGREE;
 use crate::lie::{Ahead, DerivativeSource};
@@ -17,9 +18,9 @@ const FEWEST: usize = 4;
 /// Parts of the last walk.
 const MOST: usize = 64;
 
-/// How many times what it is off in the middle a cubic may be off elsewhere. Where η has a fourth derivative it is less
-/// than once; at a kink, such as the path past a small disc, twice. What two walks differ by counts as often: where they
-/// do not resolve a turn, both are off.
+/// Error of a cubic anywhere over its error in the middle, at most. Where η has a fourth derivative the ratio is less
+/// than 1; at a kink, such as the path past a small disc, it is 2. The difference of two walks counts as often: where
+/// they do not resolve a turn, both are off.
 const UNSURE: f64 = 4.0;
 
 /// η and η̇ at an instant.
@@ -34,7 +35,7 @@ impl Node {
     const ZERO: Self = Self { at: 0.0, h: 0.0, slope: 0.0 };
 }
 
-/// Where h is lowest.
+/// The instant at which h is lowest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lowest {
     /// A lower bound on h there.
@@ -45,7 +46,7 @@ pub(super) struct Lowest {
 
 impl Lowest {
     pub(super) fn or(self, other: Self) -> Self {
-        // What is not a number counts as lowest.
+        // Not-a-number counts as lowest.
         if self.h < other.h || self.h.is_nan() { self } else { other }
     }
 }
@@ -59,7 +60,7 @@ pub(super) struct Hold<'a> {
 }
 
 impl Hold<'_> {
-    /// A lower bound on h over `from` ≤ s ≤ `to` (s after the sample), and where; `scratch` has the length
+    /// A lower bound on h over `from` ≤ σ ≤ `to` (seconds after the sample), and where; `scratch` has the length
     /// of the state. `None` where the source cannot predict.
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
         let (mut coarse, mut fine) = ([Node::ZERO; MOST + 1], [Node::ZERO; MOST + 1]);
@@ -69,7 +70,7 @@ impl Hold<'_> {
             self.walk([from, to], scratch, &mut fine[..=2 * parts])?;
             let mut differ = 0.0;
             for (a, b) in coarse[..=parts].iter().zip(fine.iter().step_by(2)) {
-                // Not `max`, which would drop what is not a number.
+                // Not `max`, which would drop not-a-number.
                 let by = (a.h - b.h).abs() + (to - from) / parts as f64 * (a.slope - b.slope).abs();
                 differ = if by <= differ { differ } else { by };
             }
@@ -120,24 +121,24 @@ impl Hold<'_> {
         self.ahead(x, at, 0.0).map(|ahead| Node { at, h: ahead.value[0], slope: ahead.value[1] })
     }
 
-    /// What is `later` s after the instant `at`, at which the state is `x`.
+    /// Derivatives of h `later` s after the instant `at`, at which the state is `x`.
     fn ahead(&self, x: &[f64], at: f64, later: f64) -> Option<Ahead> {
         let mut ahead = Ahead::ZERO;
         self.source.ahead(self.t + at, x, self.u, later, &mut ahead).then_some(ahead)
     }
 }
 
-/// Above every other.
+/// A value above every other.
 const LARGEST: Lowest = Lowest { h: f64::INFINITY, at: 0.0 };
 
-/// Number `k` of the ends of so many `parts`, which grow from 0.8 to 1.2 times the mean.
+/// End number `k` of so many `parts`, whose lengths grow from 0.8 to 1.2 times the mean.
 fn instant([from, to]: [f64; 2], k: usize, parts: usize) -> f64 {
     const UNEVEN: f64 = 0.2;
     let z = k as f64 / parts as f64;
     if k == parts { to } else { from + (to - from) * z * (1.0 - UNEVEN * (1.0 - z)) }
 }
 
-/// The least value of the cubics between three instants, and what the one through the outer two is off in the middle.
+/// The least value of the cubics between three instants, and the error in the middle of the one through the outer two.
 fn dips(&[a, middle, b]: &[Node; 3]) -> (Lowest, f64) {
     let length = b.at - a.at;
     if length <= 0.0 {

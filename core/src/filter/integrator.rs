@@ -1,4 +1,4 @@
-//! Dynamic extension inside the filter: a state that is commanded and not measured.
+//! Dynamic extension inside the filter: an integrator whose state is commanded and not measured.
 
 use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
@@ -9,9 +9,9 @@ use crate::qp::Bounds;
 /// `KinematicBicycle` of the reference plants. The plant outside takes that state as its input. So x lacks it, and u and
 /// u_ref have it in the place of its rate.
 ///
-/// Over each period the filter's model has it change evenly; the input handed out, to be held, is its mean over the
-/// period. The two differ by O(δ²) in the state at the end. The wish v for it becomes the rate
-/// `gain` (v − value), or the rate that leads there within the period where that is less.
+/// Over each period the filter's model has it change evenly. The plant is given its mean over the period, to be held;
+/// the two differ by O(δ²) in the state at the end. The wish v for it becomes the rate `gain` (v − value), or the rate
+/// that leads there within the period where that is less.
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -73,7 +73,7 @@ impl IntegratedFilter {
             }
         }
         let [min, max] = limits;
-        // Not-a-number is no limit either.
+        // Not-a-number fails too.
         if !(min <= max && min < f64::INFINITY && max > f64::NEG_INFINITY) {
             let message = format!("is [{min}, {max}], must be [min, max] with min <= max");
             return Err(Error::new(ErrorKind::Range, "limits", message));
@@ -136,8 +136,8 @@ impl IntegratedFilter {
         value.max(self.of.limits[0]).min(self.of.limits[1])
     }
 
-    /// As [`SafetyFilter::step`], for an input that is held for `hold` seconds, finite, > 0. The report's rows are
-    /// those of the filter, on the rate.
+    /// Computes the safe input as [`SafetyFilter::step`] does, for an input that is held for `hold` seconds, finite,
+    /// above 0. The report's rows are those of the filter, on the rate.
     ///
     /// # Errors
     ///

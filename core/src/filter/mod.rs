@@ -1,8 +1,8 @@
 //! The safety filter: from time, state and reference input to a safe input and a report.
 //!
 //! A step is in `step`, in the order of the mathematics: evaluate the derivatives of every barrier, move its
-//! phase, build its row, solve the quadratic program, report. What is remembered between samples is [`FilterState`], plain data; everything else can be rebuilt without changing a
-//! bit of the result.
+//! phase, build its row, solve the QP, report. [`FilterState`] is all that is remembered between samples: plain
+//! data. Everything else can be rebuilt without changing a bit of the result.
 
 mod builder;
 mod errors;
@@ -36,10 +36,10 @@ use errors::MeasurementErrors;
 use search::Requirement;
 use slot::BarrierSlot;
 
-/// What a filter remembers between samples: one promise per barrier, and what [`Sampling`] needs.
+/// The memory of a filter between samples: one promise per barrier, and the times that [`Sampling`] needs.
 #[derive(Debug, Default, PartialEq)]
 pub struct FilterState {
-    /// In the order of the barriers.
+    /// Promises, in the order of the barriers.
     pub barriers: Vec<FixedTimeState>,
     /// Time of the last sample with valid inputs, in s.
     pub time: Option<f64>,
@@ -62,25 +62,25 @@ impl Clone for FilterState {
     }
 }
 
-/// Periods that differ by less than this part of them are one.
+/// Periods that differ by less than this part of them count as equal.
 const SAME_PERIOD: f64 = 1e-6;
 
-/// Scratch memory of a step; what it holds from the step before changes no bit of the next.
+/// Scratch memory of a step; its contents change no bit of the next one.
 struct Workspace {
-    /// Of the quadratic program, with how each is enforced.
+    /// Rows of the QP, each with its enforcement.
     rows: Vec<Row>,
     enforcement: Vec<Enforcement>,
-    /// What the input held over the period has to meet.
+    /// Bounds that the input held over the period has to meet.
     requirements: Vec<Requirement>,
     next: FilterState,
-    /// One state.
+    /// Room for one state.
     scratch: Vec<f64>,
     report: Report,
     qp: qp::Workspace,
 }
 
-/// Turns barriers with deadlines into a filter on the input: `min ½‖u − u_ref‖²` under one row per
-/// barrier and the input bounds.
+/// A filter on the input, made of barriers with deadlines: `min ½‖u − u_ref‖²` under one row per barrier
+/// and the input bounds.
 ///
 /// # Requirements
 ///
@@ -107,7 +107,7 @@ pub struct SafetyFilter {
     first_period: f64,
     /// The longest time in s between two samples, 0 where it is not given.
     period_max: f64,
-    /// For how long the next input will be held, in s, if somebody said so.
+    /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
     state: FilterState,
     workspace: Workspace,
@@ -151,7 +151,7 @@ impl SafetyFilter {
         Ok(&self.workspace.report)
     }
 
-    /// What [`Self::step`] would return, without remembering the sample.
+    /// Computes what [`Self::step`] would, without remembering the sample.
     ///
     /// # Errors
     ///
@@ -168,12 +168,12 @@ impl SafetyFilter {
         self.state.input.fill(0.0);
     }
 
-    /// What the filter remembers.
+    /// The memory of the filter between samples.
     pub fn state(&self) -> &FilterState {
         &self.state
     }
 
-    /// Puts back what [`Self::state`] returned: the filter goes on exactly as it would have then.
+    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then.
     ///
     /// # Errors
     ///
@@ -189,11 +189,11 @@ impl SafetyFilter {
         &self.workspace.report
     }
 
-    /// How far `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, is from satisfying the
-    /// conditions of optimality of its qp: small multiples of 1e-16 for a pointwise step, up to the 1e-9 at which
-    /// the search stops where it looked over the period ([`Report::predicted`]; of the rows linearised at `u`).
-    /// `None` where no program was solved. Costs another solve: a check, not for every step. Inside an [`IntegratedFilter`]
-    /// u and u_ref are those of the rate.
+    /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the conditions of
+    /// optimality of its QP. They are small multiples of 1e-16 for a pointwise step. Where the step looked over the
+    /// period ([`Report::predicted`]) they are of the rows linearised at `u`, and up to the 1e-9 at which the search
+    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step. Inside an
+    /// [`IntegratedFilter`] u and u_ref are those of the rate.
     ///
     /// # Errors
     ///
@@ -221,9 +221,9 @@ impl SafetyFilter {
         self.slots.iter().map(|slot| slot.name.as_str())
     }
 
-    /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample: its
-    /// promise starts anew there, from the derivatives h then has, at once. Until then the input of the last sample
-    /// keeps the old promise, and the new profile starts with a zero error, so that no guarantee has a gap.
+    /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample. Its promise
+    /// starts anew there, from the derivatives that h then has. Until then the input of the last sample keeps the old
+    /// promise, and the new profile starts with a zero error: no guarantee has a gap.
     ///
     /// # Errors
     ///
@@ -263,9 +263,9 @@ impl SafetyFilter {
         Ok(())
     }
 
-    /// Says for how long the input of the next sample will be held, in s, finite, > 0, or that nobody knows (`None`): for
-    /// whoever is told, such as a co-simulation slave by the size of its step. [`Sampling::Measured`] then goes by it.
-    /// It is asked at every sample, and not part of [`Self::state`].
+    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where nobody
+    /// knows. It is for whoever is told, such as a co-simulation slave by the size of its step.
+    /// [`Sampling::Measured`] then goes by it at every sample. It is not part of [`Self::state`].
     ///
     /// # Errors
     ///
@@ -281,7 +281,7 @@ impl SafetyFilter {
         self.slots.get_mut(index).ok_or_else(|| Error::new(ErrorKind::Range, "barrier", message()))
     }
 
-    /// Why barrier `index` goes by another method than the configured one since its anchor
+    /// The reason why barrier `index` goes by another method than the configured one since its anchor
     /// ([`BarrierReport::fallback`]); `None` where it does not. Computed anew: not for every step.
     pub fn refusal(&self, index: usize) -> Option<Refusal> {
         self.slots.get(index)?.promise.refusal(self.state.barriers.get(index)?)

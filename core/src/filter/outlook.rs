@@ -1,5 +1,5 @@
-//! What a sample says of h until the next one: whether the input that is held keeps the promise at every instant
-//! (docs/theory.md, section 7).
+//! The outlook of a sample: whether the held input keeps the promise at every instant until the next sample
+//! (`docs/theory.md#between-samples`).
 
 use super::hold::{Hold, Lowest};
 use super::search::Requirement;
@@ -8,7 +8,7 @@ use crate::convergence::sampled::PeriodBound;
 use crate::qp::{self, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
-/// What the derivatives at a sample say of h until the next one.
+/// The course of h until the next sample, as the derivatives at a sample foresee it.
 #[derive(Clone, Copy)]
 pub(super) struct Outlook<'a> {
     pub(super) n: usize,
@@ -23,7 +23,7 @@ impl Outlook<'_> {
         (j..self.n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
     }
 
-    /// The most by which the terms of that polynomial but the first can move h.
+    /// The most by which the terms of that polynomial after the first can move h.
     fn moved(&self, highest: f64, s: f64) -> f64 {
         let (mut power, mut sum) = (1.0, 0.0);
         for k in 1..=self.n {
@@ -33,7 +33,7 @@ impl Outlook<'_> {
         sum
     }
 
-    /// The row that `requirement`, on h alone, is to the order n; `normal` is that of h⁽ⁿ⁾.
+    /// The row of `requirement`, which is on h alone, to the order n; `normal` is that of h⁽ⁿ⁾.
     pub(super) fn row_at(&self, requirement: &Requirement, normal: &[f64; MAX_INPUTS]) -> Row {
         let s = requirement.ahead;
         let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
@@ -41,8 +41,8 @@ impl Outlook<'_> {
         Row { normal: *normal, floor }
     }
 
-    /// Where the promise is broken in the `hold` (s) that begins, along the model, if it is; in a set that is kept, in one
-    /// that may last as `long`.
+    /// The instant at which the promise is broken along the model in the `hold` (s) that begins, if it is. In a set
+    /// that is kept, the hold may last as `long` (s).
     pub(super) fn look(
         &self,
         promise: &FixedTimeState,
@@ -62,8 +62,8 @@ impl Outlook<'_> {
         };
         let h = self.drift[0];
         let highest = self.drift[self.n] + qp::dot(normal, held.u);
-        // With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
-        // radians shows where the hold ends.
+        // Far enough from the edge the model need not be asked. With n = 1 a set that moves faster than the samples
+        // shows in no derivative that is known here; a turn by radians shows where the hold ends.
         let is_clear = || {
             let agrees = |end: [f64; MAX_RELATIVE_DEGREE + 1]| {
                 let mut power = 1.0;
@@ -87,11 +87,11 @@ impl Outlook<'_> {
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
         let size = promise.anchor[0].abs() + promise.margin + h.abs();
-        // What is not a number is no promise.
+        // Not-a-number keeps no promise.
         (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
     }
 
-    /// The same without a model, to the order n.
+    /// The lowest h without a model, to the order n.
     fn lowest_of_polynomial(&self, highest: f64, from: f64, to: f64) -> Lowest {
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
@@ -100,7 +100,8 @@ impl Outlook<'_> {
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
-    /// What would keep the promise of `barrier` at the instant at which it is broken; nothing does at the sample itself.
+    /// The requirement that keeps the promise of `barrier` at the instant at which it is broken. There is none for
+    /// the sample itself.
     pub(super) fn requirement(
         &self,
         barrier: usize,

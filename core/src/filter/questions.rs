@@ -1,4 +1,4 @@
-//! What can be asked of a filter between its samples: it remembers none of it.
+//! Questions to a filter between its samples; it remembers none of them.
 
 use super::SafetyFilter;
 use crate::error::{Error, length, non_negative, positive};

@@ -1,4 +1,4 @@
-//! What a step says about itself.
+//! The report of a step.
 
 use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
 use crate::qp::{Active, Constraint, Row, Solver, dot};
@@ -6,7 +6,7 @@ use crate::qp::{Active, Constraint, Row, Solver, dot};
 /// Part of the deadline without progress in [`BarrierReport::deadlocked`].
 const DEADLOCK_TIME: f64 = 0.1;
 
-/// How a step ended, and so what the returned input means. The numbers are stable: they leave the
+/// The end of a step, and so the meaning of the returned input. The numbers are stable: they leave the
 /// library as the FMU's `status`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -86,7 +86,7 @@ impl Status {
 pub struct BarrierReport {
     /// h now, in its own unit; not a number where the state is not.
     pub h: f64,
-    /// Where the barrier stands with its promise.
+    /// The phase of the barrier's promise.
     pub phase: Phase,
     /// The lower bound on h that the constraint promises at this time, in the unit of h.
     pub profile: f64,
@@ -99,38 +99,38 @@ pub struct BarrierReport {
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
-    /// μ in force since the anchor, `[h]`: the settings' margin and what held inputs are expected to cost.
+    /// μ in force since the anchor, `[h]`: the settings' margin and the expected cost of held inputs.
     pub margin: f64,
     /// Whether the configured method could not be used from the anchor and another took its place
     /// ([`SafetyFilter::refusal`](super::SafetyFilter::refusal) says why).
     pub fallback: bool,
-    /// How often leaving the set has re-armed the deadline (the settings' `recovery`).
+    /// Number of times that leaving the set has re-armed the deadline (the settings' `recovery`).
     pub recoveries: u32,
     /// Whether no input within the bounds has h ≥ 0 at the deadline ([`reach`](crate::reach)): true from the
     /// first sample of the approach at which that is certain, for plants and barriers that know it.
     pub deadline_unreachable: bool,
-    /// How often a deadline that the bounds do not allow was given up for a later one, which time left,
-    /// profile and guarantee are then about (the settings' `infeasible`).
+    /// Number of deadlines given up for a later one, because the bounds do not allow them (the settings'
+    /// `infeasible`). Time left, profile and guarantee are then about the later one.
     pub postponed: u32,
-    /// The row aᵀu ≥ b given to the quadratic program; a and b in `[h]`/sⁿ. Where the step looked
-    /// over the sampling period ([`Report::predicted`]), its linearisation at the returned u.
+    /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. Where the step looked over the sampling period
+    /// ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
     pub slack: f64,
     /// Steps in a row that have not met the constraint, this one included.
     pub unmet_steps: u32,
-    /// Where the constraint is not met: the number of the barrier whose row is active and points most
-    /// against this one's, if there is one.
+    /// The number of the barrier whose row is active and points most against this one's, if there is one and this
+    /// one's constraint is not met.
     pub blocked_by: Option<usize>,
     /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
-    /// been met, and h has not risen by a hundredth of its size. What leads out of it is a u_ref that goes around
+    /// been met, and h has not risen by a hundredth of its size. A u_ref that goes around leads out of it
     /// (`Heading::around` of the reference controllers), if this barrier lets it: a hard one that is not
     /// met stays at its least violation, whatever u_ref is; a soft one
     /// ([`Strictness::Soft`](super::Strictness::Soft)) yields to it.
     pub deadlocked: bool,
-    /// How far h may fall below its promise within the period because the input is held, `[h]`: what
-    /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not
-    /// look over the period.
+    /// Expected fall of h below its promise within the period because the input is held, `[h]`: the loss that
+    /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not look
+    /// over the period.
     pub sampling_loss: f64,
 }
 
@@ -156,7 +156,7 @@ impl BarrierReport {
         sampling_loss: 0.0,
     };
 
-    /// Before the program is solved.
+    /// The report before the QP is solved.
     #[inline]
     pub(super) fn of(promise: &FixedTimeState, h: f64, demand: DerivativeBound, row: Row) -> Self {
         Self {
@@ -181,7 +181,7 @@ impl BarrierReport {
         }
     }
 
-    /// Fills in what the promise remembers.
+    /// Fills in the memory of the promise.
     pub(super) fn remember(&mut self, promise: &FixedTimeState) {
         self.phase = promise.phase;
         self.arrival_time = promise.arrival;
@@ -195,19 +195,18 @@ impl BarrierReport {
     }
 }
 
-/// What a step did.
+/// The report of a step.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
     /// Time of the sample in s.
     pub time: f64,
-    /// How the step ended.
+    /// The end of the step.
     pub status: Status,
-    /// Which method solved the quadratic program.
+    /// The method that solved the QP.
     pub solver: Solver,
-    /// Rounds of the active-set method, iterations of the interior-point method, else 0. The one number here that
-    /// depends on what the filter did before other than by its state: a step is faster where the same rows and bounds
-    /// are active as in the last.
+    /// Rounds of the active-set method, iterations of the interior-point method, else 0. It alone depends on more than
+    /// the filter's state: a step is faster where the same rows and bounds are active as in the one before.
     pub iterations: u32,
     /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.
     pub period: f64,
@@ -236,7 +235,7 @@ impl Report {
         self.barriers.iter().enumerate().filter(|(_, b)| b.unmet_steps > 0).map(|(i, _)| i)
     }
 
-    /// Finds which of the `active` rows blocks the barriers that are not met, and whether that is a deadlock.
+    /// Finds the `active` row that blocks each barrier that is not met, and whether that is a deadlock.
     /// `barrier` is the number of the barrier that a row belongs to.
     pub(super) fn find_deadlocks(
         &mut self,
@@ -265,7 +264,7 @@ impl Report {
         }
     }
 
-    /// All but the barriers, which a sample writes anew.
+    /// Resets all but the barriers, which a sample writes anew.
     pub(super) fn reset(&mut self, t: f64) {
         self.time = t;
         self.status = Status::Unchanged;

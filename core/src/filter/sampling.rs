@@ -1,22 +1,23 @@
-//! How long an input is held, and what of that the constraint accounts for.
+//! The time for which an input is held, and how much of it the constraint accounts for (`docs/theory.md#period`).
 //!
-//! The constraint over a period is (S) of [`crate::convergence::sampled`]; the input that meets it is found in
-//! [`super::search`].
+//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds
+//! the input that meets it.
 
 use super::FilterState;
 use crate::error::{Error, positive};
 
-/// How the filter accounts for inputs that are held between samples.
+/// The account that a filter takes of inputs held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Sampling {
-    /// Not at all: the constraint is enforced at the samples, and the margin has to cover what the held
-    /// input costs, Mδ/aⁿ.
+    /// None: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs,
+    /// Mδ/aⁿ.
     Pointwise,
-    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a longer
-    /// one that was seen not long ago: a period is forgotten within a hundred of its length, so that a very short step
-    /// between long ones changes nothing. After a gap the period at most doubles from step to step. Where somebody says
-    /// how long the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it is that. The default.
+    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a
+    /// longer one that was seen not long ago. A period is forgotten within a hundred of its length, so a very short
+    /// step between long ones changes nothing. After a gap the period at most doubles from step to step. Where
+    /// somebody says how long the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it
+    /// is that. The default.
     Measured {
         /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth
         /// of the shortest deadline.
@@ -49,9 +50,8 @@ impl Sampling {
         }
     }
 
-    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint.
-    /// What somebody says of it (`expected`) is taken where it is another number than what was measured, and not the
-    /// same one with other round-off.
+    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint. The `expected` one is
+    /// taken where it differs from the measured one by more than round-off.
     pub(super) fn period(
         self,
         state: &FilterState,
@@ -59,7 +59,7 @@ impl Sampling {
         first: f64,
         expected: Option<f64>,
     ) -> Option<f64> {
-        /// Of one step, relative: times are sums of many.
+        /// Relative round-off of one step: times are sums of many.
         const SAME: f64 = 1e-6;
         match self {
             Self::Pointwise => None,
@@ -72,10 +72,10 @@ impl Sampling {
         }
     }
 
-    /// How long in s a hold may turn out that is thought to last `hold`, if nobody `told` its length.
+    /// The longest time in s that a hold of `hold` s may turn out to last; `told`: somebody gave its length.
     pub(super) fn longest(self, hold: f64, told: bool) -> f64 {
-        /// Of steps drawn at random between half of the longest and the longest, what was measured not long ago is
-        /// seldom less than the next one by more.
+        /// Longest next step over the measured one, seldom exceeded where steps are drawn at random between half of the
+        /// longest and the longest.
         const JITTER: f64 = 1.25;
         match self {
             Self::Measured { .. } if !told => JITTER * hold,
@@ -86,11 +86,11 @@ impl Sampling {
 
 /// The period in s that samples up to `t` show: that of the last step, or of longer ones not long before.
 fn measured(state: &FilterState, t: f64, first: f64) -> f64 {
-    /// By this part of the time that passes a longer period is forgotten: a hundred of them.
+    /// Decrease of a longer period per time that passes: it is forgotten within a hundred of its length.
     const FORGOTTEN: f64 = 0.01;
-    /// Growth from step to step.
+    /// Largest growth from step to step.
     const GROWTH: f64 = 2.0;
-    /// A first step shorter than this part of what was thought says nothing.
+    /// A first step shorter than this part of the expected one says nothing.
     const TINY: f64 = 1e-3;
     let Some(last) = state.time else { return first };
     let passed = t - last;

@@ -1,32 +1,30 @@
-//! What a held input does until the next sample: the sampled form of the rows, and the search for an
-//! input that meets it.
+//! The rows over the sampling period, and the search for an input that meets them.
 //!
-//! The row of the pointwise constraint is affine in u; its integral over the period
-//! ([`crate::convergence::sampled`]) is not, because the state at the end of the period depends on u
-//! through the plant. It is solved by Newton's method on the rows: linearise them at the present
-//! guess, solve the quadratic program, and go towards its answer as far as the violation decreases
-//! (halving the way), that of the rows which the program does not give up. On the way only rows that are
-//! active or violated are linearised anew; the others keep their last linearisation, at first the pointwise
-//! row, and all are evaluated where the search ends.
+//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`])
+//! is not, because the state at the end of the period depends on u through the plant. Newton's method on the rows
+//! solves it: linearise at the present candidate, solve the QP, and go towards its answer. Each step goes as far as
+//! the violation of the rows that the QP does not give up decreases, halving the way. Only rows that are active or
+//! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
+//! evaluated where the search ends.
 //!
-//! The guesses start from the answer of the pointwise rows and from the input of the step before; the better
-//! result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
-//! guess matters: where the row nearly vanishes, a vehicle across the line of sight, it carries the turn that
-//! was begun on through the instants at which the linearisation cannot see it. It is left out where the first
-//! has met every row by full steps that became shorter tenfold each (the rows are all but affine there, and the
-//! answer is the only one near), no further from u_ref than the last input is. Answers that differ by round-off
-//! count as equal: a sample taken again gives the same bits.
+//! There are two candidates to start from: the answer of the pointwise rows, and the input of the step before. The
+//! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
+//! candidate matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
+//! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
+//! has met every row by full steps that became shorter tenfold each, and is no further from u_ref than the last input
+//! is. The rows are all but affine there, and the answer is the only one near. Answers that differ by round-off count
+//! as equal, so a sample taken again gives the same bits.
 //!
-//! An answer is settled where its steps contracted like that, or where both guesses end at it, and it is not far
-//! out against u_ref, where the plant turns and other answers exist, nor one aside of which the row that u_ref violates
-//! leaves more room than the way there costs: a vehicle that brakes straight ahead where it could turn to either side is at
-//! rest between two answers. So a step taken again, or cut in two, by a master that looks for the size of its steps gives
-//! the same. Any other one, above all one that does not meet the rows, is what the module `wide` begins from: it takes another answer's place only if that meets all hard rows
-//! and is nearer, so that what is right keeps its bits. Rows that cannot be met together are given up as the
-//! program says, by priority.
+//! An answer is settled where its steps contracted like that, or where both candidates end at it. Two answers are not
+//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside:
+//! the row that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where
+//! it could turn to either side is at rest between two such answers. So a master that takes a step again, or cuts it
+//! in two, gets the same input. From any answer that is not settled, above all from one that does not meet the rows,
+//! the module `wide` searches on. Its answer takes the place only if it meets all hard rows and is nearer, so what is
+//! right keeps its bits. Rows that cannot be met together are given up as the QP says, by priority.
 //!
-//! Violations are round-off where they are small against the terms that h and its derivatives are made of, not
-//! against what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
+//! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
+//! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
 mod wide;
 
@@ -39,56 +37,56 @@ use crate::qp::{
 };
 use crate::{MAX_INPUTS, MAX_ROWS};
 
-/// Violations up to this part of a row's terms count as met: what Newton's method leaves.
+/// Violations up to this part of a row's terms count as met: Newton's method leaves as much.
 const MET: f64 = 1e-9;
 /// Violations up to this part of the terms that the derivatives of h are made of count as met: some thousand
 /// roundings of 1e-16.
 const ROUND_OFF: f64 = 1e-12;
-/// Answers that differ by no more than this, as a part of their size, are one.
+/// Answers that differ by no more than this, as a part of their size, count as one.
 const SAME: f64 = 1e-6;
-/// An answer further from u_ref than this many times the size of that, or of 1, is looked at by the wide search.
+/// Distance from u_ref beyond which an answer is not settled, over the size of u_ref and the last input, or 1.
 const FAR: f64 = 8.0;
-/// How far aside of an answer a nearer one is looked for, as a part of its distance from u_ref.
+/// Distance aside of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
 const ASIDE: f64 = 0.5;
-/// Linearisations per guess.
+/// Linearisations per candidate.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
 const HALVINGS: u32 = 8;
-/// The part of the decrease that the linearisation foretells which must come true.
+/// The part of the foretold decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
-/// How much shorter each step of a search must be than the one before, for its answer to be the only one near.
+/// Largest ratio of each step of a search to the one before, for its answer to be the only one near.
 const CONTRACTION: f64 = 0.1;
 
-/// What is asked of one barrier at one instant ahead.
+/// The requirement on one barrier at one instant ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Requirement {
     /// The number of the barrier.
     pub(super) barrier: usize,
-    /// Of its derivatives at that instant.
+    /// The bound on its derivatives at that instant.
     pub(super) bound: PeriodBound,
-    /// How far ahead that is, in s, finite, > 0.
+    /// The time in s until that instant, finite, > 0.
     pub(super) ahead: f64,
 }
 
 impl Requirement {
-    /// What h⁽ʲ⁾ at the end is divided by, to be comparable with a row on h⁽ⁿ⁾, where j is the highest order that
-    /// the bound weighs: h⁽ⁿ⁾ held for the duration δ changes it by δⁿ⁻ʲ/(n − j)! of itself. That is the
-    /// duration for j = n − 1.
+    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
+    /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 the
+    /// divisor is δ.
     fn divisor(&self, n: usize) -> f64 {
         let order = self.bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
         (1..=n - order).fold(1.0, |product, i| product * (self.ahead / i as f64))
     }
 }
 
-/// One sampled problem: where it starts and what it asks for.
+/// The rows over the period as functions of u, for the search.
 pub(super) struct PeriodProblem<'a> {
     pub(super) slots: &'a [BarrierSlot],
-    /// At most [`MAX_ROWS`]; each has a row.
+    /// Requirements, at most [`MAX_ROWS`]; each has a row.
     pub(super) requirements: &'a [Requirement],
     pub(super) t: f64,
     pub(super) bounds: &'a Bounds,
     pub(super) u_ref: &'a [f64],
-    /// Of each requirement.
+    /// Enforcement of each requirement.
     pub(super) enforcement: &'a [Enforcement],
     pub(super) correction_limit: f64,
     pub(super) errors: &'a MeasurementErrors,
@@ -96,7 +94,7 @@ pub(super) struct PeriodProblem<'a> {
     pub(super) widens: bool,
 }
 
-/// Models of the sampled rows, and how far each is from being met at the present u, in units of its terms.
+/// Linear models of the sampled rows, and the violation of each at the present u in units of its terms.
 struct Linearised<'a> {
     rows: &'a mut [Row],
     violations: [f64; MAX_ROWS],
@@ -153,18 +151,18 @@ impl PeriodProblem<'_> {
         if self.is_met_by_reference(u, doubtful, &mut at)? {
             return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
         }
-        // Newton's method from both guesses.
+        // Newton's method from both candidates.
         let watched = doubtful | at.violated();
         let against = at.most_violated();
         let Found { mut best, mut at_best, mut settled } =
             self.descend(u, [Some(&*pointwise), last], watched, &mut at, qp)?;
-        // An input that far out turns the plant by an angle: there the rows have other answers, which steps that
-        // contract do not see.
+        // Is the answer settled? An input far out turns the plant by an angle: there the rows have other answers, which
+        // steps that contract do not see.
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
         settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, i, &mut at));
-        // Far around, where the answer is in doubt.
+        // Look far around where the answer is in doubt.
         let widens = self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal;
         if !settled
             && widens
@@ -174,7 +172,7 @@ impl PeriodProblem<'_> {
         }
         if !(at_best && settled) {
             self.judge(u, &mut at)?;
-            // What is active at the answer.
+            // The last answer of the QP has to be that of the rows at u: it says which are active.
             qp.solve(&self.problem(at.rows), pointwise);
         }
         let outcome = match best.outcome {
@@ -182,14 +180,14 @@ impl PeriodProblem<'_> {
             // The linearised rows can be met, the rows themselves could not.
             Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
             Outcome::Optimal => Outcome::IllConditioned,
-            // What was relaxed on the way has been met after all.
+            // Rows relaxed on the way have been met after all.
             Outcome::Infeasible | Outcome::IllConditioned if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
     }
 
-    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows; those that are `doubtful` are looked at
+    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows. The `doubtful` ones are looked at
     /// first, and alone if one of them is violated.
     fn is_met_by_reference(&self, u: &mut [f64], doubtful: RowSet, at: &mut Linearised) -> Option<bool> {
         for (i, ui) in u.iter_mut().enumerate() {
@@ -203,8 +201,8 @@ impl PeriodProblem<'_> {
         Some(at.worst(RowSet::EMPTY) <= 0.0)
     }
 
-    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later ones are left out
-    /// where one before met every row by steps that contracted.
+    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is
+    /// left out where the one before met every row by steps that contracted.
     fn descend(
         &self,
         u: &mut [f64],
@@ -275,7 +273,7 @@ impl PeriodProblem<'_> {
         Some(())
     }
 
-    /// The row that a requirement is at `u`, and how far it is from being met there in units of its terms.
+    /// The row of a requirement linearised at `u`, and its violation there in units of its terms.
     fn linearised(&self, requirement: &Requirement, u: &[f64]) -> Option<(Row, f64)> {
         let (slot, mut ahead) = (&self.slots[requirement.barrier], Ahead::ZERO);
         let x = &slot.now.from[..];
@@ -283,7 +281,7 @@ impl PeriodProblem<'_> {
         if !known || !ahead.is_finite() {
             return None;
         }
-        // On h⁽ⁿ⁾, as the pointwise one.
+        // A row on h⁽ⁿ⁾, as the pointwise one.
         let n = slot.degree();
         let divisor = requirement.divisor(n);
         let Weighted { mut value, mut terms, mut normal } =
@@ -305,13 +303,13 @@ impl PeriodProblem<'_> {
             moved += (a * v).abs();
         }
         let row = Row { normal, floor: at_u - value };
-        // Near a floor of 0 the ends are small differences of what the input moves.
+        // Near a floor of 0 the value is a small difference of what the input moves.
         let terms = terms + moved;
         let violation = if value < -MET * terms { -value / terms } else { 0.0 };
         row.floor.is_finite().then_some((row, violation))
     }
 
-    /// As [`Self::linearise`] of all rows, where violations that are round-off count as met.
+    /// Linearises all rows at `u`, with violations that are round-off counted as met.
     fn judge(&self, u: &[f64], at: &mut Linearised) -> Option<()> {
         self.linearise(u, RowSet::ALL, at)?;
         for i in 0..at.rows.len() {
@@ -327,9 +325,9 @@ impl PeriodProblem<'_> {
 
     /// The size of the terms whose sum the row of a requirement is.
     ///
-    /// A sum that cancels says nothing about it: 10 − p on the boundary. But a change of every state and of the
-    /// time by a small part of itself shows it, as the terms no longer cancel: each part is another one, of
-    /// either sign, so that sums of states do not cancel again.
+    /// A sum that cancels says nothing about its terms: 10 − p on the boundary. So every state and the time are changed
+    /// by a small part of themselves, and the terms no longer cancel. Each part is another one, of either sign, so that
+    /// sums of states do not cancel again.
     fn size(&self, requirement: &Requirement, u: &[f64]) -> f64 {
         const STATES: usize = 64;
         const PART: f64 = 1e-6;
@@ -360,7 +358,7 @@ impl PeriodProblem<'_> {
         let (m, far) = (u.len(), self.distance(u));
         let kept = (at.rows[i], at.violations[i]);
         let mut found = false;
-        // The axis that is most along u − u_ref has nothing aside that the others have not.
+        // The axis that is most along u − u_ref adds no direction aside to those of the others.
         let way = |i: usize| (u[i] - self.u_ref[i]).abs();
         let main = (0..m).fold(0, |main, i| if way(i) > way(main) { i } else { main });
         for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
@@ -387,8 +385,8 @@ impl PeriodProblem<'_> {
         found
     }
 
-    /// Newton's method from `u`, on the rows that the linearised program does not give up; those of
-    /// `watched`, and all that become active or violated, are linearised on the way, all of them at the end.
+    /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that
+    /// become active or violated, are linearised on the way, all of them at the end.
     fn newton(
         &self,
         u: &mut [f64],
@@ -413,7 +411,7 @@ impl PeriodProblem<'_> {
         let (target, mut last_way) = (&mut target[..m], f64::INFINITY);
         let mut ended = false;
         for _ in 0..ITERATIONS {
-            // The answer of the program linearised here.
+            // The answer of the QP linearised here.
             let solution = qp.solve(&self.problem(at.rows), target);
             found.relaxed = soft | qp.relaxed() | qp.ill_conditioned();
             (found.outcome, found.solver) = (solution.outcome, solution.solver);
@@ -421,7 +419,7 @@ impl PeriodProblem<'_> {
             found.violation = at.worst(found.relaxed);
             let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-            // It is the end where that moves nothing any more, and every row has been linearised.
+            // It ends where that answer moves nothing any more, and every row has been linearised.
             if found.violation <= 0.0 && way <= MET * size {
                 if watched != RowSet::ALL {
                     self.linearise(u, RowSet::ALL, at)?;
@@ -434,7 +432,7 @@ impl PeriodProblem<'_> {
                 }
                 continue;
             }
-            // Towards it, as far as the violation decreases.
+            // Go towards it, as far as the violation decreases.
             found.sure &= way <= CONTRACTION * last_way;
             last_way = way;
             watched |= active(qp) | at.violated();
@@ -442,6 +440,7 @@ impl PeriodProblem<'_> {
                 break;
             }
         }
+        // Not ended: judge where it stopped.
         if !ended {
             self.judge(u, at)?;
             found.violation = at.worst(found.relaxed);
@@ -467,7 +466,7 @@ impl PeriodProblem<'_> {
         let (violation, mut part) = (found.violation, 1.0);
         for _ in 0..=HALVINGS {
             for i in 0..m {
-                // Between two points within the bounds, but for round-off.
+                // Round-off may leave the bounds, between two points within them.
                 u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));
             }
             if self.linearise(u, watched, at).is_some() {
@@ -485,25 +484,25 @@ impl PeriodProblem<'_> {
     }
 }
 
-/// What Newton's method found from all guesses.
+/// The result of Newton's method from all guesses.
 struct Found {
     best: Candidate,
-    /// Whether the rows are linearised at the best.
+    /// Whether the rows are linearised at `best`.
     at_best: bool,
-    /// Whether it is surely right: by steps that contracted, or the same from both guesses.
+    /// Whether it is surely right: reached by steps that contracted, or the same from both guesses.
     settled: bool,
 }
 
-/// What a search came to.
+/// An input that the search arrived at.
 struct Candidate {
-    /// The rows that are not among those counted in `violation`.
+    /// The rows that `violation` does not count.
     relaxed: RowSet,
     violation: f64,
     distance: f64,
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
-    /// Whether the program linearised at it does not move it any more.
+    /// Whether the QP linearised at it does not move it any more.
     ended: bool,
     /// Whether it met every row by steps that contracted: there is no other answer near.
     sure: bool,

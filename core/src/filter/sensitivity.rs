@@ -1,17 +1,17 @@
-//! How the input that a filter returns changes with the state and the input wanted.
+//! The change of the input that a filter returns with the state and the input wanted.
 //!
-//! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds, G_i the row i: affine in u
-//! for the pointwise constraint, not where it is enforced over the period. With the active ones A, their
-//! multipliers λ and a prime for the derivative along the direction (x', u_ref'),
+//! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds. The row G_i is affine in u for
+//! the pointwise constraint, not where it is enforced over the period. With the active ones A, their
+//! multipliers ϑ and a prime for the derivative along the direction (x', u_ref'),
 //!
 //! ```text
-//! u' − Σ_{i∈A} (λ_i' ∇_u G_i + λ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
+//! u' − Σ_{i∈A} (ϑ_i' ∇_u G_i + ϑ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
 //! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
 //! ```
 //!
-//! by the implicit function theorem. A bound that holds u_j has u_j' = 0. A soft row at its largest
-//! multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
-//! direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
+//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft
+//! row at its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with
+//! one more direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
 //!
 //! # References
@@ -33,31 +33,30 @@ use crate::{MAX_INPUTS, MAX_ROWS};
 /// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampleDerivative {
-    /// Of the returned input, unit of u over that of the direction; zeros above the number of inputs.
+    /// Derivative of the returned input, unit of u over that of the direction; zeros above the number of inputs.
     pub u: [f64; MAX_INPUTS],
-    /// In the order of the barriers.
+    /// Derivatives of the reports, in the order of the barriers.
     pub barriers: Vec<BarrierDerivative>,
     /// State, direction and zeros.
     scratch: [Vec<f64>; 3],
 }
 
-/// The derivative of what of a [`BarrierReport`](super::BarrierReport) varies continuously; its time left does not vary with
-/// the direction.
+/// The derivative of those numbers of a [`BarrierReport`](super::BarrierReport) that vary continuously with the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BarrierDerivative {
-    /// Of [`BarrierReport::h`](super::BarrierReport::h).
+    /// Derivative of [`BarrierReport::h`](super::BarrierReport::h).
     pub h: f64,
-    /// Of [`BarrierReport::profile`](super::BarrierReport::profile).
+    /// Derivative of [`BarrierReport::profile`](super::BarrierReport::profile).
     pub profile: f64,
-    /// Of [`BarrierReport::margin`](super::BarrierReport::margin).
+    /// Derivative of [`BarrierReport::margin`](super::BarrierReport::margin).
     pub margin: f64,
-    /// Of [`BarrierReport::slack`](super::BarrierReport::slack).
+    /// Derivative of [`BarrierReport::slack`](super::BarrierReport::slack).
     pub slack: f64,
-    /// Of [`BarrierReport::sampling_loss`](super::BarrierReport::sampling_loss).
+    /// Derivative of [`BarrierReport::sampling_loss`](super::BarrierReport::sampling_loss).
     pub sampling_loss: f64,
 }
 
-/// Why a derivative is not known. The number is that of the barrier.
+/// The reason why a derivative is not known. The number is that of the barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoDerivative {
@@ -103,17 +102,17 @@ impl fmt::Display for NoDerivative {
 
 impl std::error::Error for NoDerivative {}
 
-/// How one row moves.
+/// The derivative of one row along the direction.
 #[derive(Clone, Copy)]
 struct RowDerivative {
-    /// The slack at a fixed u.
+    /// Derivative of the slack at a fixed u.
     slack: f64,
-    /// The normal.
+    /// Derivative of the normal.
     normal: [f64; MAX_INPUTS],
-    /// The same of the pointwise slack, and its normal.
+    /// Derivative of the pointwise slack at a fixed u; then the pointwise normal itself.
     pointwise: f64,
     pointwise_normal: [f64; MAX_INPUTS],
-    /// Of the loss per pointwise slack.
+    /// Derivative of the attenuation Λ.
     attenuation: f64,
 }
 
@@ -127,24 +126,24 @@ impl RowDerivative {
     };
 }
 
-/// How far, as a part of its size, the input may be from the answer to the rows linearised at it: round-off,
-/// but where Newton's method ran into its limit of iterations, some of 100 samples. The derivative is then in
-/// error by a number of that order.
+/// Largest distance, as a part of its size, of the input from the answer to the rows linearised at it. It is round-off,
+/// but where Newton's method ran into its limit of iterations, some of 100 samples. The derivative is then in error by
+/// a number of that order.
 const SAME_INPUT: f64 = 1e-3;
 
-/// The same where the rows are not met, which says that the search got stuck.
+/// The same where the rows are not met: beyond it the search got stuck.
 const SAME_INPUT_UNMET: f64 = 1e-6;
 
-/// A multiplier from this part of its largest on is at it.
+/// A multiplier from this part of its largest on counts as the largest.
 const SATURATED: f64 = 1.0 - 1e-9;
 
 impl SafetyFilter {
-    /// Computes how what [`Self::peek`] returns changes along a direction: where `state` is x and its
-    /// direction, `reference` is u_ref and its direction. Remembers nothing; the report is that of the sample.
+    /// Computes the derivative of what [`Self::peek`] returns along a direction: `state` is x and its direction,
+    /// `reference` is u_ref and its direction. Remembers nothing; the report is that of the sample.
     ///
-    /// Exact for the piece in force. The input is a piecewise smooth function: where rows, bounds, a phase
-    /// or the better of two searches change, it has a kink or a jump, and this is the derivative of the piece
-    /// that the sample was computed on. By status:
+    /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
+    /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
+    /// sample was computed. By status:
     ///
     /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
     ///   in components that a bound holds.
@@ -155,8 +154,8 @@ impl SafetyFilter {
     /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
     ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
     ///
-    /// Does not allocate where `out` has been used with this filter before. Where the answer is not `None`, the
-    /// derivative is not known and `out` means nothing.
+    /// Does not allocate where `out` has been used with this filter before. An answer that is not `None` says why the
+    /// derivative is not known; `out` then means nothing.
     ///
     /// # Errors
     ///
@@ -223,6 +222,7 @@ impl SafetyFilter {
         if self.workspace.requirements.len() > self.slots.len() {
             return Err(NoDerivative::Instants);
         }
+        // The derivative of every row at a fixed u.
         let mut row_derivatives = [RowDerivative::NONE; MAX_ROWS];
         for (i, row_derivative) in row_derivatives[..self.slots.len()].iter_mut().enumerate() {
             (*row_derivative, barriers[i]) = self.row_derivative(i, t, state, u, scratch)?;
@@ -248,6 +248,7 @@ impl SafetyFilter {
         if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
             return Err(NoDerivative::NotConverged);
         }
+        // The derivative of u: (8) with the active rows, else the direction of u_ref but at bounds.
         let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
             let mut equations = Equations::new(du_ref);
@@ -291,6 +292,7 @@ impl SafetyFilter {
             }
         }
 
+        // The numbers of the report that follow u: slack and sampling loss.
         for (i, (b, row_derivative)) in barriers.iter_mut().zip(&row_derivatives).enumerate() {
             b.slack = row_derivative.slack + dot(&rows[i].normal, du);
             let loss = report.barriers[i].sampling_loss;
@@ -304,7 +306,7 @@ impl SafetyFilter {
         Ok(())
     }
 
-    /// The state from which barrier `i` is held, and its direction, in `scratch`.
+    /// Writes the state from which barrier `i` is held, and its direction, to `scratch`.
     fn begin(&self, i: usize, [x, dx]: [&[f64]; 2], scratch: &mut [Vec<f64>; 3]) -> Result<(), NoDerivative> {
         let [from, along, _] = scratch;
         from.clear();
@@ -317,7 +319,7 @@ impl SafetyFilter {
         if known { Ok(()) } else { Err(NoDerivative::Source(i)) }
     }
 
-    /// How row `i` and what is reported of its barrier move at the fixed input `u`.
+    /// The derivative of row `i` and of its barrier's report at the fixed input `u`.
     fn row_derivative(
         &self,
         i: usize,
@@ -332,6 +334,7 @@ impl SafetyFilter {
         if !slot.source.ahead_along(t, state, held, 0.0, &mut change) {
             return Err(NoDerivative::Source(i));
         }
+        // h, and whether the promise has a derivative at this sample.
         let mut derivative = BarrierDerivative { h: change.value[0], ..BarrierDerivative::default() };
         let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
         if matches!(promise.phase, Phase::Waiting | Phase::Released) {
@@ -343,6 +346,7 @@ impl SafetyFilter {
         if promise.postponed != before.postponed {
             return Err(NoDerivative::Postponed(i));
         }
+        // h and its derivatives where the input begins to act.
         let begin = t + self.delay;
         self.begin(i, state, scratch)?;
         let [from, along, _] = &*scratch;
@@ -352,6 +356,7 @@ impl SafetyFilter {
         let n = slot.source.relative_degree();
         let mut now = Derivatives::ZERO;
         slot.source.evaluate(begin, from, &mut now);
+        // The floors of the promise, and the pointwise row.
         let period = workspace.report.predicted.then_some(workspace.report.period);
         let anchors = is_anchored(before, promise, begin);
         let stack = [&now.drift[..n], &change.value[..n]];
@@ -372,6 +377,7 @@ impl SafetyFilter {
             pointwise_normal: now.row,
             attenuation: sampled.attenuation,
         };
+        // The row over the period.
         if let Some(period) = period {
             let mut ahead = Ahead::ZERO;
             let known = slot.source.ahead(begin, from, u, period, &mut ahead)
@@ -388,7 +394,7 @@ impl SafetyFilter {
         Ok((row_derivative, derivative))
     }
 
-    /// The derivative of row `k`'s normal by u: `[i][j]` of its component i by u_j.
+    /// The derivative of row `k`'s normal by u: `[i][j]` is that of its component i by u_j.
     fn curvature(
         &self,
         k: usize,
@@ -462,7 +468,7 @@ fn pull_saturated(
     equations.pull(&change, &pull);
 }
 
-/// How the row of `bound` moves where the derivatives at the end of the period move by `change`.
+/// The derivative of the row of `bound` where the derivatives at the end of the period move by `change`.
 fn weighted(bound: &PeriodBound, change: &Ahead, n: usize, inputs: usize, period: f64) -> Weighted {
     let homogeneous = PeriodBound { floor: 0.0, ..*bound };
     homogeneous.weighted(&change.value[..n], &change.gradient, inputs, period)

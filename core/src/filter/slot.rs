@@ -1,4 +1,4 @@
-//! One barrier of a filter: its derivatives, its promise, when that is in force, and what a sample makes of it.
+//! One barrier of a filter: its derivatives, its promise, when that is in force, and the result of a sample for it.
 
 use super::errors::{ErrorSlopes, MeasurementErrors};
 use super::hold::Lowest;
@@ -13,42 +13,42 @@ use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{Bounds, Enforcement, Row};
 use crate::{MAX_RELATIVE_DEGREE, reach};
 
-/// When a barrier begins to be enforced. Its deadline counts from the filter's first sample in any case, so
-/// that "be in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
+/// The time from which a barrier is enforced. Its deadline counts from the filter's first sample in any case: "be
+/// in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Begin {
-    /// At the first sample.
+    /// From the first sample.
     #[default]
     AtOnce,
-    /// This many seconds after it, finite, ≥ 0, less than the deadline.
+    /// From this many seconds after it, finite, ≥ 0, less than the deadline.
     At(f64),
-    /// When the barrier of this number, counted from 0 and added before, has arrived.
+    /// From the arrival of the barrier of this number, counted from 0 and added before.
     AfterArrival(usize),
 }
 
-/// When a barrier ceases to be enforced ([`Phase::Released`]).
+/// The time until which a barrier is enforced ([`Phase::Released`] from then on).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum End {
-    /// Never.
+    /// For ever.
     #[default]
     Never,
-    /// This many seconds after the filter's first sample, finite, > 0.
+    /// Until this many seconds after the filter's first sample, finite, > 0.
     At(f64),
-    /// As soon as h ≥ 0 has been reached.
+    /// Until h ≥ 0 has been reached.
     OnArrival,
 }
 
-/// What becomes of a barrier's constraint where not all can be met within the input bounds.
+/// The standing of a barrier's constraint where not all can be met within the input bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Strictness {
-    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: what is safe is kept before
-    /// what is promised is reached.
+    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: keeping safe sets goes before reaching
+    /// promised ones.
     #[default]
     KeepFirst,
     /// Hard: met as far as the bounds and the barriers of smaller numbers allow; of equal ones the one added
     /// first goes first.
     Priority(u32),
-    /// Soft, with an exact penalty: it yields, also to u_ref, where it would cost more than this distance
+    /// Soft, with an exact penalty: it yields, to u_ref too, where it would cost more than this distance
     /// ‖u − u_ref‖, in units of u, finite, > 0.
     Soft(f64),
 }
@@ -63,28 +63,28 @@ pub(super) struct BarrierSlot {
     pub(super) strictness: Strictness,
     /// Whether the state is measured without errors.
     pub(super) exact: bool,
-    /// What the present sample makes of it.
+    /// The result of the present sample.
     pub(super) now: SlotSample,
 }
 
-/// What a sample makes of a barrier: scratch memory that every sample writes anew.
+/// Result of a sample for one barrier: scratch memory that every sample writes anew.
 pub(super) struct SlotSample {
-    /// Whether the barrier is in force; all that follows is of such a one.
+    /// Whether the barrier is in force; the other fields mean something only where it is.
     pub(super) in_force: bool,
     /// The state from which the input acts.
     pub(super) from: Vec<f64>,
-    /// Of h there, along the plant.
+    /// Derivatives of h there, along the plant.
     pub(super) derivatives: Derivatives,
-    /// Of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
+    /// Derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
     pub(super) slopes: Vec<ErrorSlopes>,
     /// The least h⁽ⁿ⁾ that keeps the promise.
     pub(super) bound: DerivativeBound,
-    /// The row on u that this is.
+    /// The row on u that follows from it.
     pub(super) row: Row,
     pub(super) enforcement: Enforcement,
-    /// What h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ have to meet at the end of the period.
+    /// The bound on h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the end of the period.
     pub(super) period_bound: PeriodBound,
-    /// Where the held input breaks the promise before the next sample, if it does.
+    /// The instant at which the held input breaks the promise before the next sample, if it does.
     pub(super) lowest: Option<Lowest>,
 }
 
@@ -103,7 +103,7 @@ impl SlotSample {
         }
     }
 
-    /// Asks for nothing.
+    /// Takes the barrier out of force: it asks for nothing.
     fn idle(&mut self) {
         self.in_force = false;
         (self.row, self.period_bound, self.lowest) = (Row::ZERO, PeriodBound::ZERO, None);
@@ -126,8 +126,8 @@ impl BarrierSlot {
         self.promise.relative_degree()
     }
 
-    /// Evaluates h and its derivatives along the plant where the input begins to act (docs/theory.md, sections 2 and 8).
-    /// Returns h at the sample itself.
+    /// Evaluates h and its derivatives along the plant where the input begins to act
+    /// (docs/theory.md, sections 1 and 8). Returns h at the sample itself.
     #[inline]
     pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64]) -> f64 {
         let Self { source, now, .. } = self;
@@ -141,8 +141,9 @@ impl BarrierSlot {
         h
     }
 
-    /// Moves the promise number `index` of `promises` to the sample, where h is `h` (section 5): whether it is in force, its
-    /// anchor, phase, and the least h⁽ⁿ⁾ that keeps it. Returns whether the deadline is unreachable.
+    /// Moves the promise number `index` of `promises` to the sample, where h is `h`: whether it is in force, its
+    /// anchor, its phase, and the least h⁽ⁿ⁾ that keeps it (docs/theory.md, sections 6 and 8). Returns whether the
+    /// deadline is unreachable.
     ///
     /// # Errors
     ///
@@ -188,8 +189,8 @@ impl BarrierSlot {
         Ok(is_unreachable)
     }
 
-    /// The row of that: L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (section 2), and (S) of the period (section 7). Returns whether there
-    /// is one of the period.
+    /// Forms the row of that floor, L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (docs/theory.md, section 1), and (S) of the period
+    /// (`docs/theory.md#sampled-form`). Returns whether there is one of the period.
     #[inline]
     pub(super) fn form_row(&mut self, promise: &FixedTimeState, moment: &Moment) -> bool {
         let n = self.degree();
@@ -204,7 +205,7 @@ impl BarrierSlot {
         bound.is_some()
     }
 
-    /// (S) over another time in s, `None` where the barrier is not in force or has none.
+    /// (S) over another `duration` in s, `None` where the barrier is not in force or has none.
     pub(super) fn over(
         &self,
         promise: &FixedTimeState,
@@ -215,7 +216,7 @@ impl BarrierSlot {
         self.now.in_force.then(|| self.promise.over_period(promise, moment.begin, stack, duration))?
     }
 
-    /// What the derivatives say of h until the next sample.
+    /// The course of h until the next sample, as the derivatives foresee it.
     pub(super) fn outlook(&self) -> Outlook<'_> {
         Outlook { n: self.degree(), drift: &self.now.derivatives.drift }
     }
@@ -229,7 +230,7 @@ impl BarrierSlot {
         errors.of_derivatives(&*self.source, moment.t, moment.x, moment.u_ref.len(), &mut self.now.slopes)
     }
 
-    /// What plant and inputs can do about h; notes in `promise` how well it can be influenced.
+    /// The influence of plant and inputs on h⁽ⁿ⁾. Notes the largest ‖L_gL_fⁿ⁻¹h‖ so far in `promise`.
     #[inline]
     fn means(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds) -> Means {
         let Derivatives { drift, row, .. } = &self.now.derivatives;
@@ -247,7 +248,7 @@ impl BarrierSlot {
         Means { drift: drift[self.degree()], reach, weight, hold: moment.hold }
     }
 
-    /// How strictly its row is enforced.
+    /// The enforcement of its row.
     pub(super) fn enforcement(&self, promise: &FixedTimeState) -> Enforcement {
         match self.strictness {
             Strictness::KeepFirst => Enforcement::Hard { priority: u32::from(!promise.was_inside()) },
@@ -289,8 +290,8 @@ impl BarrierSlot {
         begun && !ended
     }
 
-    /// Anchors `promise` where it waits for that, from the least derivatives `h`; and where samples turn out to be further
-    /// apart than was thought then, takes the margin for that into account.
+    /// Anchors `promise` where it waits for that, from the least derivatives `h`. Where samples turn out to be
+    /// further apart than was thought at the anchor, adapts the margin.
     #[inline]
     fn anchor(&self, promise: &mut FixedTimeState, moment: &Moment, h: &[f64]) {
         let covered = moment.covered();
@@ -307,13 +308,13 @@ impl BarrierSlot {
         }
     }
 
-    /// Whether model and measurement say all of h: what a disturbance may do for it is never ruled out.
+    /// Whether model and measurement are exact. Otherwise nothing is ruled out: a disturbance may help.
     pub(super) fn is_undisturbed(&self) -> bool {
         self.exact && self.promise.settings().disturbance == 0.0
     }
 
-    /// Whether the deadline, in `time_left` s, certainly cannot be met: no input within `bounds` has h ≥ 0 then, or it has
-    /// passed outside.
+    /// Whether the deadline, in `time_left` s, certainly cannot be met: no input within `bounds` has h ≥ 0 then
+    /// (`docs/theory.md#lost-deadline`), or it has passed outside.
     fn is_unreachable(
         &self,
         promise: &FixedTimeState,
@@ -334,7 +335,7 @@ impl BarrierSlot {
     /// Gives up a deadline that is lost, where the settings say so: starts the promise anew with a later one
     /// ([`Infeasible::Soonest`]). Returns whether it did.
     fn postpone(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds, h: &[f64]) -> bool {
-        /// How much longer than what is not ruled out: getting there takes less than stopping there does.
+        /// New deadline over the soonest time not ruled out: stopping in the set takes longer than getting there.
         const FACTOR: f64 = 2.0;
         const GROWTH: f64 = 1.5;
         /// The longest deadline looked for, in units of the configured one.
@@ -359,7 +360,7 @@ impl BarrierSlot {
     }
 }
 
-/// Why derivatives cannot carry a constraint, if they cannot.
+/// The reason why derivatives cannot carry a constraint, if they cannot.
 #[inline]
 fn defect(derivatives: &Derivatives) -> Option<Status> {
     /// An input that enters below the declared degree by more than this part of the row is real.

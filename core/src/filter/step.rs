@@ -1,5 +1,4 @@
-//! One sample, in the order of the mathematics: evaluate, advance, rows, solve, report. Section numbers are those of
-//! docs/theory.md.
+//! One sample, in the order of the mathematics: evaluate, advance, rows, solve, report.
 
 use super::hold::Hold;
 use super::search::{PeriodProblem, Requirement};
@@ -10,21 +9,21 @@ use crate::qp::{Enforcement, Outcome, Problem, Solution};
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_ROWS};
 
-/// How often a sample adds the instants at which its answer breaks a promise, and is solved again.
+/// Most times that a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
-/// Of steps in a row that do not meet a constraint, so many of the first look far around for an input, and then every
-/// such one.
+/// Steps that look far around for an input where they do not meet a constraint: the first 8 in a row, then every 16th.
 const WIDE: (u32, u32) = (8, 16);
 
-/// How much further from u_ref, or 1, an instant may move the input.
+/// Largest distance from u_ref to which an added instant may move the input, over the largest of the distance before,
+/// |u_ref| and 1.
 const MUCH_FURTHER: f64 = 4.0;
 
-/// When and where a sample is taken, and for how long its input is held.
+/// Time and place of a sample, and the hold of its input.
 pub(super) struct Moment<'a> {
     /// Time of the sample in s.
     pub(super) t: f64,
-    /// From the sample until its input acts, in s.
+    /// Time in s from the sample until its input acts.
     pub(super) delay: f64,
     /// Time in s from which its input acts.
     pub(super) begin: f64,
@@ -32,9 +31,9 @@ pub(super) struct Moment<'a> {
     pub(super) u_ref: &'a [f64],
     /// The period in s that the rows look over, `None` for the pointwise constraint.
     pub(super) period: Option<f64>,
-    /// How long the input may be held, in s.
+    /// The longest time in s that the input is expected to be held.
     pub(super) hold: f64,
-    /// How long a hold may turn out that is thought to last `hold`.
+    /// The longest time in s that a hold of `hold` s may turn out to last.
     pub(super) long: f64,
     /// Whether the period is measured.
     pub(super) measures: bool,
@@ -50,7 +49,7 @@ impl Moment<'_> {
 }
 
 impl SafetyFilter {
-    /// Makes a sample: its input to `u`, its report and the state after it to the workspace.
+    /// Takes a sample: writes its input to `u`, its report and the state after it to the workspace.
     pub(super) fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
         length("x", x.len(), self.state_dim)?;
         length("u_ref", u_ref.len(), self.input_dim)?;
@@ -93,8 +92,8 @@ impl SafetyFilter {
         }
     }
 
-    /// Evaluates every barrier, moves its promise to the sample, and forms its row (sections 2, 5 and 7). Returns whether
-    /// all have a row over the period.
+    /// Evaluates every barrier, moves its promise to the sample, and forms its row
+    /// (docs/theory.md, sections 1 and 6 to 8). Returns whether all have a row over the period.
     ///
     /// # Errors
     ///
@@ -134,7 +133,8 @@ impl SafetyFilter {
         found.map(|()| is_sampled)
     }
 
-    /// Where the next sample may come at the end of the period or of the longest step, asks for both (section 7).
+    /// Asks for (S) at the end of the longest step too, where that is longer than the period
+    /// (docs/theory.md, section 7).
     fn require_longest(&mut self, moment: &Moment, is_sampled: bool) {
         let Workspace { next, report, requirements, .. } = &mut self.workspace;
         let period = moment.period.filter(|_| is_sampled);
@@ -154,23 +154,26 @@ impl SafetyFilter {
         }
     }
 
-    /// Solves; where h would break its promise between the samples, once more with that instant as a row (section 7).
+    /// Solves. Where h would break its promise between the samples, solves again with that instant as a row
+    /// (`docs/theory.md#between-samples`).
     fn solve(&mut self, moment: &Moment, u: &mut [f64]) -> Solution {
         let listed = self.workspace.requirements.len();
         let (mut round, mut allowed) = (0, f64::INFINITY);
         loop {
             let solution = self.solve_once(moment, listed, u);
             self.look(moment, u);
-            // An input that turns the plant by many radians makes any prediction true.
+            // An answer that is too far out does not count: an input that turns the plant by many radians makes any
+            // prediction true.
             let distance = u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
             let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
             if self.workspace.requirements.len() > listed && !met {
-                // That instant cannot be had as well: the flag says so.
+                // That instant cannot be had as well: solve without it, and the report says so.
                 self.workspace.requirements.truncate(listed);
                 round = ROUNDS;
                 continue;
             }
-            // With n = 1 the model hardly turns, and an instant soon after the sample takes what it takes.
+            // Limit how far an instant may move the input. With n = 1 there is no limit: the model hardly turns, and an
+            // instant soon after the sample may need a large input.
             if self.slots.iter().any(|slot| slot.now.lowest.is_some() && slot.degree() > 1) {
                 let size = moment.u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
                 allowed = MUCH_FURTHER * size;
@@ -182,11 +185,12 @@ impl SafetyFilter {
         }
     }
 
-    /// Solves the quadratic program, over the period where all barriers have a row of it and a model to predict with
-    /// (sections 7 and 9); the first `listed` requirements begin from the pointwise rows.
+    /// Solves the QP: over the period where all barriers have a row of it and a model to predict with
+    /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
         let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
+        // Over the period.
         if !requirements.is_empty() {
             for (i, requirement) in requirements.iter().enumerate() {
                 let now = &self.slots[requirement.barrier].now;
@@ -196,7 +200,7 @@ impl SafetyFilter {
                     false => self.slots[requirement.barrier].outlook().row_at(requirement, &now.row.normal),
                 };
             }
-            // Where rows have not been met for some steps, looking far around at each would find what it found before.
+            // Where rows have not been met for some steps, looking far around at every one would find nothing new.
             let widens =
                 |b: &FixedTimeState| b.unmet.is_none_or(|u| u.steps < WIDE.0 || u.steps % WIDE.1 == 0);
             let problem = PeriodProblem {
@@ -216,6 +220,7 @@ impl SafetyFilter {
                 return solution;
             }
         }
+        // Pointwise, where there is no row over the period or no prediction.
         report.predicted = false;
         for (i, slot) in self.slots.iter().enumerate() {
             (rows[i], enforcement[i]) = (slot.now.row, slot.now.enforcement);
@@ -249,7 +254,8 @@ impl SafetyFilter {
         requirements.len() > before
     }
 
-    /// Says what the step did, and what becomes of each promise (section 5).
+    /// Reports the step, and notes for each promise whether it was met and is still guaranteed
+    /// (docs/theory.md, section 7).
     fn report_on(&mut self, moment: &Moment, solution: Solution, u: &[f64]) {
         let Workspace { next, report, rows, requirements, qp, .. } = &mut self.workspace;
         if moment.measures && self.state.time.is_some_and(|last| moment.t > last) {
@@ -266,6 +272,7 @@ impl SafetyFilter {
             Outcome::IllConditioned => Status::NoAuthority,
             Outcome::Failed => Status::SolverFailed,
         };
+        // Each barrier: its slack, its loss, and whether its guarantee goes on.
         let (status, predicted) = (report.status, report.predicted);
         let mut blocked = false;
         for (i, slot) in self.slots.iter().enumerate().filter(|(_, slot)| slot.now.in_force) {
@@ -277,7 +284,7 @@ impl SafetyFilter {
             report.slack = row.slack(u);
             let soft = matches!(slot.now.enforcement, Enforcement::Soft { .. });
             let met = status.is_satisfied() && !soft || row.holds(u);
-            // A row without what the errors may do is not the one of the theorem.
+            // With measurement errors, only the predicted rows contain them and are those of the theorem.
             let is_kept = slot.now.lowest.is_none() && (predicted || self.errors.is_exact());
             promise.guaranteed &= met && is_kept;
             promise.unmet = (!met).then(|| Unmet::after(promise.unmet, moment.t, report.h));
@@ -291,8 +298,7 @@ impl SafetyFilter {
         }
     }
 
-    /// Enforces nothing: the admissible input nearest 0. The promises stay as they were, but those already given lose their
-    /// guarantee.
+    /// Enforces nothing and gives the admissible input nearest 0. Promises stay as they were, but lose their guarantee.
     fn abstain(&mut self, status: Status, u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = status;

@@ -251,7 +251,7 @@ mod tests {
         (response, taylor)
     }
 
-    /// What a model would do with a scalar: every operation.
+    /// Every operation that a model may apply to a scalar.
     fn operations<S: Scalar>(a: S, b: S, t: S) -> [S; 18] {
         let (sin, cos) = a.sin_cos();
         [

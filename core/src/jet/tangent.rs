@@ -5,8 +5,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::derived_operators;
 use crate::scalar::Scalar;
 
-/// `v + d ε` with `ε² = 0` over any scalar: with a [`Dual`](super::Dual) inside, the gradient and its
-/// derivative along a further direction, which is what second derivatives are made of.
+/// `v + d ε` with `ε² = 0` over any scalar. With a [`Dual`](super::Dual) inside it is the gradient and its
+/// derivative along a further direction: second derivatives are made of these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangent<C> {
     /// The value.

@@ -1,17 +1,16 @@
 //! The state and the barrier's derivatives a moment ahead, under an input that is held.
 //!
-//! Let φ(s; x, u) be the state s seconds after x under the constant input u. Running the classical
-//! Runge-Kutta method on dual numbers whose gradients are those along u gives φ and ∂φ/∂u; the series
-//! of h started there gives h⁽ᵏ⁾(t + s) and its total derivative with respect to u,
+//! The classical Runge-Kutta method runs on dual numbers whose gradients are those along u. It gives the state x(t + σ)
+//! after σ seconds, and its derivative by u. The series of h started there gives h⁽ᵏ⁾(t + σ) and its total derivative,
 //!
 //! ```math
-//! h^{(k)} \circ \varphi \quad \text{and} \quad \frac{\partial (h^{(k)} \circ \varphi)}{\partial u}
-//! = \frac{\partial h^{(k)}}{\partial x} \frac{\partial \varphi}{\partial u} + \frac{\partial h^{(k)}}{\partial u},
+//! \frac{\partial h^{(k)}(t+\sigma)}{\partial u}
+//! = \frac{\partial h^{(k)}}{\partial x} \frac{\partial x(t+\sigma)}{\partial u} + \frac{\partial h^{(k)}}{\partial u},
 //! \qquad k = 0 \dots n. \tag{4}
 //! ```
 //!
-//! The error is the integrator's, O(s⁵) over [`SUBSTEPS`] substeps; (4) is the exact derivative of what
-//! is computed, so that Newton's method on it converges quadratically.
+//! The error is the integrator's, O(σ⁵) over [`SUBSTEPS`] substeps. (4) is the exact derivative of what is computed, so
+//! Newton's method on it converges quadratically.
 
 use nalgebra::SVector;
 
@@ -127,7 +126,7 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     out.write((0..K).map(|k| h.derivative(k)));
 }
 
-/// As [`evaluate`], the derivative of what that writes along the direction (`dx`, `du`) of state and input.
+/// Writes the derivative of what [`evaluate`] writes, along the direction (`dx`, `du`) of state and input.
 pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),
     time: (f64, f64),

@@ -1,13 +1,13 @@
-//! Which derivative of a barrier the inputs enter first.
+//! The relative degree: the order of the first derivative of a barrier that inputs enter.
 //!
-//! A constraint built for relative degree n needs every input that reaches h to enter h⁽ⁿ⁾ and none
-//! to enter an earlier derivative. An input that never enters is harmless (the steering of a vehicle
-//! does not act on a speed limit). Inputs that enter at *different* orders are not: one row on h⁽ⁿ⁾
-//! with the lower n uses only the input that comes first, with the higher n it is wrong.
+//! A constraint for relative degree n needs every input that reaches h to enter h⁽ⁿ⁾, and none to enter an earlier
+//! derivative. An input that never enters is harmless: the steering of a vehicle does not act on a speed limit. Inputs
+//! that enter at *different* orders are not harmless. A row on h⁽ⁿ⁾ with the lower n uses only the input that comes
+//! first; with the higher n it is wrong.
 //!
-//! The orders are read off the gradients of [`barrier_series`] at sample states. A sample may lie
-//! where a gradient vanishes by accident (the centre of a disc, standing still), so where an order is
-//! not the lowest found, two neighbours of the sample are asked as well.
+//! The orders are read off the gradients of [`barrier_series`] at sample states. At a sample a gradient may vanish by
+//! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of
+//! the sample are asked as well.
 
 use std::array::from_fn;
 
@@ -152,12 +152,12 @@ where
     })
 }
 
-/// For each input the first order at which it enters.
+/// The first order at which each input enters.
 type Orders = [Option<usize>; MAX_INPUTS];
 
-/// What the samples showed.
+/// The orders found on the samples.
 struct Findings {
-    /// Number of inputs; what follows is `None` for those above.
+    /// Number of inputs; orders are `None` for those above.
     inputs: usize,
     /// Per input the lowest order over all samples.
     lowest: Orders,
@@ -169,8 +169,8 @@ struct Findings {
 
 impl Findings {
     fn add(&mut self, t: f64, x: &[f64], series: &mut impl FnMut(f64, &[f64]) -> Coefficients) {
-        /// How far a neighbour is, as a part of the component and absolutely: far enough that a
-        /// gradient that vanishes at the sample only is seen there.
+        /// Distance of a neighbour, as a part of the component and absolutely. A gradient that vanishes at the
+        /// sample only is seen that far away.
         const AWAY: f64 = 1e-3;
         let Some(mut orders) = orders(&series(t, x)) else { return };
         let mut numbers = Numbers(1);

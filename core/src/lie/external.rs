@@ -39,7 +39,7 @@ impl DerivativeSource for External {
         duration == 0.0
     }
 
-    /// As [`Self::ahead`]: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
+    /// Knows the present only: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
     fn ahead_along(
         &self,
         t: f64,
@@ -63,9 +63,9 @@ fn dot(row: &[f64], u: &[f64]) -> f64 {
 /// L_f^n h (the derivative of order n where all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input
 /// adds to that), in `[h]`/s^k and `[h]`/(s^n · unit of u). Of a time-varying h they are total derivatives.
 ///
-/// They are taken as they are: nobody checks `n`, and nothing can be predicted, so that steps are those of
-/// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise) and the margin has to cover held inputs. For several
-/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded) picks each.
+/// They are taken as they are: nobody checks `n`. Nothing can be predicted, so steps are those of
+/// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise), and the margin has to cover held inputs. For several
+/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded()) picks each.
 ///
 /// # Errors
 ///

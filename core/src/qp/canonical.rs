@@ -1,11 +1,11 @@
-//! The minimiser from its active rows and bounds, by one computation that depends on nothing else: so a guess of
-//! what is active changes the time that an answer takes, and not its bits.
+//! The minimiser from its active rows and bounds, by one computation that depends on nothing else. So a guess of
+//! the active ones changes the time that an answer takes, and not its bits.
 //!
 //! With the active normals N = Q R (module [`factors`](super::factors)) and their slacks s at u_ref,
 //! `u = u_ref − Q R⁻ᵀ s` and `λ = −R⁻¹ R⁻ᵀ s`. Where every λ is positive, every other row and bound holds with room
-//! to spare, and the normals are far from dependent, u satisfies the conditions of Karush, Kuhn and Tucker strictly:
-//! it is the minimiser, and no other set of rows and bounds is active in it. So whichever way the set was found,
-//! the last answer's or a method's, [`solve`] gives the same u for it.
+//! to spare, and the normals are far from dependent, u satisfies the conditions of Karush, Kuhn and Tucker strictly.
+//! It is the minimiser, and no other set of rows and bounds is active in it. So [`solve`] gives the same u for a set
+//! from the last answer and for one that a method found.
 
 use super::factors::{Factors, dot};
 use super::{Active, Constraint, Enforcement, Problem, Row};
@@ -37,6 +37,7 @@ pub(super) fn solve<const N: usize>(p: &Problem, guess: &mut [Active], u: &mut [
     let mut u_ref = [0.0; N];
     u_ref[..dim].copy_from_slice(p.u_ref);
 
+    // Factorise the active normals.
     let mut factors = Factors::<N>::EMPTY;
     factors.clear(dim);
     let mut norms = [0.0; N];
@@ -52,7 +53,8 @@ pub(super) fn solve<const N: usize>(p: &Problem, guess: &mut [Active], u: &mut [
         }
         factors.append(&projection);
     }
-    // The second pass takes what round-off has left of the slacks: u_ref may be far larger than u.
+    // Solve for u and the multipliers. The second pass corrects the round-off of the slacks: u_ref may be far larger
+    // than u.
     let (mut found, mut multipliers) = (u_ref, [0.0; N]);
     for _ in 0..2 {
         let mut y = [0.0; N];
@@ -69,6 +71,7 @@ pub(super) fn solve<const N: usize>(p: &Problem, guess: &mut [Active], u: &mut [
             *to += y;
         }
     }
+    // Bounds are met exactly; all else has to hold strictly.
     for &constraint in &*active {
         match constraint {
             Constraint::Row(_) => {}
@@ -98,7 +101,7 @@ fn affine<const N: usize>(p: &Problem, constraint: Constraint) -> Option<([f64; 
             normal.copy_from_slice(&row.normal[..N]);
             row.floor
         }
-        // Of a component that this problem does not have: a guess from another one.
+        // A component that this problem does not have: the guess is from another one.
         Constraint::Lower(i) | Constraint::Upper(i) if i >= p.u_ref.len() => return None,
         Constraint::Lower(i) => {
             normal[i] = 1.0;
@@ -112,7 +115,7 @@ fn affine<const N: usize>(p: &Problem, constraint: Constraint) -> Option<([f64; 
     Some((normal, floor))
 }
 
-/// Whether `u` satisfies the conditions with room to spare, `active` being what holds it.
+/// Whether `u`, held by `active`, satisfies the conditions with room to spare.
 fn is_strict<const N: usize>(
     p: &Problem,
     active: &[Constraint],

@@ -3,8 +3,8 @@
 //!
 //! A column is appended by Gram-Schmidt, done twice: that keeps Q orthonormal to round-off for every
 //! column that is not counted as dependent. One is removed by plane rotations of R's rows and Q's
-//! columns. Only the first `len` columns mean anything, so that starting anew costs nothing. [f64; N]s
-//! have N components, of which those from `dim` on are 0.
+//! columns. Only the first `len` columns mean anything, so starting anew costs nothing. Arrays have N
+//! components, of which those from `dim` on are 0.
 
 /// A normal whose part outside the span of the active ones is below this part of it depends on them.
 const DEPENDENT: f64 = 1e-14;
@@ -36,12 +36,12 @@ impl<const N: usize> Factors<N> {
     pub(super) const EMPTY: Self =
         Self { dim: 0, len: 0, basis: [[0.0; N]; N], upper: [[0.0; N]; N], inverse: [0.0; N] };
 
-    /// No column, of `dim` components each.
+    /// Removes all columns; new ones have `dim` components.
     pub(super) fn clear(&mut self, dim: usize) {
         (self.dim, self.len) = (dim, 0);
     }
 
-    /// Takes `normal`, of length `norm`, apart.
+    /// Splits `normal`, of length `norm`, into its parts inside and outside the span.
     #[inline(always)]
     pub(super) fn project(&self, normal: &[f64; N], norm: f64) -> Projection<N> {
         let mut p = Projection { inside: [0.0; N], outside: *normal, square: norm * norm };
@@ -76,7 +76,7 @@ impl<const N: usize> Factors<N> {
         p
     }
 
-    /// Appends the normal that `p` is of; its `square` is not 0.
+    /// Appends the normal whose projection is `p`; its `square` is not 0.
     #[inline(always)]
     pub(super) fn append(&mut self, p: &Projection<N>) {
         let k = self.len;

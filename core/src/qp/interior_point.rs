@@ -47,7 +47,7 @@ pub(super) fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], limit: f64, u:
             (false, false) => Outcome::Infeasible,
         }
     } else {
-        // Some row asks for more than the limit: the others are still to be met.
+        // Some row asks for more than the limit: meet the others.
         let near: Vec<Row> = units.iter().filter(within_reach).copied().collect();
         let far = near.len() < units.len();
         if !(far && answer(&near, &relaxed, u)) {
@@ -116,6 +116,7 @@ fn attempt(rows: &[Row], bounds: &Bounds, u_ref: &[f64], penalty: Option<f64>, u
             d.push((r - bounds.min[i]) / unit);
         }
     }
+    // Minimise ½vᵀPv + qᵀv: the slacks have the penalty for their price.
     let diagonal: Vec<f64> = (0..variables).map(|j| if j < m { 1.0 } else { 0.0 }).collect();
     let indices: Vec<usize> = (0..variables).collect();
     let p = CscMatrix::new_from_triplets(variables, variables, indices.clone(), indices, diagonal);

@@ -1,4 +1,4 @@
-//! How far an input is from satisfying the Karush-Kuhn-Tucker conditions.
+//! The residuals of an input in the Karush-Kuhn-Tucker conditions.
 
 use super::{Active, Constraint, Enforcement, Problem, Row};
 use crate::MAX_INPUTS;
@@ -43,7 +43,8 @@ impl Residuals {
                 Constraint::Upper(i) => pull(i, -1.0),
             }
         }
-        // u is known to the round-off of these terms, as a length of √W u.
+        // The violation of each row, and the distance of each active one from its floor. u is known to the round-off of
+        // the terms above, as a length of √W u.
         let length = (0..m).fold(0.0, |s: f64, i| s.max(size[i] / weight(i).sqrt()));
         let part = |row: &Row, slack: f64| {
             let terms = |s: f64, i: usize| s + (row.normal[i] / weight(i).sqrt()).abs() * length;

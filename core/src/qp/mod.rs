@@ -1,4 +1,4 @@
-//! The quadratic program `min ½‖u − u_ref‖²` under affine rows and bounds: linear algebra only.
+//! The quadratic program (QP) `min ½‖u − u_ref‖²` under affine rows and bounds: linear algebra only.
 //!
 //! ```text
 //! minimise ½ (u − u_ref)ᵀ W (u − u_ref)  subject to  a_iᵀ u ≥ b_i (i = 1 … m),  u_min ≤ u ≤ u_max
@@ -11,18 +11,19 @@
 //! - one row, W = 1: closed form, with or without bounds (module `single_row`).
 //! - else: a dual active-set method (module `dual_active_set`), exact up to round-off.
 //!
-//! None of these allocates. A wrong answer would show in [`Workspace::residuals`]. clarabel (module `interior_point`), which does, can be chosen instead.
+//! None of these allocates. A wrong answer would show in [`Workspace::residuals`]. clarabel (module
+//! `interior_point`), which does allocate, can be chosen instead.
 //!
-//! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible:
-//! each in the order of priority (then of the list) as little as those before it allow, and among the inputs
-//! that do so the one nearest to u_ref is returned. Soft rows ([`Enforcement::Soft`]) yield to every hard
-//! one. The outcome says which it was, [`Workspace::relaxed`] which rows.
+//! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible. Each,
+//! in the order of priority and then of the list, is violated as little as those before it allow. Among the inputs
+//! that do so the one nearest to u_ref is returned. Soft rows ([`Enforcement::Soft`]) yield to every hard one.
+//! [`Solution::outcome`] says whether rows were relaxed, [`Workspace::relaxed`] which.
 //!
 //! A row whose normal vanishes, or that would move u by more than the correction limit, is ill-conditioned:
 //! where there are several rows it is left out and the others are met.
 //!
 //! A workspace starts warm: where several rows or bounds are active it tries those of its last answer first. The
-//! answer has the same bits either way (module `canonical`); [`Solution::iterations`] alone tells.
+//! answer has the same bits either way (module `canonical`); only [`Solution::iterations`] differs.
 
 mod canonical;
 mod dual_active_set;
@@ -94,13 +95,13 @@ fn power_of_two(normal: &[f64]) -> Option<f64> {
     (largest > 0).then(|| f64::from_bits((EXPONENT - ONE).saturating_sub(largest).max(ONE)))
 }
 
-/// `row` times [`power_of_two`]: out of reach of overflow.
+/// `row` times [`power_of_two`], so that it cannot overflow.
 fn scaled(row: &Row) -> Option<Row> {
     let scale = power_of_two(&row.normal)?;
     Some(Row { normal: row.normal.map(|a| a * scale), floor: row.floor * scale })
 }
 
-/// How far the rows moved `u`: its distance from the reference within the bounds.
+/// Distance by which the rows moved `u`, from the reference within the bounds.
 fn distance_from_clamped(u: &[f64], bounds: &Bounds, u_ref: &[f64]) -> f64 {
     u.iter().zip(u_ref).enumerate().fold(0.0, |d: f64, (i, (v, r))| d.hypot(v - bounds.clamp(i, *r)))
 }
@@ -130,7 +131,7 @@ impl Bounds {
     }
 }
 
-/// How strictly a row is enforced.
+/// Strictness with which a row is enforced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Enforcement {
     /// Met wherever bounds and the rows of higher priority allow. The smaller number goes first; of equal
@@ -142,26 +143,26 @@ pub enum Enforcement {
     /// Exact (L1) penalty: the row yields once it costs more than this distance in u. Its multiplier, for a
     /// normal of length 1, does not exceed `penalty`.
     Soft {
-        /// In units of u (of √W u where there are weights), > 0.
+        /// Distance in units of u (of √W u where there are weights), > 0.
         penalty: f64,
     },
 }
 
-/// One program.
+/// One QP.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
-    /// At most [`MAX_ROWS`].
+    /// Rows, at most [`MAX_ROWS`].
     pub rows: &'a [Row],
-    /// Never relaxed.
+    /// Bounds, never relaxed.
     pub bounds: &'a Bounds,
-    /// Finite, 1 to [`MAX_INPUTS`] components.
+    /// u_ref: finite, 1 to [`MAX_INPUTS`] components.
     pub u_ref: &'a [f64],
     /// The diagonal of W, finite and > 0, in 1/(unit of u)²; `None` for ones.
     pub weights: Option<&'a [f64]>,
-    /// Of each row; rows beyond its end are hard with priority 0.
+    /// Enforcement of each row; rows beyond its end are hard with priority 0.
     pub enforcement: &'a [Enforcement],
-    /// How far, > 0 in units of u, the rows may move u from the reference within its bounds: one that needs
-    /// more is ill-conditioned.
+    /// Largest distance, > 0 in units of u, by which the rows may move u from the reference within its bounds. A
+    /// row that needs more is ill-conditioned.
     pub correction_limit: f64,
 }
 
@@ -172,7 +173,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Which method solves problems that no closed form does.
+/// Method for problems that have no closed form.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
@@ -185,7 +186,7 @@ pub enum Backend {
     InteriorPoint,
 }
 
-/// Which method produced the answer. The numbers are stable.
+/// Method that produced the answer. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u8)]
@@ -201,7 +202,7 @@ pub enum Solver {
     DualActiveSet = 3,
 }
 
-/// What the returned input is.
+/// Meaning of the returned input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The minimiser.
@@ -216,19 +217,19 @@ pub enum Outcome {
     Failed,
 }
 
-/// How a solve went.
+/// Outcome and effort of a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Solution {
-    /// What the returned input is.
+    /// Meaning of the returned input.
     pub outcome: Outcome,
-    /// Which method produced it.
+    /// Method that produced it.
     pub solver: Solver,
     /// Rounds of the active-set method or iterations of the interior-point method, else 0; 0 too where the rows
     /// and bounds of the workspace's last answer were those of this one.
     pub iterations: u32,
 }
 
-/// What can be active.
+/// A row or bound that can be active.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Constraint {
     /// A row, by its place in the list.
@@ -243,18 +244,18 @@ pub enum Constraint {
 /// an upper bound is −1 in its component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Active {
-    /// Which one.
+    /// The row or bound.
     pub constraint: Constraint,
-    /// For the normal as given. ≥ 0 up to round-off, but for the rows and bounds that forbid a hard row.
+    /// Multiplier of the normal as given. ≥ 0 up to round-off, but for the rows and bounds that forbid a hard row.
     pub multiplier: f64,
 }
 
-/// The memory of a solve, to be used again and again. What it remembers of the last answer makes the next one
-/// faster where the same rows and bounds are active, and changes no bit of it.
+/// The memory of a solve, to be used again and again. Its memory of the last answer makes the next one faster
+/// where the same rows and bounds are active, and changes no bit of it.
 #[derive(Clone)]
 pub struct Workspace {
     backend: Backend,
-    // The method for the number of inputs, rounded up: a third of the time of the last one for two inputs.
+    // The method for the number of inputs, rounded up. For two inputs it takes a third of the time of the last one.
     two: DualActiveSet<2>,
     four: DualActiveSet<4>,
     any: DualActiveSet<MAX_INPUTS>,
@@ -271,7 +272,7 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// For any problem, with this method where there is no closed form.
+    /// A workspace for any problem, with this method where there is no closed form.
     pub const fn new(backend: Backend) -> Self {
         Self {
             backend,
@@ -292,9 +293,10 @@ impl Workspace {
     /// More than [`MAX_ROWS`] rows.
     pub fn solve(&mut self, p: &Problem, u: &mut [f64]) -> Solution {
         assert!(p.rows.len() <= MAX_ROWS, "{} rows, must be at most {MAX_ROWS}", p.rows.len());
-        // What the last answer was made of; nothing of one in which something yielded.
+        // The guess: the active rows and bounds of the last answer, none if something yielded in it.
         let guess = if (self.relaxed | self.ill_conditioned).is_empty() { self.active_len } else { 0 };
         (self.active_len, self.relaxed, self.ill_conditioned) = (0, RowSet::EMPTY, RowSet::EMPTY);
+        // u_ref itself, or one active row.
         if let Some(answer) = one_active::solve(p, u)
             && (self.backend == Backend::DualActiveSet || matches!(answer, Answer::Reference))
         {
@@ -305,6 +307,7 @@ impl Workspace {
             }
             return Solution { outcome: Outcome::Optimal, solver, iterations: 0 };
         }
+        // u_ref within its bounds.
         for (i, (ui, r)) in u.iter_mut().zip(p.u_ref).enumerate() {
             *ui = p.bounds.clamp(i, *r);
         }
@@ -312,6 +315,7 @@ impl Workspace {
             self.take_over(p, u, 0.0);
             return Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 };
         }
+        // One hard row with bounds.
         let soft = || p.enforcement.iter().any(|e| matches!(e, Enforcement::Soft { .. }));
         if let [row] = p.rows
             && p.weights.is_none()
@@ -329,6 +333,7 @@ impl Workspace {
         if self.backend == Backend::InteriorPoint {
             return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
         }
+        // Several: from the guess, else by the dual active-set method.
         let Self { two, four, any, active, active_len, relaxed, ill_conditioned, .. } = self;
         let (outcome, iterations);
         macro_rules! solve_with {
@@ -357,7 +362,7 @@ impl Workspace {
         Solution { outcome, solver: Solver::DualActiveSet, iterations }
     }
 
-    /// Notes what is active in an answer found without a method: the first row, by its multiplier, and the
+    /// Notes the active constraints of an answer found without a method: the first row, by its multiplier, and the
     /// bounds that hold `u`.
     fn take_over(&mut self, p: &Problem, u: &[f64], multiplier: f64) {
         let mut push = |constraint, multiplier: f64| {
@@ -398,15 +403,15 @@ impl Workspace {
         self.ill_conditioned
     }
 
-    /// How far `u` is from satisfying the conditions of optimality, with the active rows of the last solve,
-    /// which was of `p`.
+    /// The residuals of `u` in the conditions of optimality, with the active rows of the last solve, which was of
+    /// `p`.
     pub fn residuals(&self, p: &Problem, u: &[f64]) -> Residuals {
         Residuals::of(p, u, self.active())
     }
 }
 
-/// Solves one program of hard rows with W = 1 into `u`, as [`Workspace::solve`] does: a workspace saves the
-/// cost of making one.
+/// Solves one QP of hard rows with W = 1 into `u`, as [`Workspace::solve`] does. A workspace saves the cost of
+/// making one.
 ///
 /// # Panics
 ///

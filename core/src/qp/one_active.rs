@@ -1,9 +1,9 @@
-//! u_ref itself, or one active row in closed form: the answer of most programs.
+//! u_ref itself, or one active row in closed form: the answer of most QPs.
 //!
 //! The point of a row's plane nearest to u_ref, `u = u_ref + λ a` with λ = (b − aᵀu_ref)/‖a‖², has a
 //! multiplier λ > 0. Where it also satisfies all other rows and the bounds, it satisfies every condition of
-//! Karush, Kuhn and Tucker, so it is the minimiser. The row to try is the one furthest from u_ref: no other can
-//! be the only one that is active.
+//! Karush, Kuhn and Tucker, so it is the minimiser. The row to try is the one furthest from u_ref, since no other
+//! can be the only active one.
 
 use std::array::from_fn;
 
@@ -12,7 +12,7 @@ use super::{Bounds, Enforcement, MAX_INPUTS, Problem, ROUND_OFF, Row};
 /// Squared lengths and slacks in this range can neither overflow nor lose digits on the way.
 const SIZES: std::ops::Range<f64> = 1e-150..1e150;
 
-/// What is active.
+/// The active row, if there is one.
 pub(super) enum Answer {
     /// Nothing: u_ref satisfies every row and bound.
     Reference,
@@ -42,7 +42,7 @@ fn solve_for<const M: usize>(p: &Problem, u: &mut [f64]) -> Option<Answer> {
     if !within(p.bounds, u_ref) {
         return None;
     }
-    // The largest distance², as a fraction: of the row `active`, with its slack and ‖a‖².
+    // Find the row furthest from u_ref: its distance² as a fraction, by slack and ‖a‖².
     let (mut active, mut slack, mut length) = (None, 0.0, 1.0);
     for (k, row) in p.rows.iter().enumerate() {
         let found = slack_at(row, u_ref);
@@ -66,14 +66,16 @@ fn solve_for<const M: usize>(p: &Problem, u: &mut [f64]) -> Option<Answer> {
     if soft || !in_range || p.weights.is_some() {
         return None;
     }
+    // Go to the nearest point of its plane.
     let (row, per_square) = (&p.rows[active], 1.0 / length);
     let along = |from: &[f64; M], multiplier: f64| from_fn(|i| from[i] + multiplier * row.normal[i]);
     let mut multiplier = -slack * per_square;
     let mut on_row: [f64; M] = along(u_ref, multiplier);
-    // What round-off has left of the slack: u_ref may be far larger than u.
+    // Correct the round-off of the slack: u_ref may be far larger than u.
     let rest = -slack_at(row, &on_row) * per_square;
     multiplier += rest;
     on_row = along(&on_row, rest);
+    // There every other row and the bounds have to hold.
     let holds = slack_at(row, &on_row)
         >= -ROUND_OFF * (row.floor.abs() + sum::<M>(|i| (row.normal[i] * on_row[i]).abs()));
     let near = multiplier * multiplier * length <= p.correction_limit * p.correction_limit;

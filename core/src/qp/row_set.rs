@@ -35,7 +35,7 @@ impl RowSet {
         self.0 == 0
     }
 
-    /// How many there are.
+    /// Their number.
     pub const fn len(self) -> u32 {
         self.0.count_ones()
     }
@@ -103,7 +103,7 @@ impl BitAnd for RowSet {
     }
 }
 
-/// The rows of the one that are not in the other.
+/// The rows of the first that are not in the second.
 impl Sub for RowSet {
     type Output = Self;
 

@@ -1,18 +1,14 @@
-//! How the solution of a program moves: one linear system.
+//! The change of the solution of a QP: one linear system.
 //!
-//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Along a
-//! direction in which everything they are made of moves, with the multipliers' change μ,
+//! Where the active constraints aᵀu = b stay active, the conditions of optimality stay equations. Let everything they
+//! are made of move along a direction, and let ϑ' be the change of the multipliers. Then
 //!
 //! ```text
-//! H u' − Aᵀ μ = c,   A u' = d,                                                            (7)
+//! N u' − Aᵀ ϑ' = c,   A u' = d,                                                            (7)
 //! ```
 //!
-//! H the Hessian of the Lagrangian, c what moves its gradient and d what moves the constraints, at a fixed u.
-//!
-//! # References
-//!
-//! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
-//! Press 1983, theorem 3.2.2.
+//! with the Hessian N of the Lagrangian, the change c of its gradient and the change d of the constraints, both at a
+//! fixed u (`docs/theory.md#input-sensitivity`).
 
 use nalgebra::{SMatrix, SVector};
 
@@ -30,16 +26,16 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// For the gradient u − r, where r moves along `direction`: H is the identity, and nothing is active.
+    /// The equations for the gradient u − r, where r moves along `direction`: N is the identity, and nothing is active.
     pub(crate) fn new(direction: &[f64]) -> Self {
         let mut right = SVector::<f64, SIZE>::zeros();
         right.as_mut_slice()[..direction.len()].copy_from_slice(direction);
-        // What is not used stays the identity.
+        // Unused rows and columns stay those of the identity.
         Self { inputs: direction.len(), rows: 0, matrix: SMatrix::identity(), right }
     }
 
-    /// Adds a part −λ a(u) of the gradient: `change` is how λ a moves at a fixed u, `curvature[i][j]` the
-    /// derivative of its component i by u_j.
+    /// Adds a part −ϑ a(u) of the gradient: `change` is the derivative of ϑ a at a fixed u, `curvature[i][j]` that
+    /// of its component i by u_j.
     pub(crate) fn pull(&mut self, change: &[f64], curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS]) {
         for i in 0..self.inputs {
             self.right[i] += change[i];

@@ -2,8 +2,8 @@
 //!
 //! The Karush-Kuhn-Tucker conditions of `min ½‖u − r‖²` under aᵀu ≥ b and bounds give
 //! `u_i(λ) = clamp(r_i + λ a_i)` for a multiplier λ ≥ 0, and aᵀu(λ) is continuous, piecewise linear
-//! and non-decreasing in λ. So λ is found by walking the at most 2 dim u breakpoints at which a
-//! component leaves or reaches a bound. Without bounds there is none and λ = (b − aᵀr)/‖a‖².
+//! and non-decreasing in λ. So λ is found by walking the breakpoints, at most 2 dim u, at which a component
+//! leaves or reaches a bound. Without bounds there is none and λ = (b − aᵀr)/‖a‖².
 
 use std::array::from_fn;
 
@@ -41,6 +41,7 @@ pub(super) fn solve(row: &Row, bounds: &Bounds, u_ref: &[f64], limit: f64, u: &m
             bounds.min[i]
         }
     };
+    // Walk the breakpoints.
     let mut lambda = 0.0;
     loop {
         // On the way to the next breakpoint aᵀu(λ) grows with the slope of the moving components.

@@ -245,13 +245,13 @@ fn sets(count: usize, m: usize) -> impl Iterator<Item = Vec<usize>> {
     (0..=m).flat_map(of_size)
 }
 
-/// What [`minimiser`] found.
+/// The answer of [`minimiser`].
 pub(crate) struct Found {
     pub(crate) u: Point,
     /// The active rows.
     pub(crate) set: Vec<usize>,
     pub(crate) multipliers: [Twofold; 3],
-    /// How far from parallel they are.
+    /// The least sine of the angle between a row of the set and those before it.
     pub(crate) sine: f64,
 }
 

@@ -1,24 +1,23 @@
-//! The wide search: where Newton's method from its two guesses does not end at an answer that is surely right.
+//! The wide search, for samples at which Newton's method from its two candidates ends at no settled answer.
 //!
-//! A row is F(u) ≥ 0 with F smooth, and what makes it hard is that it turns with some inputs: a unicycle that
-//! stands across the line of sight gains by turning either way and then by driving either way. Four parts find
-//! the nearest of these answers.
+//! A row is F(u) ≥ 0 with F smooth. It is hard where F turns with some inputs: a unicycle that stands across the line
+//! of sight gains by turning either way and then driving either way. Four parts find the nearest of these answers.
 //!
-//! **Scan.** One component of u is moved over a grid around u_ref; for each of its values another one is found
-//! for which all rows hold, by Newton's method along that axis. An acceleration enters all but affinely, so one
-//! or two steps are exact. The grid is as wide as the bounds allow, and first fine, then coarse: widths grow by
-//! a factor until they exceed the distance of an input that is known to meet the rows. What is kept are the
-//! local minima over the grid: of the distance where the rows hold, of the violation elsewhere.
+//! **Scan.** Move one component of u over a grid around u_ref. For each of its values find another component for which
+//! all rows hold, by Newton's method along that axis. An acceleration enters all but affinely, so one or two steps are
+//! exact. The grid is first fine, then coarse, and at most as wide as the bounds: widths grow by a factor until they
+//! exceed the distance of an input that is known to meet the rows. Keep the local minima over the grid: of the distance
+//! where the rows hold, of the violation elsewhere.
 //!
-//! **Restoration.** From there to the rows by the shortest way: the linearised program with u in place of
-//! u_ref, and back to a third of the way as long as the violation does not decrease.
+//! **Restoration.** Go from there to the rows by the shortest way: the linearised QP with u in place of u_ref. Go
+//! back to a third of the way as long as the violation does not decrease.
 //!
-//! **Polishing.** From an input that meets the rows towards the answer of the linearised qp. Each trial is
-//! restored (the correction of second order), and taken where it is nearer to u_ref by a part of what the
-//! program promises. So every iterate meets the rows, and the distance only falls.
+//! **Polishing.** Go from an input that meets the rows towards the answer of the linearised QP. Restore each trial (the
+//! correction of second order), and take it where it is nearer to u_ref by a part of what the QP promises. So every
+//! iterate meets the rows, and the distance only falls.
 //!
-//! **Sharpening.** The distance is flat at its least, so that polishing ends at about the root of the tolerance. If
-//! Newton's method does not converge from there, steps of the secant method along the row do.
+//! **Sharpening.** The distance is flat at its least, so polishing ends at about the root of the tolerance. If Newton's
+//! method does not converge from there, take steps of the secant method along the row.
 //!
 //! All numbers of steps are fixed: the cost is bounded, and the same input gives the same bits.
 
@@ -30,7 +29,7 @@ use crate::qp::{Outcome, Problem, RowSet, Solver, Workspace};
 const GRID: usize = 16;
 /// Half the width of the finest grid, in units of u.
 const FINEST: f64 = 1.0;
-/// How much wider each grid is than the one before.
+/// Width of each grid over that of the one before.
 const WIDER: f64 = 8.0;
 /// Grids of one component, at most.
 const WIDTHS: usize = 6;
@@ -44,21 +43,21 @@ const RESTORING: [usize; 2] = [10, 4];
 const POLISHING: usize = 12;
 /// Steps of a sharpening.
 const SHARPENING: usize = 16;
-/// The part of the way of its first step, and the largest of any.
+/// The part of the way of its first step, then the largest of any.
 const FIRST_PART: f64 = 0.3;
 const LARGEST_PART: f64 = 10.0;
 /// Trials of one step.
 const TRIALS: usize = 4;
-/// The part of what the linearised program promises that must come true.
+/// The part of what the linearised QP promises that must come true.
 const SUFFICIENT: f64 = 0.1;
 /// Starts are looked at up to this part of the distance of the answer that is known.
 const NEAR: f64 = 1.2;
-/// An answer takes the place of another one where it is nearer by this part.
+/// An answer takes the place of another where it is nearer by this part.
 const NEARER: f64 = 2e-3;
 
 type Input = [f64; MAX_INPUTS];
 
-/// An input, how far it is from meeting the rows and how far from u_ref.
+/// An input, its violation of the rows and its distance from u_ref.
 #[derive(Clone, Copy)]
 struct Start {
     u: Input,
@@ -117,6 +116,7 @@ impl PeriodProblem<'_> {
             nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
+        // Start from the inputs at hand: the answer, u_ref, zero and both guesses.
         let mut starts = Starts::within(f64::INFINITY);
         let zero = [0.0; MAX_INPUTS];
         for guess in [Some(&*u), Some(self.u_ref), Some(&zero[..m])].iter().chain(guesses).flatten() {
@@ -132,7 +132,7 @@ impl PeriodProblem<'_> {
         if !known {
             found |= self.finish(&mut starts, &mut nearest, relaxed, at, qp);
         }
-        // Once more from the first answer: inputs near u_ref that all but meet the rows come after all that do.
+        // Scan; once more from the first answer. Inputs near u_ref that all but meet the rows come after all that do.
         for _ in 0..2 {
             let limit = nearest.distance;
             let mut starts = Starts::within(NEAR * limit);
@@ -146,10 +146,11 @@ impl PeriodProblem<'_> {
             return None;
         }
         if !found {
-            // The answer is the one that is known, but not where it ends.
+            // The known answer is the nearest, but Newton's method did not end at it.
             nearest.u[..m].copy_from_slice(u);
             nearest.distance = best.distance;
         }
+        // Make it exact: by Newton's method, or where that fails by sharpening.
         let mut exact = nearest.u;
         if let Some(guess) = self.newton(&mut exact[..m], RowSet::ALL, at, qp)
             && guess.is_met(relaxed)
@@ -185,7 +186,7 @@ impl PeriodProblem<'_> {
     ) -> bool {
         let mut found = false;
         for start in &mut starts.kept {
-            // Where an answer is known, one that is to be nearer begins near.
+            // A nearer answer than the known one begins near it.
             let near = |start: &Start| start.distance < NEAR * nearest.distance;
             if !start.distance.is_finite() || !near(start) {
                 continue;
@@ -281,8 +282,8 @@ impl PeriodProblem<'_> {
         *start = best;
     }
 
-    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; between what
-    /// they ask for where they contradict.
+    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of
+    /// their demands where they contradict.
     fn on_axis(&self, start: &Start, axis: usize, relaxed: RowSet, at: &Linearised) -> f64 {
         let m = self.u_ref.len();
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -341,8 +342,8 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that
-    /// promises to be nearer than `known`.
+    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that can
+    /// be nearer than `known`.
     fn polish(
         &self,
         start: &mut Start,
@@ -378,12 +379,11 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a polished answer, known to about the root of the tolerance, to where the program linearised there
-    /// does not move it any more.
+    /// Moves from a polished answer, known to about the root of the tolerance, to where the QP linearised there does
+    /// not move it any more.
     ///
-    /// Where the rows curve, full steps towards the program's answer overshoot. With two of them, Δu and the
-    /// change ΔR of what is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the
-    /// row.
+    /// Where the rows curve, full steps towards the QP's answer overshoot. With the last step Δu and the change ΔR of
+    /// the way that is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the row.
     fn sharpen(&self, start: &mut Start, relaxed: RowSet, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         let (mut point, mut least) = (*start, f64::INFINITY);

@@ -1,18 +1,18 @@
 //! Several rows: a dual active-set method of the Goldfarb-Idnani family.
 //!
-//! In the variables δ = √W (u − u_ref) the program is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active
-//! rows, with normals N = Q R (module `factors`) and multipliers λ ≥ 0, give δ = Nλ. Each round takes
-//! the row p that is violated most by its distance, and raises its multiplier by t:
+//! In the variables δ = √W (u − u_ref) the QP is `min ½‖δ‖²` under rows aᵀδ ≥ c. The active rows, with normals N = Q
+//! R (module `factors`) and multipliers λ ≥ 0, give δ = Nλ. Each round takes the row p that is violated most by its
+//! distance, and raises its multiplier by t:
 //!
 //! ```text
 //! a_p = N r + z, Nᵀz = 0:   δ ← δ + t z,   λ ← λ − t r,   λ_p ← λ_p + t
 //! ```
 //!
 //! until p holds (t = −slack/‖z‖²: p joins the active rows) or some λ_j reaches 0 before (j leaves, and
-//! the round goes on). The start, u_ref within its bounds, has the bounds that u_ref exceeds active. Each
+//! the round goes on). At the start, u_ref within its bounds, the bounds that u_ref exceeds are active. Each
 //! join raises the dual objective, so no active set comes twice and the method ends; ties go to the row
-//! listed first. Round-off can break that argument, so rounds are counted: beyond the limit the outcome
-//! is [`Outcome::Failed`]. After a row has left, δ is computed anew from the active rows.
+//! listed first. Round-off can break that argument, so rounds are counted. Beyond the limit the outcome is
+//! [`Outcome::Failed`]. After a row has left, δ is computed anew from the active rows.
 //!
 //! **Soft rows** have λ_j ≤ κ, the penalty per weighted length of their normal: the dual of the exact
 //! penalty κ max(0, −slack). A multiplier at κ is constant; its row moves from the active ones into the
@@ -20,9 +20,9 @@
 //!
 //! **Infeasibility.** Where z = 0 and no λ_j falls, a_p = Σ r_j a_j with r_j ≤ 0: the active rows with
 //! r_j < 0 cap a_pᵀδ at its present value (Farkas). The rows are then taken anew one by one, in the order
-//! of priority, and the multiplier of each is raised with all rows before it kept: the same walk with one
-//! more event, a kept row that is reached becomes active. It ends where the row holds, or where the
-//! kept rows cap it: then δ is already the least violation nearest to u_ref, and the rows of the
+//! of priority, and the multiplier of each is raised with all rows before it kept. That is the same walk
+//! with one more event: a kept row that is reached becomes active. It ends where the row holds, or where
+//! the kept rows cap it. Then δ is already the least violation nearest to u_ref, and the rows of the
 //! certificate stay active from then on. Soft rows follow at the end, all at once. A row after which u
 //! has moved beyond the correction limit is taken back (the soft ones together).
 //!
@@ -74,7 +74,7 @@ struct Entering<const N: usize> {
     /// Its normal as δ sees it, or its negative for a soft row that holds more than it must.
     normal: [f64; N],
     norm: f64,
-    /// By how much it is violated, > 0.
+    /// Its violation, > 0.
     violation: f64,
     reversed: bool,
 }
@@ -82,7 +82,7 @@ struct Entering<const N: usize> {
 enum End {
     /// The row holds.
     Met,
-    /// It cannot hold; the rows that forbid it are now fixed. `true`: by no more than round-off.
+    /// It cannot hold; the rows that forbid it are now fixed. `true`: its violation is round-off.
     Capped(bool),
     /// Too many rounds, or numbers that are not finite.
     Stuck,
@@ -102,7 +102,7 @@ pub(super) struct DualActiveSet<const N: usize> {
     /// u_ref, moved by the soft rows at their largest multiplier.
     origin: [f64; N],
     u: [f64; N],
-    /// Sets of rows: at their largest multiplier; active; taken part in.
+    /// Sets of rows: at their largest multiplier; active; enabled to become so.
     saturated: RowSet,
     active: RowSet,
     enabled: RowSet,
@@ -186,7 +186,7 @@ impl<const N: usize> DualActiveSet<N> {
         self.limit = 100 + 20 * (p.rows.len() + 2 * n) as u32;
         for i in 0..N {
             self.u_ref[i] = if i < n { p.u_ref[i] } else { 0.0 };
-            // Components that do not exist do not move.
+            // Components beyond the inputs do not move.
             self.reach[i] = if i < n { 1.0 } else { 0.0 };
             self.weight[i] = 1.0;
         }
@@ -214,17 +214,17 @@ impl<const N: usize> DualActiveSet<N> {
         self.join(p, e.slot, &projection);
     }
 
-    /// Every enabled row and bound, the most violated first. At u_ref the least violation counts, later
-    /// that beyond round-off.
+    /// Takes every enabled row and bound, the most violated first. At u_ref any violation counts, later those beyond
+    /// round-off.
     fn all_at_once(&mut self, p: &Problem) -> End {
         let mut tolerance = if self.rounds == 0 { 0.0 } else { ROUND_OFF };
         while let Some(entering) = self.most_violated(p, tolerance) {
             let soft = entering.slot.cap.is_finite();
             match self.enter(p, entering, None) {
                 End::Met => {}
-                // Equal to the others up to round-off: it holds with them.
+                // The others forbid no more than round-off: it holds with them.
                 End::Capped(true) => self.disable(entering.slot.constraint),
-                // Cannot happen to a soft row but by round-off.
+                // Round-off alone can do that to a soft row.
                 End::Capped(false) if soft => self.disable(entering.slot.constraint),
                 end => return end,
             }
@@ -233,7 +233,7 @@ impl<const N: usize> DualActiveSet<N> {
         if self.u.iter().all(|v| v.is_finite()) { End::Met } else { End::Stuck }
     }
 
-    /// The hard rows one after the other, those before kept; then the soft ones.
+    /// Takes the hard rows one after the other, those before kept; then the soft ones.
     fn one_by_one(&mut self, p: &Problem) -> Outcome {
         self.limit = self.rounds + 1000 + 20 * (p.rows.len() * p.rows.len()) as u32;
         let mut stuck = false;
@@ -247,6 +247,7 @@ impl<const N: usize> DualActiveSet<N> {
                 }
                 continue;
             };
+            // Take it in, or back where it gets stuck or goes beyond the limit.
             let before = *self;
             let end = self.enter(p, entering, Some(kept));
             if matches!(end, End::Stuck) || !self.within_limit(p) {
@@ -260,6 +261,7 @@ impl<const N: usize> DualActiveSet<N> {
                 kept.insert(k);
             }
         }
+        // The soft rows together.
         let before = *self;
         let soft = RowSet::first(p.rows.len()) - done;
         self.enabled = kept | soft;
@@ -283,13 +285,14 @@ impl<const N: usize> DualActiveSet<N> {
     /// way; with `None` they may be.
     fn enter(&mut self, p: &Problem, mut e: Entering<N>, kept: Option<RowSet>) -> End {
         let parametric = kept.is_some();
-        // Of its own multiplier: how far it has come, and how far it may.
+        // Its own multiplier so far; it may go as far as its cap.
         let mut moved = 0.0;
         loop {
             self.rounds += 1;
             if self.rounds > self.limit {
                 return End::Stuck;
             }
+            // The step to where it holds.
             let projection = self.factors.project(&e.normal, e.norm);
             let mut r = projection.inside;
             self.factors.solve(&mut r);
@@ -299,7 +302,7 @@ impl<const N: usize> DualActiveSet<N> {
             if e.slot.cap - moved < step {
                 (step, event) = (e.slot.cap - moved, Event::Saturates);
             }
-            // The multipliers on their way to 0 or to their largest.
+            // Shorter: to where an active multiplier reaches 0 or its largest.
             let noise = NO_SLOPE * r[..self.len].iter().fold(1.0, |s: f64, v| s.max(v.abs()));
             for (j, slot) in self.slots[..self.len].iter().enumerate() {
                 let at = if slot.fixed || r[j].abs() <= noise {
@@ -313,6 +316,7 @@ impl<const N: usize> DualActiveSet<N> {
                     (step, event) = (at, Event::Leaves(j));
                 }
             }
+            // Shorter: to where a kept row or bound is reached.
             if let Some(kept) = kept
                 && free
                 && let Some((at, constraint)) = self.first_reached(p, &projection, kept, step)
@@ -322,6 +326,7 @@ impl<const N: usize> DualActiveSet<N> {
             if step == f64::INFINITY {
                 return self.capped(p, &e, &r, noise, parametric);
             }
+            // Take the step.
             for (slot, r) in self.slots[..self.len].iter_mut().zip(&r) {
                 slot.multiplier -= step * r;
             }
@@ -332,6 +337,7 @@ impl<const N: usize> DualActiveSet<N> {
                 }
             }
             e.violation -= step * projection.square;
+            // Change the active rows by its event.
             match event {
                 Event::Holds => {
                     if e.reversed {
@@ -374,14 +380,14 @@ impl<const N: usize> DualActiveSet<N> {
         }
     }
 
-    /// What is left to do where the active rows forbid `e`: r_j ≤ 0 for all that are not fixed.
+    /// Ends the entering of `e` where the active rows forbid it: r_j ≤ 0 for all that are not fixed.
     fn capped(&mut self, p: &Problem, e: &Entering<N>, r: &[f64; N], noise: f64, parametric: bool) -> End {
-        // What its violation is the difference of: its own terms and those of the certificate.
+        // The terms whose difference its violation is: its own and those of the certificate.
         let mut terms = self.terms(p, &e.slot);
         for (slot, r) in self.slots[..self.len].iter().zip(r) {
             terms += r.abs() * self.terms(p, slot);
         }
-        // Between nearly parallel rows the second may be large: the row must hold all the same.
+        // Between nearly parallel rows the terms may be large: the row must hold up to its own as well.
         let round_off = e.violation <= f64::min(HOLDS * self.terms(p, &e.slot), ROUND_OFF * terms);
         if parametric || round_off {
             for (slot, r) in self.slots[..self.len].iter_mut().zip(r) {
@@ -400,7 +406,7 @@ impl<const N: usize> DualActiveSet<N> {
         let (mut violation, mut norm) = (0.0, 1.0);
         for (k, row) in p.rows.iter().enumerate() {
             let slack = dot(&row.normal[..N], &self.u) - row.floor;
-            // Not a number, or overflow, is looked at closely too.
+            // A slack that is not a number, or overflows, is looked at closely too.
             if (0.0..f64::INFINITY).contains(&slack) {
                 continue;
             }
@@ -452,7 +458,7 @@ impl<const N: usize> DualActiveSet<N> {
         let (slot, normal, norm) = self.constraint(p, Constraint::Row(k));
         let violation = -self.slack(p, &slot);
         if !violation.is_finite() {
-            // It asks for more than a number can say.
+            // The row asks for more than a number can hold.
             self.ill_conditioned.insert(k);
             self.enabled.remove(k);
             return None;

@@ -105,7 +105,7 @@ impl<const N: usize> DualActiveSet<N> {
         }
     }
 
-    /// Puts the row of `slot` at its largest multiplier, or takes it from there, and moves the origin.
+    /// Puts the row of `slot` at its largest multiplier (`there`), or takes it from there, and moves the origin.
     pub(super) fn saturate(&mut self, p: &Problem, slot: Slot, there: bool) {
         if let Constraint::Row(k) = slot.constraint {
             if there { self.saturated.insert(k) } else { self.saturated.remove(k) }
