@@ -78,7 +78,7 @@ fn expressions_that_are_refused() {
                  [[barrier]]\nname = \"goal\"\nexpression = \"x + y - 3\"\ndeadline = 2.0\n";
     workshop.write("my.toml", mixed);
     let done = workshop.punctual(["build", "my.toml", "-o", "my.fmu"]);
-    let message = text.split("h = x + y − 3:\n`").nth(1).and_then(|rest| rest.split('`').next());
+    let message = text.split("h = x + y − 3 the message is\n`").nth(1).and_then(|rest| rest.split('`').next());
     done.fails(2, &format!("my.toml: {}", message.expect("the message").replace('\n', " ")));
     assert!(!workshop.files().contains(&"my.fmu".to_owned()));
 }
