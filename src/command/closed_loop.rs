@@ -237,7 +237,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         until: deadlines.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max),
     };
     let run = effort::run(&mut filter, &setting, |x, u_ref| wanted.write(c, x, u_ref))?;
-    // What was seen, by barrier, input and state.
+    // Findings by barrier, input and state.
     let barriers = c.barrier.iter().zip(&run.barriers).map(|(section, seen)| LoopBarrier {
         name: section.name.clone(),
         promise: seen.judgement.verdict().into(),
