@@ -13,11 +13,11 @@ pub(crate) struct Memory {
     integrated: f64,
 }
 
-/// A filter with its integrator, if it has one: what the FMU of the same configuration computes.
+/// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {
     filter: SafetyFilter,
     integrator: Option<Integrator>,
-    /// For how long an integrated input is going to be held, in s.
+    /// Expected time in s for which an integrated input is held.
     hold: f64,
 }
 
@@ -31,7 +31,7 @@ impl Loop {
         made.map_err(|e| refused(&e))
     }
 
-    /// The sample at `t`, remembered.
+    /// Computes the sample at `t` and remembers it.
     ///
     /// # Errors
     ///
@@ -49,7 +49,7 @@ impl Loop {
         }
     }
 
-    /// Starts every deadline anew; what is integrated stays.
+    /// Starts every deadline anew; the integrated input stays.
     pub(crate) fn rearm(&mut self) {
         self.filter.rearm();
     }
@@ -58,18 +58,18 @@ impl Loop {
         self.integrator.as_ref().map_or(0.0, Integrator::value)
     }
 
-    /// What is remembered.
+    /// A copy of the memory.
     pub(crate) fn memory(&self) -> Memory {
         Memory { filter: self.filter.state().clone(), integrated: self.integrated() }
     }
 
-    /// Writes what is remembered to `memory`, without an allocation.
+    /// Writes the memory to `memory`, without an allocation.
     pub(crate) fn save(&self, memory: &mut Memory) {
         memory.filter.clone_from(self.filter.state());
         memory.integrated = self.integrated();
     }
 
-    /// Goes back to what was remembered: every bit that follows is the same.
+    /// Goes back to a memory: every bit that follows is the same.
     ///
     /// # Errors
     ///
