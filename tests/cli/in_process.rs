@@ -20,7 +20,7 @@ use crate::table::{Table, assert_same_bits};
 const STEP: f64 = 0.001;
 const STEPS: usize = 3000;
 
-/// When the filter's input acts.
+/// The instants from which the filter's input acts.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
     /// From the sample on.
@@ -38,7 +38,7 @@ fn filter() -> SafetyFilter {
     builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.build()).expect("a filter")
 }
 
-/// What is compared, row by row: state, input of the plant, h.
+/// The values compared, row by row: state, input of the plant, h.
 #[derive(Default)]
 struct Rows {
     x: [Vec<f64>; 4],
@@ -58,8 +58,8 @@ fn in_process(order: Order) -> Rows {
     let mut filter = filter();
     let mut rows = Rows::default();
     let mut x = SVector::<f64, 4>::zeros();
-    // What the filter returned last, and h of that sample: in Jacobi order these are still read when
-    // the plant is at the next point. Before the first step both are a look at the start.
+    // The last result of the filter, and h of that sample. In Jacobi order these are still read when the plant is
+    // at the next point. Before the first step both are a look at the start.
     let mut last = Vector2::zeros();
     let mut sample = |time: f64, x: &SVector<f64, 4>| {
         // The nominal controller: damping, a = −v.
