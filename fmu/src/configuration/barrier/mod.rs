@@ -129,10 +129,10 @@ pub struct BarrierSection {
     /// The barrier, above in the file, whose arrival it waits for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<String>,
-    /// Time in s after the first step at which it is let go, > begin; 0: never.
+    /// Time in s after the first step at which it is released, > begin; 0: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end: Option<f64>,
-    /// Whether it is let go when it has been reached.
+    /// Whether it is released when it has been reached.
     #[serde(skip_serializing_if = "is_default")]
     pub until_arrival: bool,
 }
