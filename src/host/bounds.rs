@@ -72,7 +72,7 @@ fn tag(rest: &[u8]) -> Option<(usize, usize)> {
     }
 }
 
-/// Where `wanted` begins first, from `from` on.
+/// First position of `wanted`, from `from` on.
 fn find(bytes: &[u8], from: usize, wanted: &[u8]) -> Option<usize> {
     let tail = bytes.get(from..)?;
     if let [one] = wanted {
