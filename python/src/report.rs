@@ -47,7 +47,7 @@ pub(crate) struct BarrierReport {
     /// The margin in force, in the unit of h.
     #[pyo3(get)]
     margin_used: f64,
-    /// How far h may fall below its promise within the period because u is held, in the unit of h.
+    /// Largest fall of h below its promise within the period because u is held, in the unit of h.
     #[pyo3(get)]
     sampling_loss: f64,
     /// Steps in a row that have not met the constraint, this one included.

@@ -64,7 +64,7 @@ macro_rules! api {
 
 punctual_modeldescription::fmi2_functions!(api);
 
-/// Where cargo puts the library of the tested build: beside the test's executable.
+/// The path where cargo puts the library of the tested build: beside the test's executable.
 pub(crate) fn library_path() -> PathBuf {
     let name = format!("{}punctual_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     std::env::current_exe().expect("the path of this test").with_file_name(name)

@@ -231,7 +231,7 @@ impl Machine {
 
     /// Reads a state from `bytes`; `intact` if they are those of a state of this FMU.
     pub(crate) fn read(&mut self, k: usize, bytes: &[u8], intact: bool) -> bool {
-        /// Where the mode stands: after magic number, version, GUID and length.
+        /// Position of the mode: after magic number, version, GUID and length.
         const MODE: usize = 8 + 4 + 38 + 8;
         let (c, mut pointer) = (self.slots[k].instance.component, null_mut());
         let status = (API.deserialize)(c, bytes.as_ptr().cast(), bytes.len(), &raw mut pointer);

@@ -1,11 +1,10 @@
 //! `punctual run` equals the core in process, bit for bit: going through files, FMI and a shared
 //! library changes nothing.
 //!
-//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a
-//! sample. `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on
-//! from the end of its last step, (k−1)·h + h, as long as the two differ by round-off only, so that
-//! its time never runs backwards under a master that counts otherwise. The filter's profile is a
-//! function of that time, so the last bits depend on it.
+//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a sample.
+//! `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on from the end of its
+//! last step, (k−1)·h + h, as long as the two differ by round-off only. So its time never runs backwards under a
+//! master that counts otherwise. The filter's profile is a function of that time, so the last bits depend on it.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;

@@ -165,7 +165,7 @@ static FMUS: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
     })
 });
 
-/// Where cargo puts the library that tests use.
+/// The path where cargo puts the library that tests use.
 pub(crate) fn library() -> PathBuf {
     let name = format!("{}punctual_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     std::env::current_exe().expect("a running test").with_file_name(name)

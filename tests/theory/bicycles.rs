@@ -1,4 +1,4 @@
-//! How much of the promise survives where the plant is another bicycle than the filter's.
+//! Survival of the promise where the plant is another bicycle than the filter's.
 
 use punctual::reproduce::bicycles::{Model, Pairing, Remedy, Size};
 
