@@ -1,5 +1,5 @@
-//! Compiles the one C file of the command line: the logger that FMUs call. A function with a
-//! variable argument list can be called from stable Rust, but not defined in it.
+//! Compiles the one C file of the command line: the logger that FMUs call. Stable Rust can call a function with a
+//! variable argument list, but not define one.
 
 fn main() {
     println!("cargo::rerun-if-changed=src/host/logger.c");

@@ -1,8 +1,8 @@
-//! What the C interface adds to a step: `cargo bench --bench abi`.
+//! Cost of the C interface in a step: `cargo bench --bench abi`.
 //!
-//! The same filter, from the same configuration, once in process (`SafetyFilter::step`) and once through the
-//! shared library as an importer loads it. Steps of about 1 ms on the way to the disc, where the row is active;
-//! after a thousand of them both go back to the state they started from, which costs a thousandth of it. "doStep
+//! The same filter, from the same configuration, runs once in process (`SafetyFilter::step`) and once through the
+//! shared library as an importer loads it. Steps are of about 1 ms on the way to the disc, where the row is
+//! active. After a thousand of them both go back to their first state, which costs a thousandth of it. "doStep
 //! adds" is the difference of both, measured in turns, so that a busy machine slows both.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
@@ -54,7 +54,7 @@ fn configuration(sampling: &str, bounded: bool, obstacles: usize) -> String {
     text
 }
 
-/// The filter in process, and where it goes back to.
+/// The filter in process, and the state it goes back to.
 struct Plain {
     filter: SafetyFilter,
     start: FilterState,
@@ -85,7 +85,7 @@ impl Plain {
     }
 }
 
-/// The filter behind the shared library, and where it goes back to.
+/// The filter behind the shared library, and the state it goes back to.
 struct Shared<'a> {
     slave: Slave<'a>,
     start: api::State,
@@ -121,7 +121,7 @@ impl<'a> Shared<'a> {
         self.slave.step(black_box(t), H);
     }
 
-    /// A cycle of an importer: inputs, step, outputs.
+    /// Makes a cycle of an importer: inputs, step, outputs.
     fn cycle(&mut self) -> [f64; 2] {
         let t = self.time();
         let (component, references) = (self.slave.component, [0, 1, 2, 3, 4, 5]);

@@ -1,4 +1,4 @@
-//! One piece of work a given number of times, for benches/instructions.sh to count:
+//! Repeats one piece of work a given number of times, for benches/instructions.sh to count:
 //! `instructions CASE TIMES`. Without arguments: every case once.
 
 use std::hint::black_box;

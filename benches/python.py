@@ -1,4 +1,4 @@
-"""What a step costs in Python: the filter alone, rows of a batch, and FMPy's loop against its plain methods.
+"""Cost of a step in Python: the filter alone, rows of a batch, and FMPy's loop against its plain methods.
 
     PYTHON benches/python.py     # of an environment with the wheel and FMPy
 """
@@ -81,7 +81,7 @@ def main():
 
             long, short = STEPS * STEP, STEPS * STEP / 10
             for name, more in [("everything", {}), ("u alone", {"record": ["u.a", "u.omega"]})]:
-                # What loading takes is in both.
+                # Loading takes its time in both.
                 step = (pair(long, **more) - pair(short, **more)) / (0.9 * STEPS)
                 print(f"  simulate, recording {name}: {1e6 * step:.2f} us per step of the pair")
             print(f"  FMPy's getReal, setReal, doStep, recording nothing: {1e6 * fastest(plain_loop(*paths)) / STEPS:.2f} us")

@@ -1,5 +1,5 @@
-//! Cost of a filter step by where the derivatives come from: the same model built in, by expressions, by a plug-in, and
-//! handed over: `cargo bench --bench sources`. Fails where a model of a user costs more than [`MOST`] times
+//! Cost of a filter step by the source of its derivatives: the same model built in, by expressions, by a plug-in,
+//! and handed over: `cargo bench --bench sources`. Fails where a model of a user costs more than [`MOST`] times
 //! the built-in one. Needs a C compiler.
 //!
 //! All run in turn in the same process; the figure of each is the median over batches.
@@ -17,12 +17,12 @@ use support::{T, X, anchored, goal};
 
 mod support;
 
-/// What a step may cost by expressions or by a plug-in, in steps of the built-in model.
+/// Largest cost of a step by expressions or by a plug-in, in steps of the built-in model.
 const MOST: f64 = 5.0;
 const BATCHES: usize = 301;
 const STEPS: usize = 400;
 
-/// Nanoseconds for each step of one batch.
+/// Time in ns for each step of one batch.
 fn batch(filter: &mut SafetyFilter, x: &[f64]) -> f64 {
     let mut u = [0.0; 2];
     let start = Instant::now();
@@ -38,7 +38,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Prints the figures; returns what costs too much.
+/// Prints the figures; returns those that are too large.
 fn compare<P>(model: usize, plant: P) -> Vec<String>
 where
     P: ControlAffine<4, 2> + Copy + Send + 'static,

@@ -1,9 +1,9 @@
 //! Cost of one filter step and of its parts: `cargo bench --bench step`.
 //!
-//! The quadratic program by itself: `qp.rs`. The states are on the way to the disc, where the row
-//! is active, so that every step solves its quadratic program; those with obstacles also from a reference
-//! input that needs no solving. "by hand" is what the first step computes, written out for that one plant,
-//! barrier and order.
+//! `qp.rs` measures the quadratic program by itself. The states are on the way to the disc, where the row is
+//! active, so that every step solves its quadratic program. Those with obstacles are also measured from a
+//! reference input that needs no solving. "by hand" is the computation of the first step, written out for that
+//! one plant, barrier and order.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
@@ -21,7 +21,7 @@ fn bicycle() -> Bicycle {
     Bicycle::new(10.0).expect("valid bicycle")
 }
 
-/// Times `step` at one sample again and again; `status` is what it must answer.
+/// Times `step` at one sample again and again; `status` is its expected status.
 fn bench_filter(c: &mut Criterion, name: &str, builder: FilterBuilder, u_ref: [f64; 2], status: Status) {
     let mut filter = anchored(builder);
     let start = filter.state().clone();

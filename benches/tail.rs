@@ -1,9 +1,10 @@
 //! The slowest of many steps: `cargo bench --bench tail [-- STEPS]`, ten million by default.
 //!
 //! Every step has a state and a reference input of its own, drawn anew (seeded), so that branches and caches
-//! cannot learn it; the filter starts anew every thousand steps. The clock costs some 20 ns of each figure. The
-//! largest one is that of the operating system as much as of the filter: run it on a quiet machine, on a core
-//! of its own (`taskset`). The number of rounds of the solver, printed beside it, is not.
+//! cannot learn it. The filter starts anew every thousand steps. The clock costs some 20 ns of each figure. The
+//! largest figure is that of the operating system as much as of the filter. So run it on a quiet machine, on a
+//! core of its own (`taskset`). The number of rounds of the solver, printed beside it, does not depend on the
+//! machine.
 
 #![allow(clippy::print_stdout, reason = "it is what a benchmark is for")]
 
@@ -19,10 +20,10 @@ const STEPS: u64 = 10_000_000;
 const PERIOD: f64 = 0.001;
 /// Steps of one start.
 const RUN: u64 = 1000;
-/// Of the histogram, in ns; longer ones count as this.
+/// Longest time in the histogram, in ns; longer ones count as this.
 const LONGEST: usize = 1_000_000;
 
-/// xorshift64*: good enough to vary inputs, and the same everywhere.
+/// The generator xorshift64*: good enough to vary inputs, and the same everywhere.
 struct Random(u64);
 
 impl Random {

@@ -5,7 +5,7 @@
     python examples/campaign_dask.py my.toml -o my.csv      # all runs, a process for each core
     python examples/campaign_dask.py my.toml -o my.csv --scheduler tcp://head:8786
 
-What is drawn comes from `punctual campaign --list`. A task is a batch of runs; those of a lost worker go to others.
+The draws come from `punctual campaign --list`. A task is a batch of runs; those of a lost worker go to others.
 """
 
 import argparse
@@ -37,7 +37,7 @@ Z = 1.959963984540054  # the 0.975 quantile of the normal distribution
 
 
 class Campaign(WorkerPlugin):
-    """Goes to every worker of the cluster, also to one that comes later; there each thread has its instances."""
+    """Goes to every worker of the cluster, later ones too; there each thread has its instances."""
 
     def __init__(self, system, links, fmus):
         self.name, self.parts = f"punctual-{uuid.uuid4()}", (system, links, fmus)

@@ -1,6 +1,6 @@
-//! Two ways to keep the same deadline, side by side: the paper's repeated root on its quadratic disc,
-//! and the reference profile on a distance-shaped one. Same set, same start, same deadline; what
-//! differs is the effort and whether the deadline survives sampling.
+//! Compares two ways to keep the same deadline: the paper's repeated root on its quadratic disc, and the
+//! reference profile on a distance-shaped one. Set, start and deadline are the same. The ways differ in the
+//! effort, and in whether the deadline survives sampling.
 //!
 //! Run with `cargo run --example compare_methods`.
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
@@ -17,7 +17,7 @@ const RADIUS: f64 = 2.0; // m
 const DEADLINE: f64 = 10.0; // s
 const STEP: f64 = 0.001; // s
 
-/// What a run until twice the deadline came to.
+/// Result of a run until twice the deadline.
 struct Run {
     /// First sample inside, in s.
     arrival: f64,

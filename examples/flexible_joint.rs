@@ -52,16 +52,16 @@ impl Barrier<4> for Window {
 fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 3.0; // s
     let window = Window { target: 1.5, width: 0.2 };
-    // The relative degree can be asked for, and the source built by hand for a declared one: what
-    // `FilterBuilder::barrier` does by itself.
+    // `FilterBuilder::barrier` does both steps by itself: it asks for the relative degree, and builds the source
+    // for it.
     let found = lie::detected(&ARM, &window);
     assert_eq!(found, lie::RelativeDegree::Uniform(4));
     let source = lie::along(ARM, window, 4)?;
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
     let mut filter = SafetyFilter::builder(4, 1).source("window", source, settings)?.build()?;
 
-    // 6 s in steps of 1 ms, hanging at rest. What is wanted: damping of the motor, nothing else, so
-    // that gravity pulls the arm down all the time.
+    // 6 s in steps of 1 ms, hanging at rest. The wanted input damps the motor and does nothing else, so that
+    // gravity pulls the arm down all the time.
     let schedule = Schedule { step: 0.001, steps: 6000, substeps: 1 };
     let damping = |_: f64, x: &Vector4<f64>| vector![-2.0 * x[3]];
     let (mut arrival, mut outside, mut peak, mut rows) = (None, 0.0_f64, 0.0_f64, 0);

@@ -1,6 +1,6 @@
-//! Relative degree three: a lift that is driven by its jerk must be above a level by a deadline and
-//! stay there, while its operator wants it down. The paper's repeated root does not exist here: for
-//! n = 3 there is never one from rest. The reference profile needs none.
+//! Relative degree three: a lift that is driven by its jerk must be above a level by a deadline and stay there,
+//! while its operator wants it down. The paper's repeated root does not exist here: for n = 3 there is never one
+//! from rest. The reference profile needs none.
 //!
 //! Run with `cargo run --example jerk_control`.
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
@@ -44,7 +44,7 @@ fn main() -> Result<(), punctual_core::Error> {
         SafetyFilter::builder(3, 1).barrier("level", Lift, Above { level: 20.0 }, settings)?.build()?;
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [3], "found, not declared");
 
-    // 20 s in steps of 1 ms, from rest at 0. What is wanted: down at 1 m/s.
+    // 20 s in steps of 1 ms, from rest at 0. The wanted motion is down at 1 m/s.
     let schedule = Schedule { step: 0.001, steps: 20_000, substeps: 1 };
     let down = |_: f64, x: &SVector<f64, 3>| vector![-4.0 * (x[1] + 1.0) - 4.0 * x[2]];
     let (mut arrival, mut least_after, mut peak, mut rows) = (None, f64::INFINITY, 0.0_f64, 0);

@@ -1,5 +1,5 @@
-//! Links the shared library against the oldest glibc that Rust's standard library supports, whichever the
-//! machine has: calls of functions of newer versions go to what `src/abi/glibc.rs` defines.
+//! Links the shared library against the oldest glibc that Rust's standard library supports, whichever the machine
+//! has. Calls of functions of newer versions go to those that `src/abi/glibc.rs` defines.
 
 use std::env;
 
@@ -40,8 +40,8 @@ fn main() {
     for name in NEWER {
         println!("cargo::rustc-cdylib-link-arg=-Wl,--wrap={name}");
     }
-    // Before 2.34 threads and the loading of libraries had libraries of their own; since then empty ones have
-    // their names.
+    // Before glibc 2.34, threads and the loading of libraries had libraries of their own. Since then empty
+    // libraries have their names.
     println!(
         "cargo::rustc-cdylib-link-arg=-Wl,--push-state,--no-as-needed,-l:libpthread.so.0,-l:libdl.so.2,--pop-state"
     );

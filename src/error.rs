@@ -1,5 +1,5 @@
-//! The one error type of the command line's library: what went wrong, with the names and numbers
-//! needed to mend it, and which exit code it means.
+//! The one error type of the command line's library. It tells what went wrong, with the names and numbers needed
+//! to mend it, and its exit code.
 
 use std::fmt;
 use std::io;
@@ -9,7 +9,7 @@ use punctual_fmu::configuration::ConfigurationError;
 
 use crate::host::{LogMessage, Status};
 
-/// Something that keeps the command from being carried out.
+/// An error that keeps the command from being carried out.
 #[derive(Debug)]
 pub struct Error(Box<Kind>);
 
@@ -23,7 +23,7 @@ enum Kind {
     Plot { path: PathBuf, message: String },
 }
 
-/// Why an `.fmu` file cannot be used.
+/// Reasons why an `.fmu` file cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FmuProblem {
     /// Not a zip archive, or a damaged one; with the reason.
@@ -32,13 +32,13 @@ pub enum FmuProblem {
     UnsafeEntry(String),
     /// It cannot be joined with others to one; with the reason.
     Unfit(String),
-    /// More than is unpacked or read from a file of unknown origin.
+    /// A size beyond the limit for files of unknown origin.
     Limit {
-        /// What is measured, as the beginning of a sentence.
+        /// The quantity, as the beginning of a sentence.
         what: &'static str,
-        /// How much it is.
+        /// Its value.
         value: u64,
-        /// Of what; empty where it is a plain number.
+        /// Its unit; empty for a plain number.
         unit: &'static str,
         /// The greatest value allowed.
         allowed: u64,
@@ -64,7 +64,7 @@ pub enum FmuProblem {
     Version {
         /// The function asked.
         call: &'static str,
-        /// What it answered.
+        /// Its answer.
         answer: String,
     },
 }
@@ -111,7 +111,7 @@ pub struct CallFailure {
     pub path: PathBuf,
     /// The communication point of the call, in seconds; `None` before the experiment is set up.
     pub time: Option<f64>,
-    /// What it returned; `None` where it returned a null instance.
+    /// The status that it returned; `None` where it returned a null instance.
     pub status: Option<Status>,
     /// The last log messages of that instance, oldest first.
     pub log: Vec<LogMessage>,
@@ -167,7 +167,7 @@ impl Error {
         Self(Box::new(Kind::Call(failure)))
     }
 
-    /// An FMU that ended its process, in `what` and in which way.
+    /// An FMU that ended its process: `what` it was in, and `how` it ended.
     pub fn broken(what: impl Into<String>, how: impl Into<String>) -> Self {
         Self(Box::new(Kind::Broken { what: what.into(), how: how.into() }))
     }
@@ -181,7 +181,7 @@ impl Error {
         self
     }
 
-    /// What is wrong with the `.fmu` file, if the error is about one.
+    /// The problem of the `.fmu` file, if the error is about one.
     pub fn as_fmu_problem(&self) -> Option<&FmuProblem> {
         match &*self.0 {
             Kind::Fmu { problem, .. } => Some(problem),
@@ -234,7 +234,7 @@ impl From<ConfigurationError> for Error {
     }
 }
 
-/// Misuse of the core, in the words of the command line.
+/// Misuse of the core, in the terms of the command line.
 impl From<punctual_core::Error> for Error {
     fn from(error: punctual_core::Error) -> Self {
         Self::configuration(error.field(), error.message())

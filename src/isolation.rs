@@ -1,6 +1,6 @@
-//! Work with FMUs in a child process: a crash, an `exit()` or a hang of an FMU ends the child, and this
-//! process tells what it was in. The child is this program again, with a journal (see
-//! [`crate::host::journal`]) as the only thing it must leave behind.
+//! Work with FMUs in a child process. A crash, an `exit()` or a hang of an FMU ends the child, and this process
+//! names the call it was in. The child is this program again. It must leave nothing behind but a journal (see
+//! [`crate::host::journal`]).
 
 use std::ffi::OsString;
 use std::fmt;
@@ -16,15 +16,15 @@ use crate::host::journal::{self, LastCall};
 
 /// The name of the journal in the child's folder.
 const JOURNAL: &str = "journal";
-/// How often the child is looked at while it runs.
+/// Period at which the child is looked at while it runs.
 const LOOK: Duration = Duration::from_millis(5);
 
 fn journal_file(folder: &Path) -> PathBuf {
     folder.join(JOURNAL)
 }
 
-/// For the child: begins the journal in the folder that the watching process made, and unpacks FMUs below
-/// it, so that nothing is left behind when this process has no time to tidy up.
+/// Begins, in the child, the journal in the folder that the watching process made, and unpacks FMUs below it. So
+/// nothing is left behind when this process has no time to tidy up.
 ///
 /// # Errors
 ///
@@ -32,12 +32,12 @@ fn journal_file(folder: &Path) -> PathBuf {
 pub fn settle(folder: &Path) -> Result<(), Error> {
     let file = journal_file(folder);
     journal::begin(&file).map_err(|e| Error::io("write", &file, e))?;
-    // Refused only where it is set already: then files go there.
+    // A refusal means that it is set already: then files go there.
     let _ = tempfile::env::override_temp_dir(folder);
     Ok(())
 }
 
-/// What the child may say.
+/// Output that the child may print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Voice {
     /// Its output is this process's.
@@ -46,28 +46,28 @@ pub enum Voice {
     Silent,
 }
 
-/// How a child ended.
+/// The end of a child.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
     /// By itself, after it had finished with its FMUs; with its exit code.
     Finished(i32),
     /// In the middle of its work with an FMU.
     Broken {
-        /// In which way.
+        /// The way it broke off.
         how: Break,
         /// The last call made; `None` before the first.
         last: Option<LastCall>,
     },
 }
 
-/// In which way a child broke off.
+/// Ways in which a child breaks off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Break {
-    /// By this signal.
+    /// Ended by this signal.
     Signal(i32),
-    /// With this exit code, which the FMU chose by ending the process.
+    /// Ended with this exit code, which the FMU chose by ending the process.
     Exit(i32),
-    /// It was stopped because it took longer than this.
+    /// Stopped because it took longer than this.
     Late(Duration),
 }
 
@@ -81,7 +81,7 @@ impl fmt::Display for Break {
     }
 }
 
-/// The name of a signal that ends a process by itself, where all systems agree on its number.
+/// The name of a signal that ends a process by itself, if all systems agree on its number.
 fn meaning(signal: i32) -> &'static str {
     match signal {
         4 => " (illegal instruction)",
@@ -112,7 +112,7 @@ impl Child {
         Ok(Self { folder })
     }
 
-    /// Where the child may leave files.
+    /// The folder in which the child may leave files.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -142,7 +142,7 @@ impl Child {
                 break status;
             }
             if let Some(limit) = limit.filter(|limit| begin.elapsed() >= *limit) {
-                // It may just have ended by itself; either way it is waited for.
+                // The child may just have ended by itself; either way it is waited for.
                 let _ = child.kill();
                 child.wait().map_err(failed)?;
                 return Ok(End::Broken { how: Break::Late(limit), last: self.last_call() });

@@ -4,11 +4,11 @@
 //! Each module uses only modules above it (`error` only names the statuses of `host`):
 //!
 //! ```text
-//! error                what went wrong, with names and numbers
+//! error                the errors of all commands, with names and numbers
 //! host                 one FMU: archive, description, library, instance
 //! isolation            FMUs in a child process, which may crash
-//! validate             what is wrong with an FMU: archive, schema, rules, symbols, a trial
-//! recording            what a run leaves behind; CSV
+//! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
+//! recording            the rows of a run; CSV
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
 //! pictures             from a system file's plots and a recording to pictures

@@ -1,5 +1,5 @@
-//! The `punctual` command line: arguments in, exit code out. What a command does stands in
-//! [`punctual::command`]; nothing is printed but through [`punctual::output`].
+//! The `punctual` command line: arguments in, exit code out. The commands stand in [`punctual::command`]; nothing
+//! is printed but through [`punctual::output`].
 #![deny(unsafe_code)]
 
 use std::process::ExitCode;

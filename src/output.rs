@@ -1,5 +1,5 @@
-//! The one place that prints: results on stdout, talk and progress on stderr. A reader that went
-//! away (a closed pipe) is no error.
+//! The one place that prints: results on stdout, talk and progress on stderr. A reader that went away (a closed
+//! pipe) is no error.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Prints a result: `text` and a line break, on stdout.
 pub fn result(text: &str) {
     let mut out = io::stdout().lock();
-    // Nobody is left to tell if this fails.
+    // Nobody is left to tell of a failure.
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
@@ -21,12 +21,12 @@ pub fn json(value: &impl serde::Serialize) {
     }
 }
 
-/// Says something that is not a result, on stderr.
+/// Prints something that is not a result, on stderr.
 pub fn note(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// Says what went wrong, on stderr.
+/// Prints an error, on stderr.
 pub fn error(error: &dyn std::fmt::Display) {
     note(&format!("error: {error}"));
 }
@@ -43,7 +43,7 @@ pub struct Progress {
 
 /// Calls of [`Progress::update`] between two looks at the clock.
 const CALLS: u64 = 512;
-/// How long a run takes before the bar shows.
+/// Time that a run takes before the bar shows.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Parts the bar is divided into.
 const PARTS: u64 = 1000;
@@ -63,7 +63,7 @@ impl Progress {
         }
     }
 
-    /// The same, for calls that are far between.
+    /// Updates the bar at every call, for calls that are far between.
     pub fn show(&mut self, fraction: f64) {
         if !self.wanted {
             return;
@@ -89,10 +89,10 @@ impl Progress {
 pub struct Counter(ProgressBar);
 
 impl Counter {
-    /// Counts `all` of the things named `what`, of which `done` are done.
+    /// Counts `all` of the things named `what`, `done` of which are done.
     pub fn new(what: &str, done: u64, all: u64) -> Self {
         let bar = ProgressBar::new(all).with_message(what.to_owned());
-        // As above.
+        // As above: with a broken template the default style stays.
         if let Ok(style) = ProgressStyle::with_template(
             "{human_pos} of {human_len} {msg} {wide_bar} {per_sec}  {elapsed} gone, {eta} left",
         ) {

@@ -1,4 +1,4 @@
-//! What a run leaves behind: a table of doubles with named columns, and its CSV form.
+//! The recording of a run: a table of doubles with named columns, and its CSV form.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What the benchmarks measure: the cases, and the same step written by hand.
+//! The cases of the benchmarks, and the same step written by hand.
 
 #![allow(dead_code, reason = "each benchmark uses a part")]
 
@@ -90,15 +90,15 @@ impl<const NX: usize> ControlAffine<NX, 2> for Integrators<NX> {
     }
 }
 
-/// What [`goal`] with [`PointMass`] computes, by hand: derivatives of one barrier, one profile of
-/// order 2, one row.
+/// The computation of [`goal`] with [`PointMass`], by hand: derivatives of one barrier, one profile of order 2,
+/// one row.
 pub(crate) struct ByHand {
     anchor: [f64; 2],
     rate: f64,
 }
 
 impl ByHand {
-    /// Anchored at rest at the origin at time 0.
+    /// The filter anchored at rest at the origin at time 0.
     pub(crate) fn anchored() -> Self {
         let (h, dh, _, _) = Self::derivatives(&[0.0; 4]);
         Self { anchor: [h, dh], rate: FixedTimeSettings::default_rate(DEADLINE, 0.0) }

@@ -1,4 +1,4 @@
-//! The goal of [`super`] with its derivatives from each source that there is.
+//! The goal of [`super`] with its derivatives from each kind of source.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,7 +12,7 @@ use punctual_models::evaluated::{CodeModel, Dimensions};
 
 use super::{DEADLINE, X};
 
-/// A model that every source has: its derivatives as expressions; the plug-in is told it by its index.
+/// A model that every source has, with its derivatives as expressions; the plug-in gets its index.
 pub(crate) const MODELS: [(&str, [&str; 4]); 3] = [
     ("point mass", ["p", "q", "a", "b"]),
     ("unicycle", ["q*cos(p)", "q*sin(p)", "b", "a"]),
@@ -34,12 +34,12 @@ fn expression(model: usize) -> Box<dyn DerivativeSource> {
     barrier.source(2).expect("in range")
 }
 
-/// Along a plant of expressions.
+/// The goal along a plant of expressions.
 pub(crate) fn expressed(model: usize) -> FilterBuilder {
     filter(4, expression(model))
 }
 
-/// Along a plant of a plug-in, which is compiled here.
+/// The goal along a plant of a plug-in, which is compiled here.
 pub(crate) fn plugged(model: usize) -> FilterBuilder {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -59,12 +59,12 @@ pub(crate) fn plugged(model: usize) -> FilterBuilder {
     filter(4, model.barrier(0).and_then(|b| b.source(2)).expect("in range"))
 }
 
-/// With derivatives that are handed over.
+/// The goal with derivatives that are handed over.
 pub(crate) fn given() -> FilterBuilder {
     filter(5, external(2, 2).expect("in range"))
 }
 
-/// What [`given`] is handed over at the state `x` of a model.
+/// Derivatives handed over to [`given`] at the state `x` of a model.
 pub(crate) fn derivatives(model: usize, x: &[f64; 4]) -> [f64; 5] {
     let mut out = Derivatives::ZERO;
     expression(model).evaluate(0.0, x, &mut out);

@@ -121,7 +121,7 @@ def powers(unit):
 
 
 class Judge:
-    """What became of a promise, by h itself: the Judge of the library, line by line (docs/configuration.md)."""
+    """The verdict on a promise, by h itself: the Judge of the library, line by line (docs/configuration.md)."""
 
     def __init__(self, deadline, straight):
         self.after, self.points = deadline if math.isfinite(deadline) else None, 1 if straight else 3
@@ -211,7 +211,7 @@ class Judge:
         return values[0]
 
     def missed(self):
-        """When it was known that the deadline is missed."""
+        """The time at which it became certain that the deadline is missed."""
         return self.late if self.due or self.began_inside or self.late is not None else self.certain
 
     def on_time(self):
@@ -224,7 +224,7 @@ class Judge:
 
 
 class Filter:
-    """What is kept of a filter in a run, as docs/campaign.md says under "The rows"."""
+    """The row of a filter in a run, as docs/campaign.md says under "The rows"."""
 
     def __init__(self, block, values):
         self.block = block

@@ -3,10 +3,10 @@
 //! Everything here takes references and returns `Result`; the C interface is only guard and conversion.
 //! A failed call leaves the instance as it was.
 //!
-//! **Sample time.** An output read after inputs were set belongs to those inputs at the communication
-//! point at which they were set: it is computed when read, and only looked at. A step computes the
-//! sample at its start and remembers it; after the step, outputs stay that sample (a filter) or show
-//! the new state (a plant) until inputs change.
+//! **Sample time.** An output read after inputs were set belongs to those inputs at the communication point at
+//! which they were set. It is computed when read, and only looked at. A step computes the sample at its start and
+//! remembers it. After the step, outputs stay that sample (a filter) or show the new state (a plant) until inputs
+//! change.
 
 mod access;
 mod derivative;
@@ -25,8 +25,8 @@ const SAME_TIME: f64 = 1e-9;
 /// by addition or multiply it out. Much less than any step, also where time is counted from 1970.
 const TIME_ROUND_OFF: f64 = 1e-13;
 
-/// Part of the last step by which a plant's next step may start later: importers that round times to
-/// their own resolution.
+/// Part of the last step by which a plant's next step may start later, for importers that round times to their
+/// own resolution.
 const GAP: f64 = 1e-3;
 
 /// The modes of an instance, as flags.
@@ -90,9 +90,9 @@ pub enum Call {
     GetDirectionalDerivative,
 }
 
-/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11).
-/// Wider than the standard where importers are: values may be read in every mode. Calls that are not
-/// here are legal in every mode.
+/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11). They
+/// are wider than the standard where importers are: values may be read in every mode. Calls that are not here are
+/// legal in every mode.
 pub const LEGAL: [(Call, Mode); 8] = [
     (Call::SetupExperiment, Mode::INSTANTIATED),
     (Call::EnterInitializationMode, Mode::INSTANTIATED),
@@ -104,7 +104,7 @@ pub const LEGAL: [(Call, Mode); 8] = [
     (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
-/// Why a call failed, for the log: what was given and what is allowed.
+/// The reason why a call failed, for the log: the value given and those allowed.
 pub type Failure = String;
 
 /// A snapshot of an instance: all that influences what it does later.
@@ -126,17 +126,17 @@ pub struct State {
     pub configured: bool,
     /// Inputs (pending ones too), outputs and parameters.
     pub values: Values,
-    /// What the computation remembers.
+    /// The state of the computation.
     pub block: BlockState,
 }
 
 /// One instance of an FMU.
 pub struct Instance {
     product: Product,
-    /// Type and causality by value reference: what every read and write checks, in few bytes.
+    /// Type and causality by value reference: checked at every read and write, in few bytes.
     kinds: Vec<(BaseType, Causality)>,
     block: Box<dyn Block>,
-    /// What a new block remembers: nothing yet.
+    /// The state of a new block, which remembers nothing yet.
     start: BlockState,
     mode: Mode,
     /// The present communication point in s.
@@ -282,7 +282,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Back to where `fmi2Instantiate` left the instance, start values included.
+    /// Goes back to the state after `fmi2Instantiate`, start values included.
     pub fn reset(&mut self) {
         self.mode = Mode::INSTANTIATED;
         self.time = 0.0;
@@ -293,7 +293,7 @@ impl Instance {
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
-        // So that a state taken now is that of a new instance, bit for bit.
+        // Restoring makes a state taken now that of a new instance, bit for bit.
         let restored = self.block.restore(&self.start);
         debug_assert!(restored.is_ok(), "{restored:?}");
     }
@@ -317,7 +317,7 @@ impl Instance {
 
     /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
     pub fn save(&self, state: &mut State) {
-        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
         let Self {
             product,
             kinds: _,
@@ -339,8 +339,8 @@ impl Instance {
         block.save(&mut state.block);
     }
 
-    /// Goes back, or on, to a snapshot of this or another instance of the same FMU, in any mode: every bit
-    /// that follows is the same. Allocates only where the parameters were others.
+    /// Restores a snapshot of this or another instance of the same FMU, an earlier or a later one, in any mode:
+    /// every bit that follows is the same. Allocates only where the parameters were others.
     ///
     /// # Errors
     ///
@@ -370,10 +370,10 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// The wrong mode; a time that is not finite or lies before the present communication point; for a
-    /// plant also one after it (a part of its motion would be missing); a step that is not finite or
-    /// negative; what the block itself refuses. Importers that ignore the error see it in the outputs
-    /// of a filter: `status` is `invalid_input` and `u` nearest 0 until an input is set or a step made.
+    /// The wrong mode; a step that is not finite or negative; a time that is not finite or lies before the
+    /// present communication point; for a plant also one after it (a part of its motion would be missing); a
+    /// refusal by the block itself. Importers that ignore the error see it in the outputs of a filter: `status`
+    /// is `invalid_input` and `u` nearest 0 until an input is set or a step made.
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.check(Call::DoStep)?;
         let done = self.step(t, h);
@@ -456,8 +456,8 @@ impl Instance {
         self.check_references(call, BaseType::String, references)
     }
 
-    /// Writes reals. Inputs may have any value (what is not finite shows in `status`, or in the next
-    /// step of a plant); parameters must lie within their range.
+    /// Writes reals. Inputs may have any value; one that is not finite shows in `status`, or in the next step of
+    /// a plant. Parameters must lie within their range.
     ///
     /// # Errors
     ///
@@ -521,7 +521,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Computes the outputs if inputs changed since.
+    /// Computes the outputs if inputs changed since the last time.
     fn refresh(&mut self) {
         let lazy = match self.mode {
             Mode::INITIALIZATION => true,
@@ -531,8 +531,8 @@ impl Instance {
         if self.fresh || !lazy {
             return;
         }
-        // Parameters that contradict each other are an error when initialization ends; until then
-        // the outputs stay what they are.
+        // Contradicting parameters are an error when initialization ends. Until then the outputs stay as they
+        // are.
         if self.configured || self.configure().is_ok() {
             self.block.output(self.time, &mut self.values);
             self.fresh = true;

@@ -8,7 +8,7 @@
 //! | `filter_loop` | a filter with its integrator, if it has one |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
-//! | [`block`] | what is computed: a filter, plant or controller between value arrays |
+//! | [`block`] | the computation: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |

@@ -1,7 +1,7 @@
-//! What an FMU shows of itself: variables, value references, model description, GUID.
+//! The interface of an FMU: variables, value references, model description, GUID.
 //!
-//! The table built here is the only place that knows value references; the XML file and the accessors
-//! of the running instance are both read from it.
+//! The table built here is the only place that knows value references. The XML file and the accessors of the
+//! running instance are both read from it.
 
 mod outputs;
 
@@ -31,7 +31,7 @@ pub struct Product {
     pub configuration: Configuration,
     /// The variables; the value reference of each is its index.
     pub variables: Vec<Variable>,
-    /// Where the groups of variables lie.
+    /// Positions of the groups of variables.
     pub layout: Layout,
     /// The ranges of the parameters, in the order of the table.
     pub ranges: Vec<Range>,
@@ -241,7 +241,7 @@ impl Table {
         self.ranges.push(row.range);
     }
 
-    /// Adds the parameters of `configuration`, which come last, and completes `layout` with their place.
+    /// Adds the parameters of `configuration`, which come last, and completes `layout` with their position.
     fn finish<C: Clone>(
         mut self,
         configuration: &C,
@@ -270,6 +270,7 @@ fn real(start: Option<f64>, unit: &str) -> VariableKind {
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     let (states, inputs) = (&c.measured_states(), &c.commanded());
     let mut table = Table::default();
+    // Inputs: measured states, those of the barriers, the reference, the re-arming.
     for state in states {
         let measured = table.signal("x", state, "measured ", Causality::Input);
         if let VariableKind::Real(Real { start, min, max, .. }) = &mut measured.kind {
@@ -288,6 +289,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
 
     let outputs = table.variables.len();
     let output = Causality::Output;
+    // Outputs: the safe input and the status, those of each barrier, the integrated state.
     for input in inputs {
         table.signal("u", input, "safe ", output);
     }
@@ -311,7 +313,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         let ahead = "what the filter has integrated, at the end of the step; u is its mean over the step";
         table.add(format!("integrator.{name}"), ahead, output, real(None, unit));
     }
-    // Every output follows from state, reference and re-arming at once, or from nothing until a step.
+    // Every output follows from all inputs at once, or from nothing until a step.
     let direct: Vec<u32> = if c.direct_feedthrough { (0..outputs as u32).collect() } else { Vec::new() };
     for variable in &mut table.variables[outputs..] {
         variable.dependencies = Some(direct.clone());
@@ -356,7 +358,7 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
     }
     let outputs = table.variables.len();
     for (i, input) in inputs.iter().enumerate() {
-        // Damping knows which state it opposes; a goal is sought with all of them.
+        // Damping depends on the states that it opposes; a goal is sought with all of them.
         let dependencies = match c.controller {
             _ if !c.direct_feedthrough => Vec::new(),
             ControllerName::Damping => {

@@ -9,8 +9,8 @@
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
 //! | 4 | CRC-32 of all before |
 //!
-//! Little-endian; numbers by their bits. A field has the same place in every state of an FMU: optional ones
-//! keep theirs. Bytes that are damaged, or not of this FMU, are refused; which field it is, is said.
+//! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
+//! keep theirs. Damaged bytes, and those of another FMU, are refused by the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::filter::FilterState;
@@ -23,7 +23,8 @@ use crate::product::Product;
 
 const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
-/// To be raised with every change of the layout. (The GUID changes with the version of the library.)
+/// Version of the layout, to be raised with every change of it. (The GUID changes with the version of the
+/// library.)
 const VERSION: u32 = 3;
 
 const GUID: usize = 38;
@@ -66,11 +67,13 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
         return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
     }
     check_guid(product, guid.as_bytes())?;
+    // The header.
     let mut out = Vec::with_capacity(size);
     out.extend_from_slice(&MAGIC);
     VERSION.write(&mut out);
     out.extend_from_slice(guid.as_bytes());
     (size as u64).write(&mut out);
+    // The fields of the instance, and the values in the order of the table.
     mode.write(&mut out);
     time.write(&mut out);
     stepped.write(&mut out);
@@ -85,6 +88,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
             BaseType::String => {}
         }
     }
+    // The memory of the block.
     match block {
         BlockState::Filter { rearm_seen, filter, integrated } => {
             let FilterState { barriers, time, period, input } = filter;
@@ -98,6 +102,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
         BlockState::Controller { waypoint } => waypoint.write(&mut out),
     }
+    // The checksum, and the whole at once.
     let checksum = crc32(&out);
     checksum.write(&mut out);
     if out.len() != size {
@@ -113,8 +118,9 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
 ///
 /// # Errors
 ///
-/// Bytes that are not such a state: which part, what it is and what it must be.
+/// Bytes that are not such a state: the field, the value found and those allowed.
 pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
+    // The header: does it belong to a state of this product, and is all of it there?
     let size = size(product);
     let mut input = Reader { rest: bytes };
     if input.take("magic number", MAGIC.len())? != MAGIC {
@@ -136,6 +142,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     if let Some(at) = rest.iter().position(|byte| *byte != 0) {
         return Err(format!("byte {} after the state is {}, must be 0", size + at, rest[at]));
     }
+    // The checksum.
     let (content, checksum) = state.split_at(size - CHECKSUM);
     let found: u32 = Reader { rest: checksum }.field("checksum")?;
     let wanted = crc32(content);
@@ -143,6 +150,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         return Err(format!("the checksum is {found:08x}, must be {wanted:08x}: the bytes are damaged"));
     }
 
+    // The fields of the instance, and the values in the order of the table.
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
     let time = input.finite("time")?;
@@ -154,6 +162,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         return Err(format!("configured: is false, must be true in the mode {:?}", mode.name()));
     }
     let values = read_values(product, &mut input)?;
+    // The memory of the block.
     let block = match &product.configuration {
         Configuration::Filter(c) => {
             let rearm_seen = input.field("rearm_seen")?;
@@ -239,7 +248,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// What has a fixed number of bytes.
+/// A field with a fixed number of bytes.
 trait Field: Sized {
     const SIZE: usize;
     fn write(&self, out: &mut Vec<u8>);
@@ -282,7 +291,7 @@ impl Field for bool {
     }
 }
 
-/// Its number, in one byte.
+/// The number of a phase, in one byte.
 impl Field for Phase {
     const SIZE: usize = 1;
 
@@ -301,7 +310,7 @@ impl Field for Mode {
     const SIZE: usize = 1;
 
     fn write(&self, out: &mut Vec<u8>) {
-        // A number that is none of a mode is refused when it is read.
+        // A number that is no mode's is refused when it is read.
         let index = Self::EACH.iter().position(|mode| mode == self).unwrap_or(Self::EACH.len());
         out.push(index as u8);
     }
@@ -347,10 +356,10 @@ impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
     }
 }
 
-/// `FilterState::input`.
+/// The type of `FilterState::input`.
 type Inputs = [f64; punctual_core::MAX_INPUTS];
 
-/// Structures field by field: one that is missing here, or of another type, does not compile.
+/// Writes and reads structures field by field: one that is missing here, or of another type, does not compile.
 macro_rules! structure {
     ($kind:ident { $($field:ident: $type:ty),* $(,)? }) => {
         impl Field for $kind {

@@ -1,8 +1,7 @@
 //! The `.fmu` or `.ssp` file: a zip archive whose bytes depend on nothing but its entries and one given instant.
 //!
-//! Reproducible means: sorted entries, one fixed time for all of them, fixed permissions and a fixed
-//! compression level, whatever the operating system. Another version of the compression library may
-//! compress to other bytes.
+//! Reproducible means: sorted entries, one fixed time for all of them, fixed permissions and a fixed compression
+//! level, whatever the operating system. Another version of the compression library may compress to other bytes.
 
 use crate::Error;
 use crate::calendar::days_in_month;
@@ -35,8 +34,8 @@ impl Timestamp {
     /// Reads the value of the convention `SOURCE_DATE_EPOCH`: seconds since 1970-01-01 00:00:00 UTC in
     /// decimal digits, 315532800 (1980-01-01) to 4354819199 (2107-12-31 23:59:59).
     ///
-    /// The archive stores two-second steps and rounds down. This crate never reads the environment;
-    /// whoever does passes the text on.
+    /// The archive stores two-second steps and rounds down. This crate never reads the environment: its caller
+    /// reads it and passes the text on.
     ///
     /// # Errors
     ///
@@ -162,9 +161,10 @@ impl Archive {
     /// # Errors
     ///
     /// - The archive is larger than its format allows. Then nothing is written.
-    /// - The destination cannot be written. What was written until then is not a valid archive.
+    /// - The destination cannot be written. The bytes written until then are no valid archive.
     pub fn write_to<W: Write>(&self, mut destination: W) -> Result<(), Error> {
-        // Not written through: when a destination fails, the zip crate prints to standard error.
+        // The bytes are complete before they are written: when a destination fails, the zip crate prints to
+        // standard error.
         let bytes = self.to_bytes()?;
         let written = destination.write_all(&bytes).and_then(|()| destination.flush());
         written.map_err(|error| Error::io("write the archive", error))

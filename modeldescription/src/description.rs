@@ -4,7 +4,7 @@ use crate::words::words;
 use crate::{Integer, ScalarType, Unit, Variable, VariableKind, xsd};
 use serde::Serialize;
 
-/// How variable names are built.
+/// The convention by which variable names are built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum NamingConvention {
     /// Any text on one line.
@@ -23,7 +23,7 @@ pub struct SimpleType {
     pub name: String,
     /// Meaning for a human; empty: the attribute is absent.
     pub description: String,
-    /// What it gives to variables that do not say it themselves.
+    /// Attributes that variables take over where they do not give them themselves.
     pub kind: VariableKind,
     /// The items of an enumeration; at least one, names and values unique. Of other types none.
     pub items: Vec<EnumerationItem>,
@@ -56,7 +56,7 @@ pub struct EnumerationItem {
     pub description: String,
 }
 
-/// When and how finely to simulate unless the user says otherwise.
+/// Default start, stop and step of a simulation, unless the user says otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DefaultExperiment {
     /// Start time in seconds; finite, default 0.
@@ -146,12 +146,12 @@ pub struct CoSimulation {
 pub struct ModelDescription {
     /// The name of the model for a human; not empty.
     pub model_name: String,
-    /// The text that ties description and library together; not empty, one line. Different for FMUs
-    /// with different variables: importers use it as a key.
+    /// The text that ties description and library together; not empty, one line. It differs for FMUs with
+    /// different variables, since importers use it as a key.
     pub guid: String,
-    /// What the model is.
+    /// A description of the model, for a human.
     pub description: String,
-    /// Who made the model.
+    /// The author of the model.
     pub author: String,
     /// The version of the model; one line.
     pub version: String,
@@ -161,10 +161,10 @@ pub struct ModelDescription {
     pub license: String,
     /// The program that writes the FMU; one line.
     pub generation_tool: String,
-    /// When it was written, in UTC as `YYYY-MM-DDThh:mm:ssZ`. `None`, the default, keeps the file
+    /// The instant of writing, in UTC as `YYYY-MM-DDThh:mm:ssZ`. `None`, the default, keeps the file
     /// reproducible.
     pub generation_date_and_time: Option<String>,
-    /// How variable names are built.
+    /// The convention by which variable names are built.
     pub variable_naming_convention: NamingConvention,
     /// Identity and capabilities.
     pub co_simulation: CoSimulation,
@@ -174,7 +174,7 @@ pub struct ModelDescription {
     pub types: Vec<SimpleType>,
     /// The categories of log messages; names unique.
     pub log_categories: Vec<LogCategory>,
-    /// When and how finely to simulate; `None`: nothing is said.
+    /// Default start, stop and step; `None`: nothing is said.
     pub default_experiment: Option<DefaultExperiment>,
     /// The variables, at least one. Their order is that of the file.
     pub variables: Vec<Variable>,

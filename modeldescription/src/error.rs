@@ -1,9 +1,9 @@
-//! The one error type of the crate. Which dependency failed stays inside.
+//! The one error type of the crate. It does not show which dependency failed.
 
 use std::fmt;
 use std::io;
 
-/// Why a description or an archive could not be written.
+/// An error in writing a description or an archive.
 ///
 /// The message names the field, its value and what would be allowed, for example
 /// `variables["x.v"].start is 11.0; allowed: 0.0 to 10.0`.
@@ -97,7 +97,7 @@ impl Error {
         }
     }
 
-    /// What would be allowed there, in words.
+    /// The values that would be allowed there, in words.
     pub fn allowed(&self) -> Option<&str> {
         match &*self.kind {
             Kind::Invalid { allowed, .. } => Some(allowed),

@@ -1,12 +1,12 @@
-//! The C interface of FMI 2.0 for co-simulation: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, and one
-//! table of the functions. Who exports them, calls them or looks for them takes them from here.
+//! The C interface of FMI 2.0 for co-simulation: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`,
+//! and one table of the functions. All code that exports, calls or looks for them takes them from here.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::fmt;
 
 /// `fmi2Component`: an instance, as only its library knows it.
 pub type Component = *mut c_void;
-/// `fmi2ComponentEnvironment`: what the importer gets back with each message.
+/// `fmi2ComponentEnvironment`: a pointer that the importer gets back with each message.
 pub type Environment = *mut c_void;
 /// `fmi2FMUstate`.
 pub type State = *mut c_void;

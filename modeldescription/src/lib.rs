@@ -4,12 +4,12 @@
 //! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
 //! of what the slave computes, reads no file and no environment variable and prints nothing.
 //!
-//! A [`ModelDescription`] is plain data with public fields: one model for whoever writes a description, reads one
-//! or looks for what is wrong with one. [`ModelDescription::to_xml`] checks it
-//! against the rules of FMI 2.0.x that an XML schema cannot express ([`RULES`]), then writes it. With the feature
-//! `read` `Located` takes it from a file, however broken, with where everything stands, and tells what breaks
-//! the same rules. With the feature `archive` (on by default) `Archive` collects the files of an FMU and writes them
-//! so that the same entries always give the same bytes.
+//! A [`ModelDescription`] is plain data with public fields: one model for code that writes a description, reads
+//! one or looks for defects in one. [`ModelDescription::to_xml`] checks it against the rules of FMI 2.0.x that an
+//! XML schema cannot express ([`RULES`]), then writes it. With the feature `read`, `Located` takes it from a
+//! file, however broken, with the positions of its parts, and tells which of the same rules it breaks. With the
+//! feature `archive` (on by default), `Archive` collects the files of an FMU and writes them so that the same
+//! entries always give the same bytes.
 //!
 //! | module | owns |
 //! |---|---|
@@ -17,14 +17,14 @@
 //! | `unit` | units in terms of SI base units |
 //! | `description` | the whole description, its types, log categories and experiment |
 //! | `structure` | outputs, initial unknowns and their dependencies as variable indices |
-//! | `rules` | what the standard says beyond the schema, for what is written and what was read |
-//! | `validate` | what else a description must be to be written |
+//! | `rules` | the rules of the standard beyond the schema, for descriptions written and read |
+//! | `validate` | further conditions on a description that is to be written |
 //! | `xml` | the file, written |
 //! | `read` | the file, read |
-//! | `names` | what a text, a C identifier and a structured name may contain |
+//! | `names` | characters and forms of a text, a C identifier and a structured name |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
 //! | `fmi2` | the C interface: types, and one table of the functions |
-//! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and what they may say |
+//! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and their rules |
 //! | `archive` | the zip file |
 //!
 //! # Example

@@ -1,4 +1,4 @@
-//! What texts, identifiers and structured variable names may contain.
+//! Characters and forms that texts, identifiers and structured variable names may have.
 
 /// The first character that XML 1.0 cannot carry, not even escaped.
 pub(crate) fn forbidden_character(text: &str) -> Option<char> {

@@ -1,8 +1,8 @@
-//! A model description from its XML, whatever is wrong with it.
+//! Reads a model description from its XML, whatever is wrong with it.
 //!
-//! Nothing is refused here. What is missing, or no value of its type, is absent or at its default in the
-//! model, and noted, so that no rule takes it for what the file says. Elements and attributes that the
-//! model has no field for are passed over: a check against the schema is another's.
+//! Nothing is refused here. A value that is missing, or is none of its type, is absent or at its default in the
+//! model. It is also noted, so that no rule takes it for the file's own. Elements and attributes that the model
+//! has no field for are passed over, since a check against the schema finds those.
 
 use crate::rules::{Check, Place, UnknownList, Unread, Violation};
 use crate::xsd::{boolean, double, int, unsigned, words};
@@ -14,16 +14,16 @@ use crate::{
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
-/// A model description with where its parts stand in the text.
+/// A model description, and the positions of its parts in the text.
 ///
 /// The dependencies of variables stay `None`: they are in the structure.
 #[derive(Debug, Default)]
 pub struct Located {
-    /// What it says. Without a co-simulation interface that part is empty.
+    /// The content. Without a co-simulation interface that part is empty.
     pub description: ModelDescription,
     /// Its `ModelStructure`.
     pub structure: ModelStructure,
-    /// How many co-simulation interfaces it has; the model's is the first.
+    /// Number of co-simulation interfaces; the model's is the first.
     pub interfaces: usize,
     /// The start values of the variables as written.
     pub starts: Vec<Option<String>>,
@@ -39,8 +39,8 @@ impl Located {
         read
     }
 
-    /// Where a part begins, in bytes from the beginning of the text. Of what is not there: where the part
-    /// begins that should have it.
+    /// The beginning of a part, in bytes from the beginning of the text. For a part that is not there, it is the
+    /// beginning of the part that should have it.
     pub fn position(&self, place: Place) -> usize {
         let outer = match place {
             Place::Start(v) => Place::Variable(v),
@@ -59,7 +59,7 @@ impl Located {
         (self.interfaces > 0).then_some(&self.description.co_simulation)
     }
 
-    /// The name that the libraries have, if one is given.
+    /// The name of the libraries, if one is given.
     pub fn model_identifier(&self) -> Option<&str> {
         let given = !self.is_unread(Place::Interface(0), "modelIdentifier");
         given.then_some(&self.description.co_simulation.model_identifier)
@@ -86,6 +86,7 @@ impl Located {
 
     fn root(&mut self, root: Node<'_, '_>) {
         self.positions.insert(Place::Root, root.range().start);
+        // The root's own attributes.
         let mut at = At { read: self, place: Place::Root, node: Some(root) };
         let description = ModelDescription {
             model_name: at.text("modelName"),
@@ -103,6 +104,7 @@ impl Located {
             ..ModelDescription::default()
         };
         self.description = description;
+        // The co-simulation interfaces; the first is the model's.
         let interfaces: Vec<_> = children(root, "CoSimulation").collect();
         self.interfaces = interfaces.len();
         if interfaces.is_empty() {
@@ -116,6 +118,7 @@ impl Located {
                 self.description.co_simulation = self.interface(place, node);
             }
         }
+        // The lists that variables refer to, and the experiment.
         self.description.units =
             list(root, "UnitDefinitions", "Unit").enumerate().map(|(u, node)| self.unit(u, node)).collect();
         self.description.types = list(root, "TypeDefinitions", "SimpleType")
@@ -137,6 +140,7 @@ impl Located {
                 step_size: at.value("stepSize", double),
             });
         }
+        // The variables, and the structure over them.
         self.description.variables = list(root, "ModelVariables", "ScalarVariable")
             .enumerate()
             .map(|(v, node)| self.variable(v, node))
@@ -149,7 +153,7 @@ impl Located {
         };
     }
 
-    /// The attributes of an element, which stands at a place.
+    /// Reads the attributes of an element at a place.
     fn enter<'r, 'n, 'i>(&'r mut self, place: Place, node: Node<'n, 'i>) -> At<'r, 'n, 'i> {
         self.positions.insert(place, node.range().start);
         At { read: self, place, node: Some(node) }
@@ -195,7 +199,7 @@ impl Located {
                 offset: at.value("offset", double).unwrap_or(0.0),
             }
         });
-        // One without a name can be nobody's.
+        // A display unit without a name has nobody to refer to it.
         let named = children(node, "DisplayUnit").filter(|n| n.has_attribute("name"));
         let display = named.enumerate().map(|(d, node)| {
             let mut at = self.enter(Place::DisplayUnit(u, d), node);
@@ -216,7 +220,7 @@ impl Located {
         if of.is_none() {
             self.unread.insert((place, "type"));
         }
-        // One without a value stands for nothing.
+        // An item without a value stands for nothing.
         let valued = of.into_iter().flat_map(|of| children(of, "Item"));
         let valued = valued.filter_map(|n| Some((n, n.attribute("value").and_then(int)?)));
         let items = valued.enumerate().map(|(i, (node, value))| {
@@ -227,7 +231,7 @@ impl Located {
         SimpleType { name, description, kind, items }
     }
 
-    /// The element with the type of a variable or declared type; without one it counts as Real.
+    /// The element with the type of a variable or declared type; without such an element it counts as Real.
     fn kind<'n, 'i>(&mut self, place: Place, node: Node<'n, 'i>) -> (VariableKind, Option<Node<'n, 'i>>) {
         let found = node.children().find_map(|n| {
             let of = ScalarType::ALL.iter().find(|of| n.has_tag_name(of.as_str()))?;
@@ -284,13 +288,13 @@ impl Located {
     ) -> Vec<Unknown> {
         let found = structure.and_then(|n| children(n, list.as_str()).next());
         self.positions.insert(Place::Unknowns(list), found.or(structure).unwrap_or(root).range().start);
-        // One without an index stands for nothing.
+        // An unknown without an index stands for nothing.
         let indexed = found.into_iter().flat_map(|n| children(n, "Unknown"));
         let indexed = indexed.filter_map(|n| Some((n, n.attribute("index").and_then(unsigned)?)));
         let unknown = |(u, (node, index)): (usize, (Node<'_, '_>, u32))| {
             let place = Place::Unknown(list, u);
             self.positions.insert(place, node.range().start);
-            // Each word counts, also one that is no index.
+            // Each word counts, even one that is no index.
             let dependencies = node.attribute("dependencies").map(|text| {
                 let index = |word| {
                     unsigned(word).unwrap_or_else(|| {
@@ -332,7 +336,7 @@ impl<'n> At<'_, 'n, '_> {
         self.node?.attribute(name)
     }
 
-    /// A value; one that cannot be read is noted.
+    /// Reads a value; one that cannot be read is noted.
     fn value<T>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let text = self.attribute(name)?;
         let value = parse(text);
@@ -342,7 +346,7 @@ impl<'n> At<'_, 'n, '_> {
         value
     }
 
-    /// A value that must be there; one that is missing is noted too.
+    /// Reads a value that must be there; one that is missing is noted too.
     fn required<T: Default>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> T {
         if self.attribute(name).is_none() {
             self.read.unread.insert((self.place, name));
@@ -362,7 +366,7 @@ impl<'n> At<'_, 'n, '_> {
         self.attribute(name).map(str::to_owned)
     }
 
-    /// The start value of a variable; one that cannot be read is noted as the variable's.
+    /// Reads the start value of a variable; one that cannot be read is noted as the variable's.
     fn start<T>(&mut self, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let Place::Variable(v) = self.place else { return None };
         At { read: &mut *self.read, place: Place::Start(v), node: self.node }.value("start", parse)

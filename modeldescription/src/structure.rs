@@ -1,9 +1,8 @@
 //! `ModelStructure`: outputs and initial unknowns with their dependencies (FMI 2.0.4, section 2.2.8).
 //!
-//! Callers give dependencies as value references, because these are what they have. The file wants
-//! the 1-based positions of the variables, ascending. A value reference is unique only within its base
-//! type; the translation therefore looks among the variables that may stand there ("knowns") and
-//! refuses a value reference that fits more than one.
+//! Callers have value references, and give dependencies as such. The file wants the 1-based positions of the
+//! variables, ascending. A value reference is unique only within its base type. So the translation looks among
+//! the variables that may stand there ("knowns"), and refuses a value reference that fits more than one.
 
 use crate::validate::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variable};
@@ -12,7 +11,7 @@ use std::collections::{BTreeSet, HashMap};
 
 /// The content of `ModelStructure`.
 ///
-/// Whoever writes a description gives dependencies with its variables, and the lists follow from them
+/// In a description to be written, dependencies come with the variables, and the lists follow from them
 /// ([`ModelDescription::structure`]). A description that was read has the lists of its file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ModelStructure {
@@ -20,21 +19,21 @@ pub struct ModelStructure {
     pub outputs: Vec<Unknown>,
     /// The derivatives of continuous states.
     pub derivatives: Vec<Unknown>,
-    /// What is computed in initialization: outputs that are not exact, calculated parameters, and such
-    /// states and derivatives. In ascending order of index.
+    /// The unknowns of initialization: outputs that are not exact, calculated parameters, and states and
+    /// derivatives computed then. In ascending order of index.
     pub initial_unknowns: Vec<Unknown>,
 }
 
-/// A variable that is computed, and what it depends on, as indices of variables, from 1.
+/// A variable that is computed and its dependencies, as indices of variables, from 1.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Unknown {
     /// The index of the variable.
     #[serde(rename = "@index")]
     pub index: u32,
-    /// The indices of what it depends on; `None` (the attribute is absent) means everything, empty nothing.
+    /// The indices of its dependencies; `None` (the attribute is absent) means everything, empty nothing.
     #[serde(rename = "@dependencies", skip_serializing_if = "Option::is_none")]
     pub dependencies: Option<Vec<u32>>,
-    /// How it depends on each, in the words of the standard; `None`: nothing is said.
+    /// The kind of each dependency, in the words of the standard; `None`: nothing is said.
     #[serde(rename = "@dependenciesKind", skip_serializing_if = "Option::is_none")]
     pub dependency_kinds: Option<Vec<String>>,
 }

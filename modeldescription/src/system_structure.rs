@@ -29,7 +29,7 @@ pub struct SystemStructure {
     pub connections: Vec<SystemConnection>,
     /// The enumerations that connectors refer to.
     pub enumerations: Vec<SimpleType>,
-    /// When to start (without it at 0) and stop; the step size has no place in the format.
+    /// Start time (0 if not given) and stop time; the step size has no place in the format.
     pub default_experiment: Option<DefaultExperiment>,
 }
 

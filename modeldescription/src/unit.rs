@@ -11,7 +11,7 @@ pub struct Unit {
     /// The name, as variables spell it, for example `m/s`. Not empty, unique among the units, one line.
     #[serde(rename = "@name")]
     pub name: String,
-    /// What the unit is in SI base units; absent: nothing is said.
+    /// Definition in SI base units; absent: nothing is said.
     #[serde(rename = "BaseUnit", skip_serializing_if = "Option::is_none")]
     pub base: Option<BaseUnit>,
     /// Units to show values in.

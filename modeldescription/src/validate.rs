@@ -1,5 +1,5 @@
-//! What a description must be to be written: the rules of the standard ([`rules`](crate::rules)), what the XML
-//! schema asks for, and a few rules of our own, such as that no two variables are the same memory.
+//! Conditions on a description to be written: the rules of the standard ([`rules`](crate::rules)), those of the
+//! XML schema, and a few of our own, such as that no two variables are the same memory.
 //!
 //! The first violation found is reported. Dependencies are checked where they are translated, in
 //! `structure`.
@@ -27,7 +27,7 @@ impl ModelDescription {
     pub fn validate(&self) -> Result<(), Error> {
         let mut broken = None;
         let mut report = |violation: Violation| {
-            // Aliases are refused altogether, below.
+            // Aliases are refused altogether, in the check below.
             if !violation.rule.starts_with("variable.alias") {
                 broken.get_or_insert(violation);
             }
@@ -171,7 +171,7 @@ fn variables(description: &ModelDescription) -> Result<(), Error> {
     Ok(())
 }
 
-/// What depends on the type: bounds, start value, texts.
+/// Checks bounds, start value and texts, which depend on the type.
 fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error> {
     match kind {
         VariableKind::Real(Real { quantity, min, max, nominal, start, .. }) => {
@@ -214,7 +214,7 @@ fn finite(path: impl Into<String>, value: f64) -> Result<(), Error> {
     if value.is_finite() { Ok(()) } else { Err(Error::invalid(path, Number(value), "finite")) }
 }
 
-/// Names in one list: not empty, one line, no two equal.
+/// Checks names in one list: not empty, one line, no two equal.
 fn unique_names(list: &str, names: &[&str]) -> Result<(), Error> {
     let mut positions = HashMap::new();
     for (position, name) in names.iter().enumerate() {
@@ -228,7 +228,7 @@ fn unique_names(list: &str, names: &[&str]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Not empty, one line.
+/// Checks a name: not empty, one line.
 fn name(path: String, name: &str) -> Result<(), Error> {
     required(path.as_str(), name)?;
     line(path, name)

@@ -4,7 +4,7 @@ use crate::words::words;
 use crate::xsd;
 use serde::Serialize;
 
-/// What a variable is for.
+/// The role of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Causality {
     /// Set by the importer before the simulation, or also during it if tunable.
@@ -24,7 +24,7 @@ pub enum Causality {
 words!(Causality: Parameter "parameter", CalculatedParameter "calculatedParameter", Input "input", Output "output",
     Local "local", Independent "independent");
 
-/// When a variable may change.
+/// The instants at which a variable may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Variability {
     /// Never.
@@ -42,7 +42,7 @@ pub enum Variability {
 words!(Variability: Constant "constant", Fixed "fixed", Tunable "tunable", Discrete "discrete",
     Continuous "continuous");
 
-/// How a variable gets its first value.
+/// The origin of a variable's first value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Initial {
     /// From its start value.
@@ -55,7 +55,7 @@ pub enum Initial {
 
 words!(Initial: Exact "exact", Approx "approx", Calculated "calculated");
 
-/// What the standard says of [`Initial`] for one pair of causality and variability.
+/// The rule of the standard on [`Initial`] for one pair of causality and variability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InitialRule {
     /// The meaning of an absent `initial`; `None` where the attribute itself is forbidden.
@@ -308,18 +308,18 @@ pub struct Variable {
     pub value_reference: u32,
     /// Meaning for a human; empty: the attribute is absent.
     pub description: String,
-    /// What the variable is for.
+    /// The role of the variable.
     pub causality: Causality,
-    /// When it may change; the pair with `causality` must be legal, see [`InitialRule::of`].
+    /// The instants at which it may change; the pair with `causality` must be legal, see [`InitialRule::of`].
     pub variability: Variability,
-    /// How it gets its first value; `None`: the default of [`InitialRule::of`].
+    /// The origin of its first value; `None`: the default of [`InitialRule::of`].
     pub initial: Option<Initial>,
     /// Type, start value and range.
     pub kind: VariableKind,
-    /// Outputs only: value references of the inputs, parameters and independent variable that this
-    /// output depends on directly at communication points. `None`: unknown, so on everything;
-    /// empty: on nothing. Order and repetition do not matter. A value reference used by several of
-    /// those variables (of different base types) is refused as ambiguous.
+    /// Outputs only: value references of the inputs, parameters and independent variable that this output depends
+    /// on directly at communication points. `None`: unknown, so on everything; empty: on nothing. Order and
+    /// repetition do not matter. A value reference that several of those variables have (of different base types)
+    /// is refused as ambiguous.
     pub dependencies: Option<Vec<u32>>,
     /// Initial unknowns only (see [`is_initial_unknown`](Self::is_initial_unknown)): the same for
     /// initialization mode, where variables with initial exact count as well.
@@ -327,8 +327,8 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// How the variable gets its first value, with the default of the standard filled in; `None` for
-    /// inputs, the independent variable and illegal pairs of causality and variability.
+    /// The origin of the first value, with the default of the standard filled in. `None` for inputs, the
+    /// independent variable and illegal pairs of causality and variability.
     pub fn effective_initial(&self) -> Option<Initial> {
         self.initial.or_else(|| InitialRule::of(self.causality, self.variability)?.default)
     }

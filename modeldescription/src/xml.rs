@@ -1,5 +1,5 @@
-//! The file `modelDescription.xml`. The model's own types say how each element is written; here stand
-//! what is not a type of its own: the root, the containers, and what is derived.
+//! The file `modelDescription.xml`. The model's own types say how each element is written. The rest stands here:
+//! the root, the containers, and everything derived.
 //!
 //! Attributes at the default of the schema are left out, except causality, variability and initial: a reader of
 //! the file should not have to know the table of defaults.

@@ -78,14 +78,14 @@ pub fn int(text: &str) -> Option<i32> {
 /// An `xs:unsignedInt`.
 pub fn unsigned(text: &str) -> Option<u32> {
     let text = trimmed(text);
-    // "-0" is one too.
+    // "-0" is an unsigned integer too.
     if text.strip_prefix('-').is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b == b'0')) {
         return Some(0);
     }
     text.parse().ok()
 }
 
-/// An `xs:double`. Rust reads more than that: `inf`, `infinity`, `nan`.
+/// An `xs:double`. Rust reads more words than the schema: `inf`, `infinity`, `nan`.
 pub fn double(text: &str) -> Option<f64> {
     match trimmed(text) {
         "INF" => Some(f64::INFINITY),

@@ -100,7 +100,7 @@ fn similar_paths_are_no_conflict() {
     assert_eq!(archive.entries().count(), 5);
 }
 
-/// A destination that is full.
+/// A destination without room.
 struct Full;
 
 impl Write for Full {

@@ -1,4 +1,4 @@
-//! One defect per test in an otherwise valid description, and what is said of it.
+//! Defects of an otherwise valid description, one per test, each with its message.
 
 mod support;
 

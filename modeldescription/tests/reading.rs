@@ -1,4 +1,4 @@
-//! Descriptions that are read: what was written comes back; what is broken is told, and takes nothing else along.
+//! Descriptions that are read: a written one comes back; a broken part is told, and takes nothing else along.
 
 mod support;
 
@@ -100,7 +100,7 @@ fn positions_are_those_of_the_text() {
         (Place::Start(2), "start=\"0.0\"/>"),
         (Place::Unknowns(UnknownList::Outputs), "<Outputs>"),
         (Place::Unknown(UnknownList::InitialUnknowns, 1), "<Unknown index=\"7\" dependencies=\"3 11\""),
-        // What is not there is told where it should be.
+        // A missing part is told at the place where it should be.
         (Place::Start(1), "<ScalarVariable name=\"rod.half\""),
         (Place::Unknowns(UnknownList::Derivatives), "<ModelStructure>"),
     ] {

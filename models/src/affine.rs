@@ -1,7 +1,7 @@
 //! Whether inputs enter an expression linearly, by its structure.
 //!
-//! Each part of an expression is either free of inputs, affine in them, or neither. This looks at how the parts
-//! are put together and at no number: `a * a / a` is refused although it equals `a`.
+//! Each part of an expression is free of inputs, affine in them, or neither. This module looks at how the parts
+//! are put together and at no number. So it refuses `a * a / a`, although that equals `a`.
 
 use crate::syntax::{Node, Operator, Tree};
 

@@ -1,4 +1,4 @@
-//! What is wrong with a model, and where.
+//! Errors of a model: the part that is wrong, and why.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ impl Error {
         &self.field
     }
 
-    /// What is wrong with it.
+    /// The reason, for a human.
     pub fn message(&self) -> &str {
         &self.message
     }

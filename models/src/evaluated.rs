@@ -1,9 +1,9 @@
-//! Plants and barriers that somebody else's code computes, such as a plug-in's: it is given numbers that it cannot
-//! look into, asks for operations on them, and these are done on Taylor coefficients.
+//! Plants and barriers that somebody else's code computes, such as a plug-in's. The code gets numbers that it
+//! cannot look into and asks for operations on them. The host does these on Taylor coefficients.
 //!
-//! The code is run once: it does its operations on the coefficients of order 0, and what it asks for is written down and
-//! continued to the orders above as an expression is. It may look at the values ([`Calculator::value`]), branch on them
-//! and look things up: a state has one order 0.
+//! The code runs once for each state and does its operations on the coefficients of order 0. What it asks for is
+//! written down as a tape, and continued to the orders above as the tape of an expression is. The code may look
+//! at values ([`Calculator::value`]), branch on them and look things up, since a state has one order 0.
 
 mod trial;
 
@@ -22,31 +22,33 @@ use crate::syntax::{Function, Operator};
 use crate::tape::{Operation, Record, Register, Step, Value};
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
 
-/// A number that is computed with: a name for it, to hand back.
+/// The name of a number in a computation, for the code to hand back.
 pub type Number = u32;
 
-/// In place of a [`Number`]: the plain number of the call.
+/// Stands for the plain number of the call, in place of a [`Number`].
 pub const LITERAL: Number = Number::MAX;
 
-/// What can be asked for, each by its place in this list.
+/// Operations that code can ask for, each by its place in this list.
 pub const OPERATIONS: [&str; 19] = [
     "constant", "add", "subtract", "multiply", "divide", "power", "negate", "sqrt", "exp", "ln", "sin",
     "cos", "tan", "atan", "atan2", "abs", "tanh", "min", "max",
 ];
 
-/// What does the operations.
+/// Does the operations that code asks for.
 pub trait Calculator {
-    /// The result of the operation numbered `operation` in [`OPERATIONS`] on `a`, and `b` where it takes two;
-    /// `literal` is what [`LITERAL`] stands for. What cannot be done gives something that is not a number.
+    /// The result of the operation numbered `operation` in [`OPERATIONS`] on `a`, and `b` where it takes two.
+    /// `literal` is the number that [`LITERAL`] stands for. An operation that cannot be done gives something that
+    /// is not a number.
     fn apply(&mut self, operation: u32, a: Number, b: Number, literal: f64) -> Number;
 
-    /// The value of `a`, to branch on and to look up with; nothing that is made from it has derivatives.
+    /// The value of `a`, to branch on and to look up with. A number made from it has no derivatives.
     fn value(&self, a: Number) -> f64;
 }
 
-/// The code of a model `ẋ = f(x) + g(x) u` with barriers: pure functions, that may be called on any thread.
+/// The code of a model `ẋ = f(x) + g(x) u` with barriers. Its functions are pure and may be called on any thread.
 pub trait Code: Send + Sync {
-    /// Writes f(x), one number for each state, and g(x), state i and input j at `j * states + i`. Both come as zeros.
+    /// Writes f(x), one number for each state, and g(x), whose entry of state i and input j is at
+    /// `j * states + i`. Both come as zeros.
     fn plant(
         &self,
         c: &mut dyn Calculator,
@@ -79,11 +81,11 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// Whether they are in range.
+    /// Checks that they are in range.
     ///
     /// # Errors
     ///
-    /// The one that is not.
+    /// A number out of range.
     pub fn check(&self) -> Result<(), Error> {
         for (field, count, range) in [
             ("states", self.states, 1..=MAX_STATES),
@@ -113,14 +115,15 @@ impl fmt::Debug for CodeModel {
 }
 
 impl CodeModel {
-    /// The model that `code` computes with `parameters`, tried at [`samples`](punctual_core::lie::samples) of states within
-    /// `ranges`: there it is seen what memory it needs. Steps may do twice as many operations and 64 more.
+    /// The model that `code` computes with `parameters`. It is tried at [`samples`](punctual_core::lie::samples)
+    /// of states within `ranges`, which shows how much memory it needs. Later steps may do twice as many
+    /// operations and 64 more.
     ///
     /// # Errors
     ///
-    /// Dimensions out of range; a range missing; code that uses a number it was not given or asks for an operation
-    /// that there is not, for more than [`MAX_OPERATIONS`] of them, or for others when it is called again; a derivative
-    /// that differences of the values contradict at most of the samples.
+    /// Dimensions out of range; a range missing; a derivative that differences of the values contradict at more
+    /// than half of the samples. Code that uses a number it was not given, asks for an operation that there is
+    /// not or for more than [`MAX_OPERATIONS`] of them, or asks for others when it is called again.
     pub fn new(
         code: Arc<dyn Code>,
         dimensions: Dimensions,
@@ -166,7 +169,7 @@ impl CodeModel {
     ///
     /// # Errors
     ///
-    /// There are not as many.
+    /// An `index` that the code has no barrier for.
     pub fn barrier(&self, index: usize) -> Result<CodeBarrier, Error> {
         if index >= self.barriers {
             return Err(Error::new("barrier", format!("is {index}, must be < {}", self.barriers)));
@@ -200,10 +203,10 @@ impl CodeBarrier {
 /// Registers between those of the inputs and the first result: time, zero, one, not a number.
 const RESERVED: usize = 4;
 
-/// How many operations ago a sine may have been computed for its cosine to be taken from there.
+/// Largest distance back on the tape, in operations, at which a cosine finds the sine it is computed with.
 const RECENT: usize = 16;
 
-/// Why what code asked for could not be done.
+/// Reasons why an operation that code asked for could not be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Number(Number),
@@ -227,32 +230,32 @@ impl fmt::Display for Fault {
     }
 }
 
-/// The operations of a model by code. Registers: states, inputs, [`RESERVED`], results.
+/// The tape of a model by code. Registers: states, inputs, [`RESERVED`], results.
 struct Evaluated {
     code: Arc<dyn Code>,
     parameters: Vec<f64>,
     states: usize,
     inputs: usize,
-    /// Which barrier.
+    /// The index of the barrier.
     barrier: usize,
-    /// Whether memory may be added.
+    /// Whether memory may be added: in the trial only.
     growing: bool,
     registers: usize,
     x: Vec<Number>,
     f: Vec<Number>,
     g: Vec<Number>,
     derivatives: Vec<Register>,
-    /// What the code asked for.
+    /// The operations that the code asked for.
     steps: Vec<Step>,
-    /// How many of them belong to the plant.
+    /// Number of the steps that belong to the plant.
     plant_steps: usize,
-    /// The first register that they leave free.
+    /// The first register that the steps leave free.
     next: Register,
     fault: Option<Fault>,
 }
 
 impl Clone for Evaluated {
-    /// With room for the steps.
+    /// Keeps room for as many steps as there are registers, so that a step need not allocate.
     fn clone(&self) -> Self {
         let mut steps = Vec::with_capacity(self.registers);
         steps.extend_from_slice(&self.steps);
@@ -274,7 +277,7 @@ impl Evaluated {
         self.states + self.inputs
     }
 
-    /// What the last call asked for, and what it gave.
+    /// The operations that the last call asked for, and the numbers it gave.
     fn asked(&self) -> (Vec<Step>, Vec<Number>) {
         (self.steps.clone(), [&self.f[..], &self.g].concat())
     }
@@ -284,7 +287,7 @@ impl Evaluated {
 struct Work<'a, C> {
     series: &'a mut Series<C>,
     steps: &'a mut Vec<Step>,
-    /// How many of the steps are those of another call.
+    /// Number of the steps that another call recorded.
     others: usize,
     next: Register,
     /// Registers that the code is not given: inputs, and what another call has computed.
@@ -323,7 +326,7 @@ impl<C: Scalar> Work<'_, C> {
     }
 
     fn constant(&mut self, number: f64) -> Register {
-        // Not −0, which is equal to 0.
+        // Compares bits, because −0 equals 0.
         if number.to_bits() == 0 {
             self.zero
         } else if number == 1.0 {
@@ -461,7 +464,7 @@ impl Equations for Evaluated {
             steps: &mut self.steps,
             others: 0,
             next: time + RESERVED,
-            // Time is for barriers.
+            // The time is for barriers only.
             hidden: [self.states..time + 1, 0..0],
             inputs: self.states,
             zero: time + 1,
@@ -490,7 +493,7 @@ impl Equations for Evaluated {
             steps: &mut self.steps,
             others: self.plant_steps,
             next: self.next,
-            // What the plant has computed ends below order n.
+            // The plant's results have no coefficient of order n.
             hidden: [self.states..time, time + RESERVED..self.next],
             inputs: self.states,
             zero: time + 1,

@@ -23,26 +23,27 @@
 //!
 //! # Expressions
 //!
-//! Numbers, names, `+ - * / ^` and parentheses; `^` is done first and from the right, and then the sign, so
-//! that `-x^2` is −(x²). The functions are those of [`FUNCTIONS`]; angles are in radians; `pi` is π, and `t`, in
-//! barriers, the time in s. `abs`, `min` and `max` have kinks, where the derivatives are those of the first
-//! argument. A function outside its domain (`sqrt` of a negative number) is not a number, which the filter
-//! reports as a status and the plant as an error of the step.
+//! Numbers, names, `+ - * / ^` and parentheses. `^` is done first and from the right, and then the sign, so that
+//! `-x^2` is −(x²). The functions are those of [`FUNCTIONS`]; angles are in radians. `pi` is π, and `t`, in
+//! barriers only, the time in s. `abs`, `min` and `max` have kinks, where the derivatives are those of the first
+//! argument. A function outside its domain (`sqrt` of a negative number) is not a number. The filter reports that
+//! as a status, and the plant as an error of the step.
 //!
 //! # How they are computed
 //!
-//! Trees become one list of operations, each done once (`tape`), and the list gives Taylor coefficient after
-//! Taylor coefficient of all of them (`series`): a step costs what its operations cost, and allocates nothing.
+//! Trees become one tape on which each operation stands once (`tape`). The tape gives Taylor coefficient after
+//! Taylor coefficient of all its registers (`series`). So a step costs what its operations cost, and allocates
+//! nothing.
 //!
 //! Layers, each using only those above it:
 //!
 //! | module | owns |
 //! |---|---|
-//! | `error` | what is wrong, and where |
+//! | `error` | the part that is wrong, and why |
 //! | `syntax` | text to tree |
 //! | `affine` | whether inputs enter linearly |
-//! | `tape` | trees to one list of operations, constants folded, equal ones merged |
-//! | `series` | Taylor coefficients of a list of operations |
+//! | `tape` | trees to one tape: constants folded, equal operations merged |
+//! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
 //! | `evaluated` | plants and barriers that somebody else's code computes |
 //! | `model` | plants and barriers of expressions |

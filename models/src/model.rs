@@ -22,7 +22,7 @@ pub struct Model {
     inputs: Vec<String>,
     parameters: Vec<(String, f64)>,
     tape: Tape,
-    /// Where the derivative of each state is.
+    /// Registers of the derivatives of the states.
     derivatives: Vec<Register>,
 }
 
@@ -32,10 +32,10 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// No state or more than [`MAX_STATES`], no input or more than [`MAX_INPUTS`], a name that is no identifier,
-    /// stands twice or means something else; another number of derivatives than of states; a parameter that is
-    /// not finite; in an expression: what cannot be read, an unknown name, time, a wrong number of arguments, an
-    /// input that does not enter linearly.
+    /// No state or more than [`MAX_STATES`], no input or more than [`MAX_INPUTS`]; another number of derivatives
+    /// than of states; a parameter that is not finite. A name that is no identifier, stands twice or means
+    /// something else. In an expression: text that cannot be read, an unknown name, the time, a wrong number of
+    /// arguments, an input that does not enter linearly.
     pub fn new(
         states: &[&str],
         inputs: &[&str],
@@ -121,7 +121,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the expression: what cannot be read, an unknown name or an input, a wrong number of arguments.
+    /// In the expression: text that cannot be read, an unknown name or an input, a wrong number of arguments.
     pub fn barrier(&self, expression: &str) -> Result<Barrier, Error> {
         let mut model = self.clone();
         let tree = syntax::parse(expression);
@@ -168,22 +168,22 @@ impl Barrier {
     }
 }
 
-/// A list of operations, all of one order after all of the order below.
+/// The tape of a model, computed order by order: every operation at one order before the next order.
 #[derive(Clone)]
 struct Listed {
     states: usize,
     inputs: usize,
     registers: usize,
-    /// What is done for every order but the last.
+    /// Operations of every order but the last.
     steps: Vec<Step>,
     derivatives: Vec<Register>,
-    /// What the barrier needs: at the last order nothing else is asked.
+    /// Operations of the last order, at which only the barrier is needed.
     last: Vec<Step>,
     h: Register,
 }
 
 impl Model {
-    /// Its operations, with those of the barrier in `h`.
+    /// The tape of the model, with the operations of the barrier in `h`.
     fn equations(&self, h: Option<Register>) -> Listed {
         let Tape { steps, registers, .. } = &self.tape;
         let wanted: Vec<_> = self.derivatives.iter().copied().chain(h).collect();

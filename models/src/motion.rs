@@ -1,4 +1,4 @@
-//! The motion of a plant and the series of a barrier along it, whatever does the operations.
+//! The motion of a plant and the series of a barrier along it, whether a tape or code does the operations.
 
 use std::cell::RefCell;
 
@@ -28,15 +28,15 @@ pub(crate) trait Equations: Clone + Send + 'static {
     /// Computes coefficient `k` of the derivatives of the states, after those below it.
     fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize);
 
-    /// Where the derivative of state `i` is, once [`Self::advance`] was done.
+    /// The register of the derivative of state `i`, once [`Self::advance`] was done.
     fn derivative(&self, i: usize) -> Register;
 
-    /// Computes the coefficients of the barrier up to `n`, after those of the states, and says where they are.
+    /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their register.
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
 }
 
-/// Calls `$function::<_, M>` with the least number `M` of directions that is enough for `$inputs`: fewer instances,
-/// for a few zeros.
+/// Calls `$function::<_, M>` with the least number `M` of directions that is enough for `$inputs`. A few zeros
+/// are the price of fewer instances of the code.
 macro_rules! with_directions {
     ($inputs:expr, $function:ident($($argument:expr),*)) => {
         match $inputs {
@@ -204,12 +204,12 @@ struct Along<E, C> {
 impl<E: Equations, C: Scalar> Along<E, C> {
     fn new(plant: &E, along: &E, n: usize) -> Self {
         let mut series = along.series(n + 1);
-        // Time goes on by itself; inputs are held.
+        // Time grows with slope 1; inputs are held.
         series.set(along.states() + along.inputs(), 1, C::from(1.0));
         Self { flow: Flow::new(plant), equations: along.clone(), series, h: 0, n }
     }
 
-    /// The coefficients of h from the state and the inputs that `flow` has, at time `t`.
+    /// Computes the coefficients of h from the state and the inputs that `flow` has, at time `t`.
     fn continue_from_flow(&mut self, t: f64) {
         let (series, flow) = (&mut self.series, &self.flow);
         let time = flow.inputs().end;
@@ -232,20 +232,20 @@ impl<E: Equations, C: Scalar> Along<E, C> {
         self.series.get(self.h, k) * (1..=k).map(|i| i as f64).product::<f64>()
     }
 
-    /// Its coefficients a moment ahead, from the state and the inputs that `flow` has.
+    /// Computes the coefficients of h `duration` ahead, from the state and the inputs that `flow` has.
     fn ahead(&mut self, t: f64, duration: f64) {
         self.flow.run(duration, SUBSTEPS);
         self.continue_from_flow(t + duration);
     }
 }
 
-/// With derivatives along `M` ≥ the number of inputs.
+/// Derivatives along `M` directions, at least as many as inputs.
 impl<E: Equations, const M: usize> Along<E, Dual<M>> {
     fn hold(&mut self, u: impl Fn(usize) -> f64) {
         self.flow.hold((0..M).map(|i| Dual::variable(u(i), i)));
     }
 
-    /// From the state `x` at time `t`, along the free motion.
+    /// Computes the coefficients from the state `x` at time `t`, along the free motion.
     fn evaluate(&mut self, t: f64, x: &[f64]) {
         self.flow.set_state(x.iter().map(|&v| Dual::from(v)));
         self.hold(|_| 0.0);
@@ -269,7 +269,7 @@ struct Source<E, const M: usize> {
     n: usize,
 }
 
-/// Memory of the evaluations.
+/// Memory of the evaluations at a sample and ahead of it.
 struct Work<E, const M: usize> {
     along: Along<E, Dual<M>>,
     flow: Flow<E, f64>,

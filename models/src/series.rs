@@ -1,9 +1,9 @@
-//! Taylor coefficients of a list of operations, one order after the other.
+//! Taylor coefficients of a tape, one order after the other.
 //!
-//! Coefficient k of a result needs the coefficients up to k of what it is made from, so that a solution of
-//! ẋ = f(x) + g(x) u can be continued order by order: each operation is done once for each order, where running a
-//! function on whole series does it anew for every order of the solution. The recurrences are those of
-//! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module; the coefficients are
+//! Coefficient k of a result needs the coefficients up to k of its operands. So a solution of ẋ = f(x) + g(x) u
+//! can be continued order by order, and each operation is done once for each order. Running a function on whole
+//! series would do it anew for every order of the solution. The recurrences are those of
+//! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module. The coefficients are
 //! numbers, or dual numbers along the inputs.
 //!
 //! # References
@@ -20,7 +20,7 @@ use crate::tape::{Operation, Register, Step};
 /// The coefficients of every register.
 #[derive(Clone, Debug)]
 pub(crate) struct Series<C> {
-    /// Of register r from `r * orders` on.
+    /// Coefficients of register r, from `r * orders` on.
     coefficients: Vec<C>,
     orders: usize,
 }
@@ -31,7 +31,7 @@ impl<C: Scalar> Series<C> {
         Self { coefficients: vec![C::zero(); registers * orders], orders }
     }
 
-    /// How many registers there are.
+    /// Number of registers.
     pub(crate) fn registers(&self) -> usize {
         self.coefficients.len() / self.orders
     }
@@ -144,7 +144,7 @@ impl<C: Scalar> Series<C> {
             O::Divide(a, b) => (at(a) - self.product(to, b, k, 0..k)) / start(b),
             O::Negate(a) => -at(a),
             O::Square(a) => {
-                // Each pair once.
+                // Each pair of equal products is computed once.
                 let sum = self.product(a, a, k, 0..k.div_ceil(2)) * 2.0;
                 if k.is_multiple_of(2) { sum + self.get(a, k / 2).squared() } else { sum }
             }
@@ -180,7 +180,7 @@ impl<C: Scalar> Series<C> {
                 }
                 sum * (1.0 / k as f64) / base[0]
             }
-            // The branch is that of order 0.
+            // The sign at order 0 decides the branch.
             O::Abs(a) => {
                 if start(a).value() < 0.0 {
                     -at(a)

@@ -1,7 +1,7 @@
 //! Text to tree.
 //!
-//! The grammar is winnow's Pratt parser over four kinds of operands. What could make it recurse deeply is counted
-//! before it runs, so that no text overflows the stack.
+//! The grammar is winnow's Pratt parser over four kinds of operands. Signs, operators and nesting, which could
+//! make it recurse deeply, are counted before it runs. So no text overflows the stack.
 
 use std::ops::Range;
 
@@ -122,7 +122,7 @@ type Input<'a> = LocatingSlice<&'a str>;
 ///
 /// # Errors
 ///
-/// In words, with the position in the text, counted from 1.
+/// The first defect in words, with its position in the text, counted from 1.
 pub(crate) fn parse(text: &str) -> Result<Tree, String> {
     check_size(text)?;
     sum.parse(LocatingSlice::new(text)).map_err(|e| {
@@ -181,7 +181,7 @@ fn binary(operator: Operator, a: Tree, b: Tree) -> ModalResult<Tree> {
     Ok(Tree { node: Node::Binary(operator, Box::new([a, b])), span })
 }
 
-/// Operands under operators; the larger its power, the sooner an operator is done.
+/// Reads operands under operators; the larger its power, the sooner an operator is done.
 fn sum(input: &mut Input<'_>) -> ModalResult<Tree> {
     const PLUS: i64 = 10;
     const TIMES: i64 = 20;
@@ -225,7 +225,7 @@ fn number(input: &mut Input<'_>) -> ModalResult<Node> {
     Ok(Node::Number(value))
 }
 
-/// A name, or the call of a function.
+/// Reads a name, or the call of a function.
 fn named(input: &mut Input<'_>) -> ModalResult<Node> {
     let head = one_of(is_first_in_name);
     let tail = take_while(0.., is_in_name);

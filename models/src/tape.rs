@@ -1,4 +1,4 @@
-//! Trees to one list of operations: constants folded, equal operations done once.
+//! Trees to one tape: constants folded, equal operations done once.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use punctual_core::scalar::Scalar;
 use crate::MAX_OPERATIONS;
 use crate::syntax::{FUNCTIONS, Function, Node, Operator, PI, TIME, Tree};
 
-/// The place of a value: a variable, or the result of an operation.
+/// The place of a value on the tape: a variable, or the result of an operation.
 pub(crate) type Register = usize;
 
 /// An operation on registers. A number is kept as its bits, so that operations can be compared.
@@ -35,7 +35,7 @@ pub(crate) enum Operation {
     Tanh(Register),
     /// Arc tangent of a, with 1 + a².
     Atan(Register, Register),
-    /// Angle of (x, y), with x² + y²: y, x, then that.
+    /// Angle of (x, y): the registers of y, of x and of x² + y².
     Atan2(Register, Register, Register),
     /// To the power of a number that is not a whole one.
     Power(Register, u64),
@@ -85,7 +85,7 @@ pub(crate) struct Step {
     pub(crate) to: Register,
 }
 
-/// The operations that the registers `wanted` depend on, in order.
+/// The operations that the registers `wanted` depend on, in order of the tape.
 pub(crate) fn needed(steps: &[Step], wanted: &[Register], registers: usize) -> Vec<Step> {
     let mut marked = vec![false; registers];
     for &register in wanted {
@@ -104,14 +104,14 @@ pub(crate) fn needed(steps: &[Step], wanted: &[Register], registers: usize) -> V
     kept
 }
 
-/// What a name stands for.
+/// The value that a name stands for: a register, or a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value {
     Number(f64),
     Register(Register),
 }
 
-/// A list of operations under construction.
+/// A tape under construction.
 #[derive(Clone, Debug)]
 pub(crate) struct Tape {
     pub(crate) steps: Vec<Step>,
@@ -120,12 +120,12 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// Without operations; the first `variables` registers are given from outside.
+    /// An empty tape; the first `variables` registers are given from outside.
     pub(crate) fn new(variables: usize) -> Self {
         Self { steps: Vec::new(), registers: variables, known: HashMap::new() }
     }
 
-    /// Adds the operations of `tree`; `resolve` says what a name stands for.
+    /// Adds the operations of `tree`; `resolve` gives the value that a name stands for.
     ///
     /// # Errors
     ///
@@ -180,7 +180,7 @@ impl Record for Tape {
     }
 }
 
-/// Something that does operations, one after the other: operators and functions in terms of those.
+/// Records operations one after the other, and puts operators and functions together from them.
 pub(crate) trait Record {
     /// The register of the first result of `operation`.
     fn done(&mut self, operation: Operation) -> Register;
@@ -340,7 +340,7 @@ fn number(function: Function, a: f64, b: f64) -> f64 {
         Function::Atan2 => a.atan2(b),
         Function::Abs => a.abs(),
         Function::Tanh => a.tanh(),
-        // Not those of plain numbers, which pass over what is not one.
+        // The scalar's own minimum: that of plain numbers passes over a value that is not a number.
         Function::Min => Scalar::min(a, b),
         Function::Max => Scalar::max(a, b),
     }
@@ -355,7 +355,7 @@ fn function(name: &str) -> Result<(Function, usize), String> {
     })
 }
 
-/// What is wrong with the name `name` where only `known` ones, or time, may stand.
+/// The message on a name `name` where only `known` ones, or the time, may stand.
 pub(crate) fn unknown(name: &str, known: &[&str], allows_time: bool) -> String {
     if name == TIME && !allows_time {
         return "names t, the time, which a derivative does not depend on; a state with the derivative 1 does"

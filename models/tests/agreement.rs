@@ -165,7 +165,7 @@ proptest! {
         let found = found.unwrap_or_else(|e| panic!("{e}"));
         let wanted = lie::along(Random(plant), barrier, n).expect("in range");
         let pairs = both(&*found, &*wanted, &x, &[0.3, -0.4]);
-        // Round-off grows with what is added up; beyond this size the sample says little.
+        // Round-off grows with the terms added up; beyond this size the sample says little.
         let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
         prop_assume!(pairs.iter().all(|p| p[1].is_finite()) && size < 1e6);
         for (i, [found, wanted]) in pairs.into_iter().enumerate() {

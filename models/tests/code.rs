@@ -1,4 +1,4 @@
-//! A model by code against the same model by expressions, bit for bit; and code that does what it must not.
+//! Models by code against the same models by expressions, bit for bit; and code that breaks its contract.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -60,7 +60,7 @@ fn unicycle(c: &mut dyn Calculator, x: &[Number], f: &mut [Number], g: &mut [Num
 
 const DERIVATIVES: [&str; 4] = ["v*cos(th)", "v*sin(th)", "tanh(v)^2*w", "a"];
 
-/// With two branches that are the same function.
+/// A disc with two branches that are the same function.
 fn disc(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
     let (dx, dy) = (with(c, "subtract", x[0], 40.0), with(c, "subtract", x[1], 40.0));
     let squares = if c.value(x[0]) < 20.0 {
@@ -84,7 +84,7 @@ fn made(plant: Plant, barrier: Barrier) -> Result<CodeModel, String> {
         .map_err(|e| e.to_string())
 }
 
-/// The cosine is one that the plant computes too, to an order less.
+/// A barrier with a cosine that the plant computes too, to an order less.
 fn shared(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
     let (slow, cos) = (with(c, "multiply", t, 0.1), op(c, "cos", x[2], 0));
     let sum = op(c, "add", x[3], cos);
@@ -180,7 +180,7 @@ fn code_that_does_what_it_must_not_is_refused() {
             f[0] = op(c, "sin", x[0], 0);
         }
     };
-    // The derivative is lost on the way.
+    // A looked-up value carries no derivative.
     let looked_up: Barrier = |c, _, x| {
         let value = c.value(x[0]).sin();
         c.apply(0, 0, 0, value)
@@ -200,7 +200,7 @@ fn code_that_does_what_it_must_not_is_refused() {
     }
 }
 
-/// A branch that no sample takes, with more than there is room for: not a number, and no more than that.
+/// A branch that no sample takes asks for more operations than there is room for: the result is not a number.
 #[test]
 fn a_branch_that_is_too_long_is_a_status() {
     let branching: Barrier = |c, t, x| {

@@ -1,7 +1,7 @@
 """A safety filter that gets a system into its safe set by a deadline and keeps it there.
 
-- `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` says what a configuration
-  comes to, `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` says what became of a barrier there.
+- `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` judges a configuration,
+  `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there.
 - `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI.
 - `run_cli` runs the command line, which is installed as `punctual` too.
 """

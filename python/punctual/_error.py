@@ -2,4 +2,4 @@
 
 
 class Error(ValueError):
-    """What was refused, with the field, the value and what is allowed; or an FMI call that failed."""
+    """A refusal, with the field, the value and the values allowed; or an FMI call that failed."""

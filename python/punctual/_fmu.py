@@ -1,4 +1,4 @@
-"""FMUs and what there is to say of a configuration, by the command line."""
+"""FMUs, and findings on a configuration, by the command line."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ def check(
     u_ref: str | Mapping[str, float] = "none",
     effort: bool = False,
 ) -> dict[str, Any]:
-    """What `punctual check --json` says of a configuration: relative degrees, rates, warnings, and from a start whether
-    the promise holds, in a simulated closed loop too, and the bounds allow it.
+    """Findings of `punctual check --json` on a configuration: relative degrees, rates, warnings. From a start also
+    whether the promise holds, in a simulated closed loop too, and whether the bounds allow it.
 
     - `plant`: a plant configuration, whose start it is; or
     - `x0`: the start by state; those not named are 0.

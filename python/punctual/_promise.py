@@ -1,4 +1,4 @@
-"""What became of a promise in a result of `simulate`."""
+"""Verdict on a promise in a result of `simulate`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Promise:
-    """What became of one barrier: its promise, which is about h, and its constraint, which is about steps."""
+    """Findings on one barrier: its promise, which is about h, and its constraint, which is about steps."""
 
     promise: str
     """`kept`, `broken`, `open` (the run ends before it is decided) or `nothing_promised`."""
@@ -28,11 +28,11 @@ class Promise:
     inside: bool
     """Whether h >= 0 held from the deadline on; from the start on where it began inside."""
     arrival: float | None
-    """When h >= 0 held first, in s."""
+    """First time in s with h >= 0."""
     late: float | None
-    """When it was known in s that the deadline is missed."""
+    """Time in s at which it became certain that the deadline is missed."""
     left: float | None
-    """When it was left in s, after it had been inside and was to stay so."""
+    """Time in s at which it was left, after it had been inside and was to stay so."""
     least_h: float | None
     """Least h while it was to be inside."""
     unmet: int
@@ -50,10 +50,10 @@ class Promise:
 
 
 def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = None) -> Promise:
-    """What became of `barrier` in a result of `simulate`, judged as `punctual run` does it: by h itself, at the deadline
-    too where that lies between two communication points.
+    """Judges `barrier` in a result of `simulate` as `punctual run` does it: by h itself, at the deadline too where that
+    lies between two communication points.
 
-    - `deadline`: in s after the first step. Default: what the filter had in that run.
+    - `deadline`: in s after the first step. Default: the filter's own in that run.
 
     The result must have the fields `status` and `h`, `phase`, `deadline_unreachable` and `unmet_steps` of the barrier, as it has
     unless `record` says otherwise. Raises `Error` where one is missing.
@@ -67,7 +67,7 @@ def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = 
     own, units, prompt = known.get(barrier, (None, ("1", "1"), True))
     time, status, h, phase, late, unmet = (result[field].tolist() for field in fields)
     if not prompt:
-        # What is read at a point is of the one before.
+        # Outputs read at a point are those of the point before.
         time, status, h, phase, late, unmet = time[:-1], status[1:], h[1:], phase[1:], late[1:], unmet[1:]
     rows = list(zip(time, h, phase, late, status))
     said = judge(rows, own if deadline is None else deadline, units)

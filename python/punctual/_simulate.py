@@ -41,7 +41,7 @@ def simulate(
     `punctual run` in Gauss-Seidel order, and the same numbers bit for bit.
 
     - `start`: start values of the plant by name; `v` is short for `x0.v`. Also of inputs that the filter does not give.
-    - `nominal`: what is wanted. A dict of terms that are linear in what the plant gives, such as `{"a": ("v", -1.0)}`
+    - `nominal`: the wanted input. A dict of terms that are linear in what the plant gives, such as `{"a": ("v", -1.0)}`
       for u_ref.a = -1.0 x.v, or with an offset `("v", -1.0, 3.0)`; or a function of the time in s and of what the plant
       gives to the filter (an array in the order of the filter's inputs, the states first; valid during the call) that
       returns all of u_ref. Default: the start values of u_ref, zeros.
@@ -51,7 +51,7 @@ def simulate(
       filter, but texts. Where both have an output of one name, the plant's is called `plant.<name>`.
 
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
-    FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` says what became of a barrier.
+    FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` judges a barrier.
 
     Raises `ImportError` without FMPy (`pip install punctual[fmpy]`); `Error` for names or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
@@ -90,7 +90,7 @@ def _check_fed(slave: Slave, field: str, fed: Sequence[str], other: Slave) -> No
 
 
 def _columns(own: Slave, plant: Slave, record: Sequence[str] | None) -> dict[str, tuple[Slave, str]]:
-    """What is recorded, by the names of the result's fields."""
+    """The recorded variables, by the names of the result's fields."""
     outputs = own.names("output")
     columns = {f"plant.{n}" if n in outputs else n: (plant, n) for n in plant.names("output")}
     columns |= {n: (own, n) for n in own.names("input", "Real") if n.startswith("u_ref.")}
@@ -257,7 +257,7 @@ class _Pair:
         return self._rows(times, reals, numbers)
 
     def _barriers(self) -> dict[str, Any]:
-        """What `promise` needs of each barrier: its deadline, the units of h and its slack, whether h is not late."""
+        """Needs of `promise` on each barrier: its deadline, the units of h and its slack, whether h is not late."""
         variables, starts = self.own.variables, self.starts[0]
         barriers = {}
         for name in (n.removesuffix(".unmet_steps") for n in variables if n.endswith(".unmet_steps")):

@@ -83,7 +83,7 @@ fn array<T: Element + Copy>(
     }
     let array = array.try_readonly()?;
     match array.as_slice() {
-        // A slice of Fortran's order is another one.
+        // A contiguous slice in Fortran's order has another order of elements.
         Ok(values) if array.is_c_contiguous() => into.copy_from_slice(values),
         _ => into.iter_mut().zip(array.as_array().iter()).for_each(|(to, from)| *to = *from),
     }
@@ -100,7 +100,7 @@ fn wrong_shape(name: &str, found: &[usize], shape: &[usize], meaning: &[String])
     PyValueError::new_err(message)
 }
 
-/// As Python writes a tuple.
+/// The shape in the way that Python writes a tuple.
 fn shape_text(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),

@@ -13,7 +13,8 @@ use crate::loading::{Interface, Signals, configuration, refused};
 use crate::sample::{Loop, Memory};
 use crate::{arrays, pool};
 
-/// Rows go to threads in parts of equal size; more of them than threads, since some rows take longer than others.
+/// Rows go to threads in parts of equal size. There are more parts than threads, since some rows take longer than
+/// others.
 const PARTS_PER_THREAD: usize = 4;
 
 /// The fewest rows of a part: fewer are done before another thread wakes up.
@@ -33,7 +34,7 @@ pub(crate) struct FilterBatch {
     interface: Interface,
     memories: Vec<Memory>,
     fresh: Memory,
-    /// One for each part; what it remembers is put there before each row.
+    /// Loops, one for each part. The memory of a row is put into its loop before each row.
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     loops: Mutex<Vec<Loop>>,
     x: Vec<f64>,
@@ -66,19 +67,19 @@ impl FilterBatch {
         self.memories.len()
     }
 
-    /// What the columns of `x` are: name to unit.
+    /// Columns of `x`: name to unit.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.interface.states.dict(py)
     }
 
-    /// What the columns of `u` and `u_ref` are: name to unit.
+    /// Columns of `u` and `u_ref`: name to unit.
     #[getter]
     fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.interface.inputs.dict(py)
     }
 
-    /// What the columns of `h` are: name to unit.
+    /// Columns of `h`: name to unit.
     #[getter]
     fn barriers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.interface.barriers.dict(py)
@@ -138,8 +139,8 @@ impl FilterBatch {
         Ok((u, statuses.into_pyarray(py), h))
     }
 
-    /// Starts every deadline anew at the next step, of all loops or of those where `rows`, an array of bool of shape
-    /// (n,), is true.
+    /// Starts every deadline anew at the next step: of all loops, or of those where `rows`, an array of bool of
+    /// shape (n,), is true.
     #[pyo3(signature = (rows=None))]
     fn rearm(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let chosen = self.chosen(rows)?;
@@ -152,8 +153,8 @@ impl FilterBatch {
         Ok(())
     }
 
-    /// Forgets every sample, of all loops or of those where `rows`, an array of bool of shape (n,), is true. Other
-    /// than `rearm`, this sets an integrated input back too.
+    /// Forgets every sample: of all loops, or of those where `rows`, an array of bool of shape (n,), is true.
+    /// Unlike `rearm`, this sets an integrated input back too.
     #[pyo3(signature = (rows=None))]
     fn reset(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let chosen = self.chosen(rows)?;
@@ -165,7 +166,7 @@ impl FilterBatch {
 }
 
 impl FilterBatch {
-    /// Which rows a mask chooses; without one, all.
+    /// The rows that a mask chooses; without a mask, all.
     fn chosen(&self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<bool>> {
         let n = self.memories.len();
         let mut chosen = vec![true; n];

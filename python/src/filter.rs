@@ -10,8 +10,8 @@ use crate::loading::{Interface, configuration, refused};
 use crate::report::Step;
 use crate::sample::{Loop, Memory};
 
-/// A safety filter in this process: what the filter FMU of the same configuration computes, sample by sample, with
-/// the same bits.
+/// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
+/// same bits.
 ///
 /// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. A plug-in is
 /// loaded from the folder of the file (of a dict: from the current folder), without the trial in a process of its
@@ -49,13 +49,13 @@ impl Filter {
         })
     }
 
-    /// What `x` consists of, in order: name to unit. The measured states, then the inputs of barriers.
+    /// Components of `x`, in order: name to unit. The measured states, then the inputs of barriers.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.interface.states.dict(py)
     }
 
-    /// What `u` and `u_ref` consist of, in order: name to unit.
+    /// Components of `u` and `u_ref`, in order: name to unit.
     #[getter]
     fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.interface.inputs.dict(py)
@@ -74,7 +74,7 @@ impl Filter {
     /// - `u_ref`: the input wanted, in the order of `inputs`. Default: zeros.
     ///
     /// Raises `TypeError` or `ValueError` for an array of another type or shape. Numerical outcomes (infeasible,
-    /// not a number) are the status.
+    /// not a number) are statuses.
     #[pyo3(signature = (t, x, u_ref=None))]
     fn step(
         &mut self,
@@ -99,7 +99,8 @@ impl Filter {
         self.own.get_mut().unwrap_or_else(PoisonError::into_inner).rearm();
     }
 
-    /// Forgets every sample: the filter is as it was made. Other than `rearm`, this sets an integrated input back too.
+    /// Forgets every sample: the filter is as it was made. Unlike `rearm`, this sets an integrated input back
+    /// too.
     fn reset(&mut self) -> PyResult<()> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
         own.restore(&self.fresh).map_err(|e| refused(&e))

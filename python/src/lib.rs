@@ -6,11 +6,11 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | `arrays` | arguments that are arrays: type, shape, and what is said of one that does not fit |
+//! | `arrays` | arguments that are arrays: type, shape, and the errors of those that do not fit |
 //! | `loading` | a path or dict to a configuration and the names of its signals |
-//! | `sample` | one loop: a filter, and what it remembers |
-//! | `promise` | what became of a promise in a recorded run |
-//! | `report` | what a step says, as Python objects |
+//! | `sample` | one loop: a filter, and its memory |
+//! | `promise` | the verdict on a promise in a recorded run |
+//! | `report` | the report of a step, as Python objects |
 //! | `filter` | `Filter`: one loop |
 //! | `pool` | the threads, one set for each process |
 //! | `batch` | `FilterBatch`: many loops, a row each |

@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 
 pyo3::import_exception!(punctual._error, Error);
 
-/// `punctual.Error` with the words of `error`.
+/// Makes `punctual.Error` of the words of `error`.
 pub(crate) fn refused(error: &dyn Display) -> PyErr {
     Error::new_err(error.to_string())
 }
@@ -47,7 +47,7 @@ impl Signals {
         Self { names, units }
     }
 
-    /// How many.
+    /// Number of signals.
     pub(crate) fn len(&self) -> usize {
         self.names.len()
     }
@@ -62,18 +62,18 @@ impl Signals {
     }
 }
 
-/// What goes into a filter and comes out of it.
+/// Inputs and outputs of a filter.
 pub(crate) struct Interface {
-    /// What is measured: the states of the plant but an integrated one, then the inputs of the barriers.
+    /// Measured inputs: the states of the plant but an integrated one, then the inputs of the barriers.
     pub(crate) states: Signals,
-    /// What is handed out: the inputs of the plant, an integrated state in the place of its rate.
+    /// Outputs: the inputs of the plant, an integrated state in the place of its rate.
     pub(crate) inputs: Signals,
     /// The barriers, each with the unit of h.
     pub(crate) barriers: Signals,
 }
 
 impl Interface {
-    /// Of a filter with this configuration.
+    /// The interface of a filter with this configuration.
     pub(crate) fn of(configuration: &FilterConfiguration) -> Self {
         let measured = configuration.measured_states().into_iter().map(|s| (s.name, s.unit));
         let handed = configuration.barrier_inputs().into_iter().map(|s| (s.name, s.unit));

@@ -9,9 +9,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// The process, and its threads.
 static POOL: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
 
-/// The threads of this process: one for each core, or as many as `RAYON_NUM_THREADS` says. A forked process, which
-/// has none of its parent's threads, gets its own. Taken while holding the interpreter, so that no other thread can
-/// fork in between.
+/// The threads of this process: one for each core, or as many as `RAYON_NUM_THREADS` says. A forked process,
+/// which has none of its parent's threads, gets its own. They are taken while holding the interpreter, so that no
+/// other thread can fork in between.
 ///
 /// # Errors
 ///
@@ -26,7 +26,7 @@ pub(crate) fn threads(_: Python<'_>) -> PyResult<&'static ThreadPool> {
                 .thread_name(|i| format!("punctual-{i}"))
                 .build()
                 .map_err(|e| PyRuntimeError::new_err(e.to_string()))?;
-            // It lasts as long as the process; one of a parent cannot be ended from here.
+            // The pool lasts as long as the process; a parent's pool cannot be ended from here.
             let threads: &'static ThreadPool = Box::leak(Box::new(threads));
             *pool = Some((own, threads));
             Ok(threads)

@@ -1,4 +1,4 @@
-//! What became of a promise, from what was recorded of a run.
+//! The verdict on a promise, from a recorded run.
 
 use punctual_core::filter::{Phase, Status};
 use punctual_core::judge::{Course, Judge, Standing, Verdict};
@@ -7,8 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Judges a barrier by its h at the instants of a run: rows of (time, h, phase, deadline_unreachable, status). `units` are those
-/// of h and of its slack, which tell the relative degree 1 from others.
+/// Judges a barrier by its h at the instants of a run: rows of (time, h, phase, deadline_unreachable, status).
+/// `units` are those of h and of its slack, which tell the relative degree 1 from others.
 #[pyfunction]
 pub(crate) fn judge<'py>(
     py: Python<'py>,

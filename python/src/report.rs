@@ -1,4 +1,4 @@
-//! What a step says, as Python objects.
+//! The report of a step, as Python objects.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 
-/// `punctual.Status` and `punctual.Phase`, once they were asked for.
+/// `punctual.Status` and `punctual.Phase`, after their first use.
 static STATUS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 static PHASE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
@@ -47,13 +47,13 @@ pub(crate) struct BarrierReport {
     /// The margin in force, in the unit of h.
     #[pyo3(get)]
     margin_used: f64,
-    /// How far h may fall below its promise within the period because u is held, in the unit of h.
+    /// Largest fall of h below its promise within the period because u is held, in the unit of h.
     #[pyo3(get)]
     sampling_loss: f64,
     /// Steps in a row that have not met the constraint, this one included.
     #[pyo3(get)]
     unmet_steps: u32,
-    /// How often the deadline was given up for a later one.
+    /// Number of times that the deadline was postponed to a later one.
     #[pyo3(get)]
     postponed: u32,
     /// Whether no input within the bounds has h >= 0 at the deadline.
@@ -66,7 +66,7 @@ pub(crate) struct BarrierReport {
 
 #[pymethods]
 impl BarrierReport {
-    /// Where the barrier stands with its promise.
+    /// The phase of the barrier's promise.
     #[getter]
     fn phase<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         member(py, &PHASE, "Phase", self.phase as i32)
@@ -97,7 +97,7 @@ impl From<&filter::BarrierReport> for BarrierReport {
     }
 }
 
-/// What a step gives.
+/// Result of a step.
 #[pyclass(frozen, module = "punctual")]
 pub(crate) struct Step {
     /// The safe input, in the order of `Filter.inputs`: finite and within its bounds, whatever happens.
@@ -121,7 +121,7 @@ impl Step {
 
 #[pymethods]
 impl Step {
-    /// How the step ended, and so what `u` means.
+    /// Outcome of the step, and so the meaning of `u`.
     #[getter]
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         member(py, &STATUS, "Status", self.status as i32)
@@ -133,7 +133,7 @@ impl Step {
         self.status.is_satisfied()
     }
 
-    /// What there is to say of each barrier, by its name.
+    /// The report on each barrier, by its name.
     #[getter]
     fn barriers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);

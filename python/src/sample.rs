@@ -14,7 +14,7 @@ pub(crate) struct Memory {
     integrated: f64,
 }
 
-/// A filter with its integrator, if it has one: what the FMU of the same configuration computes.
+/// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {
     filter: FilterLoop,
     /// For how long an integrated input is going to be held, in s.
@@ -28,7 +28,7 @@ impl Loop {
         Ok(Self { filter, hold: configuration.experiment.step_size })
     }
 
-    /// The sample at `t`, remembered.
+    /// Computes the sample at `t` and remembers it.
     ///
     /// # Errors
     ///
@@ -43,7 +43,7 @@ impl Loop {
         self.filter.step(t, self.hold, x, u_ref, u)
     }
 
-    /// Starts every deadline anew; what is integrated stays.
+    /// Starts every deadline anew; the integrated input stays.
     pub(crate) fn rearm(&mut self) {
         self.filter.rearm();
     }
@@ -53,13 +53,13 @@ impl Loop {
         Memory { filter: self.filter.filter().state().clone(), integrated: self.filter.integrated() }
     }
 
-    /// Writes what is remembered to `memory`, without an allocation.
+    /// Writes the memory to `memory`, without an allocation.
     pub(crate) fn save(&self, memory: &mut Memory) {
         memory.filter.clone_from(self.filter.filter().state());
         memory.integrated = self.filter.integrated();
     }
 
-    /// Goes back to what was remembered: every bit that follows is the same.
+    /// Goes back to a memory: every bit that follows is the same.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
-//! The cost of a filter: the smallest number with which a closed loop works, such as an input bound or a
-//! deadline, and profiles and rates compared by it.
+//! Cost of a filter: the smallest number with which a closed loop works, such as an input bound or a deadline,
+//! and profiles and rates compared by it.
 //!
-//! Both are found by running the closed loop, so they are facts about one start, one plant and one u_ref,
-//! and upper bounds: another filter may do with less.
+//! Both are found by running the closed loop. So they are facts about one start, one plant and one u_ref. They
+//! are also upper bounds: another filter may do with less.
 
 use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
@@ -16,30 +16,31 @@ use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 pub struct Loop<'a> {
     /// The plant; its states are the first of the filter's.
     pub plant: &'a dyn DynPlant,
-    /// Time in s and the filter's state; the part after the plant's states stays as it is.
+    /// Time in s and the filter's state. The components behind the plant's states stay as they are.
     pub start: (f64, &'a [f64]),
-    /// h is looked at after each of its substeps, and at the deadlines themselves.
+    /// Sampling and integration. h is looked at after each substep, and at the deadlines themselves.
     pub schedule: Schedule,
     /// Deadlines of the barriers, in s from the start; infinite where there is none.
     pub deadlines: &'a [f64],
-    /// Time in s from a sample until its input acts, ≥ 0, at most a step; until the first does, 0 acts.
+    /// Time in s from the computation of an input until it acts, ≥ 0, at most a step. Until then the input before
+    /// it acts.
     pub delay: f64,
-    /// Time in s after the start from which a run ends once a promise has been broken.
+    /// Time in s after the start from which a run ends as soon as a promise is broken.
     pub until: f64,
 }
 
-/// The result of a closed loop.
+/// Result of a closed loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
     /// Whether no promise was broken, and each barrier had one.
     pub kept: bool,
-    /// Time in s from the start of the last first arrival; `None` where a barrier has not arrived.
+    /// Time in s from the start until the last barrier has first arrived; `None` where a barrier has not arrived.
     pub arrival: Option<f64>,
     /// Largest |u_i| of each input; zeros above the number of inputs.
     pub peak: [f64; MAX_INPUTS],
-    /// Steps that did not satisfy every constraint.
+    /// Steps that did not meet every constraint.
     pub unmet: usize,
-    /// The result for each barrier.
+    /// Findings on each barrier.
     pub barriers: Vec<Seen>,
     /// Smallest and largest value of each of the plant's states; not a number where one became so.
     pub states: Vec<[f64; 2]>,
@@ -47,14 +48,14 @@ pub struct Run {
     pub end: f64,
 }
 
-/// The result for one barrier.
+/// Findings on a barrier.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// Its promise, by h itself.
+    /// The verdict on its promise, by h itself.
     pub judgement: Judgement,
     /// Steps that did not meet its constraint.
     pub unmet: usize,
-    /// The first of them, in s.
+    /// The first of these steps, in s.
     pub first_unmet: Option<f64>,
 }
 
@@ -100,7 +101,7 @@ impl Running<'_> {
 
     fn bound(&mut self, x: &[f64]) {
         for (ends, x) in self.run.states.iter_mut().zip(x) {
-            // Not a number stays so.
+            // A value that is not a number stays.
             if x.is_nan() || *x < ends[0] {
                 ends[0] = *x;
             }
@@ -115,7 +116,7 @@ impl Running<'_> {
         self.judges.iter().any(lost)
     }
 
-    /// Moves the plant over the period that begins at `t`, `last` being the input of the one before.
+    /// Moves the plant over the period that begins at `t`; `last` is the input of the period before.
     fn advance(
         &mut self,
         filter: &mut SafetyFilter,
@@ -203,10 +204,10 @@ pub fn run(
     Ok(run)
 }
 
-/// The smallest number between `low` and `high` (0 < low ≤ high) with which `works` is true, to a factor of
-/// `1 + tolerance`, by bisection of the ratio. Where `works` is not true for all larger numbers, it is one next to
-/// a number with which it is not. `low` where it works there; `None` where it does not work at `high`, or the
-/// limits are not numbers as above.
+/// A number between `low` and `high` (0 < low ≤ high) with which `works` is true, at most `1 + tolerance` times
+/// one with which it is not. Where `works` holds for all larger numbers too, that is the smallest. It is found by
+/// bisection of the ratio. `low` where it works there; `None` where it does not work at `high`, or the limits are
+/// not numbers as above.
 ///
 /// ```
 /// let found = punctual_reference::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
@@ -251,8 +252,8 @@ pub struct Candidate {
     pub rate_times_deadline: f64,
 }
 
-/// The candidates that [`compare`] tries: both profiles with rates from slow to the default. Slower ones follow the
-/// profile less tightly, so an error costs less at once. Faster ones ask for more input than the profile.
+/// Candidates of [`compare`]: both profiles with rates from slow to the default. Slower ones follow the profile
+/// less tightly, so that an error costs less at once. Faster ones ask for more input than the profile.
 pub const CANDIDATES: [Candidate; 8] = {
     const fn of(profile: ProfileKind, rate_times_deadline: f64) -> Candidate {
         Candidate { profile, rate_times_deadline }
@@ -289,11 +290,11 @@ pub struct Rating {
     pub bound: Option<f64>,
 }
 
-/// Rates every one of `candidates`: `try_out(candidate, bound)` runs the closed loop with the input bounded to
-/// ±`bound` (infinite: unbounded) and returns whether the deadlines are kept, and the peak input.
+/// Rates every one of `candidates`. `try_out(candidate, bound)` runs the closed loop with the input bounded to
+/// ±`bound` (infinite: unbounded). It returns whether the deadlines are kept, and the peak input.
 ///
-/// The bound is looked for between `1e-2` of the peak and the peak itself, with which the unbounded run is
-/// its own proof. Best first: by bound, then by peak.
+/// The bound is looked for between `1e-2` of the peak and the peak itself, which the unbounded run has shown to
+/// be enough. Best first: by bound, then by peak.
 ///
 /// # Errors
 ///

@@ -6,7 +6,7 @@
 //! | [`nominal`] | controllers that want an input, for a filter to change |
 //! | [`baselines`] | the constraints of the literature, as conditions of a promise |
 //! | [`simulation`] | a closed loop of a plant and a filter |
-//! | [`effort`] | a closed loop that is watched: what filters need, compared |
+//! | [`effort`] | a closed loop that is watched: the input that filters need, compared |
 //!
 //! Nothing of a filter depends on this crate.
 #![forbid(unsafe_code)]

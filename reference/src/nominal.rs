@@ -1,8 +1,8 @@
-//! Nominal controllers: something sensible for u_ref, without any promise.
+//! Nominal controllers: a sensible u_ref, without any promise.
 //!
-//! A filter changes u_ref as little as its rows ask, so the nominal controller decides how a closed loop looks: with
-//! u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs into every
-//! loop; [`Heading`] drives to a goal.
+//! A filter changes u_ref as little as its rows ask, so the nominal controller decides how a closed loop looks.
+//! With u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs
+//! into every loop; [`Heading`] drives to a goal.
 
 use punctual_core::error::{Error, finite, positive};
 use punctual_core::scalar::Scalar;
@@ -13,8 +13,8 @@ pub fn damping<S: Scalar>(v: S, gain: f64) -> S {
     v * -gain
 }
 
-/// Drives a vehicle to a goal in the plane: turn towards it, or away from it where that is nearer, and
-/// reverse; with a speed in proportion to the distance, limited.
+/// Drives a vehicle to a goal in the plane. It turns towards the goal, or away from it where that is nearer, and
+/// then reverses. Its speed is in proportion to the distance, limited.
 ///
 /// With d the vector to the goal, φ the angle from the heading to ±d of least size and σ its sign,
 ///
@@ -46,7 +46,7 @@ pub struct Heading {
 }
 
 impl Heading {
-    /// Within this distance in m the direction to the goal is not followed any more.
+    /// Distance in m within which the direction to the goal is not followed any more.
     const NEAR: f64 = 0.5;
 
     /// The defaults towards `goal` (m).
@@ -81,12 +81,13 @@ impl Heading {
         Ok(self)
     }
 
-    /// The same controller towards a point from which the way to the goal is freer: where the straight way
-    /// from `position` passes within `clearance` (m) of one of the discs (centre and radius in m), a point
-    /// that is seen past the first of them, on the side where the way is shorter. The goal itself where it
-    /// does not. Within the clearance of that disc the way is along its edge.
+    /// The same controller towards a point from which the way to the goal is freer. Where the straight way from
+    /// `position` passes within `clearance` (m) of one of the discs (centre and radius in m), that point leads
+    /// past the first of them, on the side where the way is shorter. Within the clearance of that disc the way is
+    /// along its edge. Where no disc is in the way, the point is the goal itself.
     ///
-    /// Not a plan: it looks at one disc after the other and can go back and forth between discs that overlap.
+    /// This is no plan: it looks at one disc after the other and can go back and forth between discs that
+    /// overlap.
     pub fn around(self, position: [f64; 2], discs: &[([f64; 2], f64)], clearance: f64) -> Self {
         let mut goal = self.goal;
         // The way past one disc can lead to another; at worst each of them is passed once.
@@ -106,7 +107,7 @@ impl Heading {
         let per_distance = if self.speed_gain * far >= self.speed_limit {
             S::from(self.speed_limit) / distance
         } else if far > 0.0 {
-            // The gain, with the round-off of speed and distance.
+            // The gain, as computed from speed and distance, with their round-off.
             S::from(self.speed_gain * far / far)
         } else {
             S::from(self.speed_gain)
@@ -134,9 +135,9 @@ impl Heading {
         [within(self.acceleration_limit, acceleration), within(self.turn_limit, angle * self.turn_gain)]
     }
 
-    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v);
-    /// `l_r` > 0 in m. At rest it cannot turn: the slip angle is on its limit, to the side that turns
-    /// right once it moves.
+    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v); `l_r` > 0
+    /// in m. At rest it cannot turn: the slip angle is then on its limit, on the side that turns the right way
+    /// once it moves.
     pub fn bicycle<S: Scalar>(&self, x: &[S; 4], l_r: f64) -> [S; 2] {
         let [acceleration, turning] = self.unicycle(x);
         let at_rest = x[3].value() == 0.0;
@@ -144,7 +145,7 @@ impl Heading {
         if at_rest && turning.value() == 0.0 {
             return [acceleration, S::zero()];
         }
-        // No angle is 0, not −0.
+        // Adding 0.0 makes 0 of −0.
         [acceleration, within(self.slip_limit, turning * l_r / v + 0.0)]
     }
 
@@ -171,7 +172,7 @@ fn first_in_the_way(
     let (mut first, mut found) = (f64::INFINITY, None);
     for &(centre, radius) in discs {
         let to = [centre[0] - position[0], centre[1] - position[1]];
-        // Where the disc is along the way, and beside it: > 0 to the left.
+        // Position of the centre along the way, and beside it: > 0 to the left.
         let ahead = (way[0] * to[0] + way[1] * to[1]) / length;
         let beside = (way[0] * to[1] - way[1] * to[0]) / length;
         let wide = radius + clearance;
@@ -182,13 +183,13 @@ fn first_in_the_way(
     found
 }
 
-/// A point from which a disc with its centre at `to` from `position` is passed, on the side where the way to
-/// `goal` is shorter: where a tangent from `position` touches the disc of radius `wide`, a little enlarged;
-/// from within that, as far again along its edge and a little outwards.
+/// A point on the way past a disc whose centre is at `to` from `position`, on the side where the way to `goal` is
+/// shorter. From outside it is where a tangent from `position` touches the disc of radius `wide`, a little
+/// enlarged. From within that, it is as far again along the edge and a little outwards.
 fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2] {
-    /// Enlargement of the disc, so that it is not in the way of a vehicle that passes it.
+    /// Factor on the radius, so that the disc is not in the way of a vehicle that passes it.
     const ENLARGED: f64 = 1.1;
-    /// Sine of the angle away from the disc within it.
+    /// Sine of the angle, outwards from the edge, of the way from within the disc.
     const OUTWARDS: f64 = 0.3;
     let way = [goal[0] - position[0], goal[1] - position[1]];
     // A disc on the left is passed on its right side.
@@ -269,7 +270,7 @@ mod tests {
             let found = [heading.point_mass(&x), heading.unicycle(&x), heading.bicycle(&x, 2.0)];
             let step = 1e-6;
             let (plus, minus) = (laws(&moved(step)), laws(&moved(-step)));
-            // At the goal the speed of a vehicle that has a heading has a kink.
+            // The speed of a vehicle that has a heading has a kink at the goal.
             let compared = if i == 5 { 1 } else { 3 };
             for law in 0..compared {
                 for k in 0..2 {
@@ -282,7 +283,7 @@ mod tests {
         }
     }
 
-    /// From all around a disc, from within its clearance too: the way to the point is free of it.
+    /// Tests starts all around a disc, some within its clearance: the way to the point is free of it.
     #[test]
     fn the_way_around_a_disc_is_free() {
         let (disc, clearance) = (([10.0, 1.0], 2.0), 1.0);

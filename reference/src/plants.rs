@@ -6,7 +6,7 @@ use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, 
 use punctual_core::error::{Error, positive};
 use punctual_core::scalar::Scalar;
 
-/// One component of a state or input: what it is called, its unit and its meaning.
+/// One component of a state or input: its name, unit and meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Signal {
     /// Name as in the paper, ASCII.
@@ -29,8 +29,8 @@ const BETA: Signal = signal("beta", "rad", "slip angle at the centre of mass");
 const A: Signal = signal("a", "m/s2", "acceleration along the heading");
 const DELTA: Signal = signal("delta", "rad", "steering angle of the front wheel");
 
-/// Of every plant below: what no input changes at once is a function of position and heading, and its rate
-/// is the speed times something, which the acceleration changes.
+/// Largest relative degree on every plant below. A function that no input changes at once depends on position and
+/// heading alone. Its rate is the speed times something, and the acceleration changes that.
 const VEHICLE_DEGREE: usize = 2;
 
 /// The names and units of a plant's states and inputs.
@@ -158,11 +158,9 @@ impl ControlAffine<4, 2> for Bicycle {
 }
 
 /// The bicycle for small slip angles: x = (x_p, y_p, θ, v), u = (a, β).
-///
-/// ẋ_p = v cos θ − vβ sin θ, ẏ_p = v sin θ + vβ cos θ, θ̇ = v β / l_r, v̇ = a. β moves the vehicle
-/// sideways at once, so that it enters the *first* derivative of a barrier on the position and a only
-/// the second: a mixed relative degree, which the filter refuses. [`SmallSlipBicycleWithRate`] has a
-/// uniform one.
+/// ẋ_p = v cos θ − vβ sin θ, ẏ_p = v sin θ + vβ cos θ, θ̇ = v β / l_r, v̇ = a. β moves the vehicle sideways at
+/// once. So it enters the *first* derivative of a barrier on the position, and a only the second. That is a mixed
+/// relative degree, which the filter refuses. [`SmallSlipBicycleWithRate`] has a uniform one.
 #[derive(Clone, Copy, Debug)]
 pub struct SmallSlipBicycle {
     l_r: f64,
@@ -247,9 +245,9 @@ impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
 ///
 /// ẋ_p = v cos(θ + β), ẏ_p = v sin(θ + β), θ̇ = (v/l_r) sin β with β = atan(l_r/(l_f + l_r) tan δ).
 ///
-/// The model is not affine in δ, and a filter solves for inputs that enter linearly. With δ as a state
-/// it is affine, exactly, and a barrier on the position has relative degree 2 in both inputs. |δ| must
-/// stay below π/2: there the wheel stands across, and β jumps.
+/// The model is not affine in δ, and a filter solves for inputs that enter linearly. With δ as a state it is
+/// affine, exactly, and a barrier on the position has relative degree 2 in both inputs. |δ| must stay below π/2,
+/// where the wheel stands across, and β jumps.
 #[derive(Clone, Copy, Debug)]
 pub struct KinematicBicycle {
     l_f: f64,
@@ -267,17 +265,18 @@ impl KinematicBicycle {
         Ok(Self { l_f: positive("l_f", l_f)?, l_r: positive("l_r", l_r)? })
     }
 
-    /// β in rad that belongs to the steering angle `delta` in rad, |δ| < π/2.
+    /// Slip angle β in rad that belongs to the steering angle `delta` in rad, |δ| < π/2.
     pub fn slip_angle<S: Scalar>(&self, delta: S) -> S {
         (delta.tan() * (self.l_r / (self.l_f + self.l_r))).atan()
     }
 
-    /// δ in rad that belongs to the slip angle `beta` in rad, |β| < π/2.
+    /// Steering angle δ in rad that belongs to the slip angle `beta` in rad, |β| < π/2.
     pub fn steering_angle(&self, beta: f64) -> f64 {
         (beta.tan() * ((self.l_f + self.l_r) / self.l_r)).atan()
     }
 
-    /// The same vehicle with an angle for its input, which it then is not affine in: a plant, and no filter's model.
+    /// The same vehicle with an angle for its input. It is not affine in that, so it is a plant and no filter's
+    /// model.
     pub fn steered(self, steering: Steering) -> SteeredBicycle {
         SteeredBicycle { bicycle: self, steering }
     }
@@ -315,7 +314,7 @@ impl ControlAffine<5, 2> for KinematicBicycle {
     }
 }
 
-/// Which angle steers a [`SteeredBicycle`].
+/// The angle that steers a [`SteeredBicycle`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Steering {
     /// δ of the front wheel.
@@ -371,8 +370,8 @@ impl DynPlant for SteeredBicycle {
     }
 }
 
-/// Where a vehicle at `from` with the speed `v` can be until `time`: no further than `factor` times the way
-/// that the largest acceleration, the first input, gives.
+/// Disc of the positions that a vehicle at `from` with the speed `v` can reach until `time`: no further away than
+/// `factor` times the way that the largest acceleration, the first input, gives.
 fn driven(from: [f64; 2], v: f64, bounds: [&[f64]; 2], time: f64, factor: f64) -> Option<Region> {
     let acceleration = bounds[0][0].abs().max(bounds[1][0].abs());
     if !acceleration.is_finite() || !factor.is_finite() {

@@ -17,9 +17,9 @@ pub struct Schedule {
     pub substeps: usize,
 }
 
-/// Runs `filter` and `plant` in closed loop from `x0` at time 0. At every sample `nominal(t, x)`
-/// gives u_ref, and `observe(t, x, u, report)` sees the result before the plant moves; it is called
-/// once more at the end. Sample k is at time k · step.
+/// Runs `filter` and `plant` in closed loop from `x0` at time 0. At every sample `nominal(t, x)` gives u_ref, and
+/// `observe(t, x, u, report)` sees the result before the plant moves. It is called once more at the end. Sample k
+/// is at time k · step.
 ///
 /// # Errors
 ///
@@ -38,7 +38,7 @@ where
     closed_loop_by(filter, |x, u, dt| rk4_step(plant, x, u, dt), x0, schedule, nominal, observe)
 }
 
-/// As [`closed_loop`], with a plant that moves by `advance(x, u, dt)` over `dt` seconds: for other ways to
+/// Runs like [`closed_loop`], with a plant that moves by `advance(x, u, dt)` over `dt` seconds, for other ways to
 /// integrate.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
-//! The constraints of the literature in closed loop, against solutions in closed form.
+//! The baselines in closed loop, against solutions in closed form.
 //!
-//! On a chain of n integrators with h = x₁ the least input is the floor itself, so the state follows the
-//! constraint with equality. Inputs held for `STEP` seconds leave an error of first order in it.
+//! On a chain of n integrators with h = x₁ the least input is the floor itself. So the state follows the
+//! constraint with equality, and held inputs of `STEP` seconds leave an error of first order in it.
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::barrier::Barrier;
@@ -113,8 +113,8 @@ fn a_power_arrives_at_its_reach_time() {
     assert!((arrival.unwrap() - bound).abs() < 10.0 * STEP, "{arrival:?}");
 }
 
-/// From rest, the first link is outside too: it is there after |ψ_1|^{1/2}/(p/2), and h no later than after
-/// the time that the first link alone then needs. h falls at no time from rest, so |h| ≤ |h₀| throughout.
+/// From rest, the first link is outside too. It arrives after |ψ_1|^{1/2}/(p/2), and h no later than after the
+/// time that the first link alone then needs. h falls at no time from rest, so |h| ≤ |h₀| throughout.
 #[test]
 fn a_chain_of_powers_arrives_within_the_sum_of_its_reach_times() {
     for (p, q, h0) in [([2.0, 4.0], [0.5, 0.5], -4.0), ([3.0, 2.0], [0.75, 0.4], -9.0)] {
@@ -149,7 +149,7 @@ fn a_tube_is_kept_until_it_is_the_set() {
     let (h, _, _) = follow(tube, start.into(), 3.0);
     for (k, h) in h.iter().enumerate() {
         let bound = tube.bound(&Sample::new(&start, DEADLINE, k as f64 * STEP, &start)).lower;
-        // What held inputs cost.
+        // The tolerance is the cost of held inputs.
         assert!(*h >= bound - STEP, "{h} below {bound} at {}", k as f64 * STEP);
     }
 }

@@ -1,4 +1,4 @@
-//! `[vary]`: how one number is spread, as a function from (0, 1) to values.
+//! `[vary]`: the distribution of one number, as a function from (0, 1) to values.
 
 use punctual_fmu::configuration::{ConfigurationError, Range};
 use serde::Deserialize;
@@ -8,21 +8,21 @@ use statrs::distribution::{ContinuousCDF, Normal};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VarySection {
-    /// Which distribution.
+    /// The distribution.
     distribution: DistributionName,
     /// Least value, in the unit of the variable.
     min: Option<f64>,
     /// Greatest value, likewise.
     max: Option<f64>,
-    /// Mean before it is cut off at `min` and `max`, likewise.
+    /// Mean of the normal distribution before it is cut off at `min` and `max`, likewise.
     mean: Option<f64>,
-    /// Standard deviation before that, likewise, > 0.
+    /// Standard deviation before the cut, likewise, > 0.
     deviation: Option<f64>,
     /// The values to choose from, each as likely as the others.
     values: Option<Vec<f64>>,
 }
 
-/// The words of the file.
+/// The distributions, as the file spells them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum DistributionName {
@@ -65,23 +65,24 @@ pub enum Distribution {
     },
     /// Normal, cut off outside [min, max].
     Normal {
-        /// Before it is cut off.
+        /// The distribution before it is cut off.
         normal: Normal,
         /// Least value, may be −∞.
         min: f64,
         /// Greatest value, may be ∞.
         max: f64,
     },
-    /// One of these, each as likely as the others.
+    /// Picks one of these, each as likely as the others.
     Choice(Vec<f64>),
     /// The run's own seed.
     Seed,
 }
 
 impl VarySection {
-    /// Checks the section, whose errors are about `field`, for a variable of this range.
+    /// Checks the section for a variable of this range; errors are about `field`.
     pub(super) fn checked(&self, field: &str, range: Range) -> Result<Distribution, ConfigurationError> {
         let wrong = |key: &str, message: String| ConfigurationError::new(format!("{field}.{key}"), message);
+        // The keys are those of the distribution.
         let (name, needed, allowed) = self.distribution.keys();
         let numbers =
             [("min", self.min), ("max", self.max), ("mean", self.mean), ("deviation", self.deviation)];
@@ -99,6 +100,7 @@ impl VarySection {
                 return Err(wrong(key, format!("is not a key of distribution = {name:?}, which has {keys}")));
             }
         }
+        // Every number is finite, in order, and within the range of the variable.
         for (key, value) in numbers {
             if let Some(value) = value {
                 Range::FINITE.check(&format!("{field}.{key}"), value)?;
@@ -112,6 +114,7 @@ impl VarySection {
         }
         self.min.map_or(Ok(()), |min| within("min", min))?;
         self.max.map_or(Ok(()), |max| within("max", max))?;
+        // Each distribution has conditions of its own.
         match self.distribution {
             DistributionName::Uniform => {
                 Range::FINITE.check(&format!("{field}.max - min"), max - min)?;
@@ -132,7 +135,7 @@ impl VarySection {
                 }
                 Ok(Distribution::Choice(values))
             }
-            // Of seeds the range is [0, 2^53), and a variable that is none is a mistake.
+            // The range of a seed is [0, 2^53), so a variable with another range is a mistake.
             DistributionName::Seed if range.contains(-1.0) || range.max.is_some() => {
                 let message = "is \"seed\", which is for variables that may be any number >= 0".to_owned();
                 Err(wrong("distribution", message))
@@ -153,7 +156,7 @@ impl VarySection {
         }
         let normal = Normal::new(mean, deviation).map_err(|e| wrong("deviation", e.to_string()))?;
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
-        // Beyond that the part between is lost in round-off.
+        // With a smaller part, round-off loses the part between the ends.
         if normal.cdf(max) - normal.cdf(min) < LEAST_PART {
             let message =
                 format!("is {mean}: less than {LEAST_PART} of the distribution is from {min} to {max}");
@@ -163,11 +166,11 @@ impl VarySection {
     }
 }
 
-/// The least part of a normal distribution that may be left of it.
+/// The least part of a normal distribution that the ends may leave of it.
 const LEAST_PART: f64 = 1e-9;
 
 impl Distribution {
-    /// The value at `u` in (0, 1), rising with it, in a run whose own seed is `seed`.
+    /// The value at `u` in (0, 1), rising with `u`, in a run whose own seed is `seed`.
     pub fn value(&self, u: f64, seed: u64) -> f64 {
         match self {
             Self::Uniform { min, max } => (min + u * (max - min)).clamp(*min, *max),

@@ -25,12 +25,13 @@ use crate::package;
 struct File {
     system: SystemSource,
     campaign: CampaignSection,
-    /// By `component.variable`.
+    /// The varied variables, by `component.variable`.
     #[serde(default)]
     vary: BTreeMap<String, VarySection>,
 }
 
-/// `system`: the name of a system file, relative to the folder of the campaign file, or the same as a table.
+/// `system`: the name of a system file, relative to the folder of the campaign file, or the system itself as a
+/// table.
 #[derive(Clone, Debug)]
 enum SystemSource {
     File(PathBuf),
@@ -63,33 +64,34 @@ impl<'de> Deserialize<'de> for SystemSource {
 struct CampaignSection {
     /// The number of runs, 1 to 2⁵³.
     runs: u64,
-    /// Another number, another campaign; default 0.
+    /// Seed of the campaign: another number, another campaign; default 0.
     #[serde(default)]
     seed: u64,
-    /// How the variables are spread over their distributions; default random.
+    /// Spread of the variables over their distributions; default random.
     #[serde(default)]
     sampling: Sampling,
-    /// What makes a run a success; default kept.
+    /// Condition on a successful run; default kept.
     #[serde(default)]
     success: Success,
-    /// In place of the system's, s.
+    /// Stop time in s, in place of the system's.
     stop_time: Option<f64>,
-    /// In place of the system's, s.
+    /// Communication step in s, in place of the system's.
     step: Option<f64>,
 }
 
-/// What makes a run a success.
+/// Conditions on a successful run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Success {
-    /// Every promise is kept, as `punctual run --require kept` has it.
+    /// Every promise is kept, as for `punctual run --require kept`.
     #[default]
     Kept,
-    /// Every barrier has arrived by its deadline and is not left from then on, whatever its samples say.
+    /// Every barrier has arrived by its deadline and is not left from then on, whether or not its samples met the
+    /// constraint.
     OnTimeAndInside,
 }
 
-/// The texts that a campaign is made of: all that its rows depend on beside this program.
+/// The texts that a campaign is made of. Its rows depend on them and this program alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
     /// The campaign file.
@@ -101,8 +103,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// A name-based UUID of all texts and the version of this program: campaigns with the same one have the
-    /// same rows.
+    /// A name-based UUID of all texts and the version of this program: campaigns with the same UUID have the same
+    /// rows.
     pub fn fingerprint(&self) -> String {
         let parts = [Some(&self.file), self.system.as_ref()];
         let parts = parts.into_iter().flatten().chain(&self.configurations);
@@ -119,17 +121,17 @@ pub struct Varied {
     pub name: String,
     /// Its unit.
     pub unit: Option<String>,
-    /// What it means.
+    /// Its meaning.
     pub description: String,
     /// Position of the component.
     pub component: usize,
     /// Its value reference.
     pub reference: u32,
-    /// How it is spread.
+    /// Its distribution.
     distribution: Distribution,
 }
 
-/// What is chosen for one run.
+/// The numbers drawn for one run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choice {
     /// The run's own seed, below 2⁵³.
@@ -184,13 +186,14 @@ impl Campaign {
         Self::of(Source { file: text, system: system_text, configurations }, path, &system_path)
     }
 
-    /// Checks a campaign whose texts are at hand; errors name `path` or `system_path`.
+    /// Checks a campaign whose texts are given; errors name `path` or `system_path`.
     ///
     /// # Errors
     ///
     /// As for [`Campaign::read`].
     pub fn of(source: Source, path: &Path, system_path: &Path) -> Result<Self, Error> {
         let in_file = |e: ConfigurationError| Error::from(e).in_file(path);
+        // The system, with the times of the campaign.
         let file: File = read_toml(&source.file).map_err(in_file)?;
         let system = match (file.system, &source.system) {
             (SystemSource::Inline(system), _) => *system,
@@ -200,7 +203,7 @@ impl Campaign {
                 return Err(in_file(ConfigurationError::new("system", message)));
             }
         };
-        // What is read as part of another file has not been checked yet.
+        // A system inside the campaign file has not been checked yet.
         let prefix = if source.system.is_none() { "system." } else { "" };
         let system = system
             .timed(None, None)
@@ -209,6 +212,7 @@ impl Campaign {
         let system = system.timed(section.stop_time, section.step).map_err(|e| {
             in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))
         })?;
+        // The components, from their configurations.
         let (mut configurations, mut guids, mut descriptions) = (Vec::new(), Vec::new(), Vec::new());
         for text in &source.configurations {
             let product = parsed(text).and_then(Product::new)?;
@@ -221,6 +225,7 @@ impl Campaign {
         }
         let refer: Vec<_> = descriptions.iter().collect();
         let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
+        // The varied variables.
         let mut varied = Vec::new();
         for (name, section) in &file.vary {
             let field = format!("vary.{name:?}");
@@ -254,7 +259,7 @@ impl Campaign {
         Ok(Self { source, system, configurations, guids, descriptions, varied, sampler, runs, success })
     }
 
-    /// Its texts.
+    /// The texts it is made of.
     pub fn source(&self) -> &Source {
         &self.source
     }
@@ -264,17 +269,17 @@ impl Campaign {
         &self.system
     }
 
-    /// What each component is.
+    /// The configurations of the components.
     pub fn configurations(&self) -> &[Configuration] {
         &self.configurations
     }
 
-    /// What each component offers.
+    /// The model descriptions of the components.
     pub fn descriptions(&self) -> &[Description] {
         &self.descriptions
     }
 
-    /// What differs from run to run, by name.
+    /// The varied variables, by name.
     pub fn varied(&self) -> &[Varied] {
         &self.varied
     }
@@ -284,12 +289,12 @@ impl Campaign {
         self.runs
     }
 
-    /// What makes a run a success.
+    /// The condition on a successful run.
     pub fn success(&self) -> Success {
         self.success
     }
 
-    /// What is chosen for run `number`: a function of the campaign's texts and the number alone.
+    /// Draws the numbers of run `number`: a function of the campaign's texts and the number alone.
     pub fn choice(&self, number: u64) -> Choice {
         let mut values = Vec::new();
         let seed = self.sampler.draw(number, &mut values);
@@ -299,11 +304,12 @@ impl Campaign {
         Choice { seed, values }
     }
 
-    /// `system`, which is the campaign's but for what it records, with its components in process.
+    /// Couples the components in process as `system` says, which is the campaign's but for the signals that it
+    /// records.
     ///
     /// # Errors
     ///
-    /// A signal recorded or drawn that there is not.
+    /// A signal to record or draw that does not exist.
     pub fn simulation(&self, system: &System) -> Result<Simulation<InProcess>, Error> {
         let descriptions: Vec<_> = self.descriptions.iter().collect();
         let instance = |c: usize| {
@@ -324,7 +330,7 @@ fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))
 }
 
-/// The configuration of the component at `path`: of an FMU what it carries with it.
+/// Reads the configuration of the component at `path`; an FMU carries its own.
 fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
     if path.extension().is_some_and(|ending| ending == "toml") {
         return package::read_configuration(path);
@@ -358,7 +364,7 @@ fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
     Ok(product.configuration)
 }
 
-/// What is configured, if it needs no library.
+/// Parses a configuration, if it needs no library.
 fn parsed(text: &str) -> Result<Configuration, ConfigurationError> {
     Configuration::parse(text).map_err(|e| match e.field() {
         "plant.plugin" => ConfigurationError::new(

@@ -1,5 +1,5 @@
-//! One of our own blocks as a participant, without an archive, a library or C: the state machine is the one
-//! that the shared library runs, so the numbers are the same bit for bit.
+//! One of our own blocks as a participant, without an archive, a library or C. The state machine is the one that
+//! the shared library runs, so the numbers are the same bit for bit.
 
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::instance::Instance;
@@ -24,7 +24,7 @@ impl InProcess {
         Ok(Self { name: name.to_owned(), instance })
     }
 
-    /// What was refused, by whom and when.
+    /// The error of a refused call: the instance, the call and the time.
     #[cold]
     fn refused(&self, call: &str, reason: &str) -> Error {
         let time = crate::error::brief_time(self.instance.time());
@@ -32,7 +32,7 @@ impl InProcess {
     }
 }
 
-/// The calls that the instance answers under the same name.
+/// Passes calls on to the instance, which answers them under the same name.
 macro_rules! calls {
     ($($method:ident($($argument:ident: $kind:ty),*) as $call:literal;)*) => {$(
         fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {

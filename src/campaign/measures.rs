@@ -1,4 +1,4 @@
-//! What is kept of a run: its row, from the values at the communication points and from its promises.
+//! The row of a run, from the values at the communication points and from its promises.
 
 use punctual_core::filter::Status;
 use punctual_fmu::configuration::Configuration;
@@ -24,23 +24,23 @@ struct BarrierPlan {
     unit: String,
 }
 
-/// What a campaign keeps of its runs.
+/// The plan by which a campaign measures its runs.
 pub struct Measures {
     filters: Vec<FilterPlan>,
     success: Success,
     columns: Vec<Column>,
 }
 
-/// What is seen of one run.
+/// Findings on one run.
 struct Seen {
-    /// By filter and status.
+    /// Number of steps by filter and status.
     counts: Vec<[u64; Status::ALL.len()]>,
-    /// By filter and input.
+    /// Largest size by filter and input.
     peaks: Vec<f64>,
 }
 
 impl Measures {
-    /// For the runs of `campaign`.
+    /// Measures for the runs of `campaign`.
     pub fn new(campaign: &Campaign) -> Self {
         let mut filters = Vec::new();
         for (c, configuration) in campaign.configurations().iter().enumerate() {
@@ -83,7 +83,7 @@ impl Measures {
         self.filters.iter().flat_map(|filter| &filter.barriers).map(|barrier| barrier.name.as_str())
     }
 
-    /// The signals that are looked at, in the order of `Measures::see`.
+    /// The signals that are measured, in the order of `Measures::see`.
     pub fn signals(&self) -> Vec<String> {
         let mut signals = Vec::new();
         for filter in &self.filters {
@@ -172,7 +172,7 @@ impl Measures {
     }
 }
 
-/// What is kept of a barrier, in the order of a row; `[h]` stands for its unit.
+/// Columns of a barrier, in the order of a row; `[h]` stands for its unit.
 const OF_BARRIER: [(&str, Kind, &str, &str); 10] = [
     ("arrival", Kind::Number, "s", "when h >= 0 held first"),
     ("on_time", Kind::Flag, "", "whether that was by its deadline; without one, at the start"),

@@ -1,8 +1,8 @@
 //! Many runs of one system from drawn starts, parameters and disturbances, in process and on all cores.
 //!
-//! A run is a function of the campaign's texts and its number: which run follows which, on which thread, and
-//! where a campaign was interrupted do not show in its row. The blocks are those of the FMUs, coupled by the
-//! same master, so a row is what `punctual run` would find, bit for bit.
+//! A run is a function of the campaign's texts and its number. Its row does not show which run follows which, on
+//! which thread, or where a campaign was interrupted. The blocks are those of the FMUs, coupled by the same
+//! master. So a row is what `punctual run` would find, bit for bit.
 
 mod distribution;
 mod file;

@@ -1,9 +1,9 @@
-//! Makes the runs of a campaign on all cores and keeps their rows, so that it can be ended at any point and
-//! gone on with.
+//! Makes the runs of a campaign on all cores and keeps their rows, so that it can be interrupted at any point and
+//! resumed.
 //!
-//! Rows go to segments beside the output, in the folder `<output>.parts`: a segment holds the next runs in
-//! order, is written under another name, synchronised and renamed, so that it is there as a whole or not at all.
-//! When all runs are there, the segments are joined. How they were cut does not show in the result.
+//! Rows go to segments beside the output, in the folder `<output>.parts`. A segment holds the next runs in order.
+//! It is written under another name, synchronised and renamed, so that it is there as a whole or not at all. When
+//! all runs are there, the segments are joined. Their cuts do not show in the result.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -24,9 +24,9 @@ use super::table::{GROUP, Reader, Row, Writer};
 use crate::coupling::Simulation;
 use crate::error::Error;
 
-/// How long the runs of a segment take together: what is lost at most when the process is killed.
+/// Time that the runs of a segment take together: the most that is lost when the process is killed.
 const SEGMENT: Duration = Duration::from_secs(3);
-/// By how much a segment may have more runs than the one before.
+/// Largest growth of the number of runs from one segment to the next, as a factor.
 const GROWTH: usize = 4;
 
 /// Names of the texts in the metadata of a file.
@@ -45,23 +45,23 @@ pub(super) mod key {
     pub(crate) const COLUMNS: &str = "punctual.columns";
 }
 
-/// Where and how a campaign is run.
+/// Output and threads of a campaign.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The Parquet file.
     pub output: PathBuf,
-    /// How many runs are made at once; default one for each core.
+    /// Number of runs made at once; default one for each core.
     pub threads: Option<NonZeroUsize>,
 }
 
-/// How far a campaign came.
+/// Progress of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Runs whose rows are kept.
     pub done: u64,
-    /// Those of them that were there before.
+    /// Number of these runs that were there before.
     pub before: u64,
-    /// How long the others took.
+    /// Wall time of the others.
     pub wall_time: Duration,
 }
 
@@ -80,7 +80,7 @@ fn metadata(source: &Source, measures: &Measures) -> Vec<(String, String)> {
     texts
 }
 
-/// The campaign that the file at `path` is of.
+/// The reader of the file at `path`, and the campaign that it belongs to.
 ///
 /// # Errors
 ///
@@ -114,11 +114,11 @@ struct Parts {
     _lock: File,
 }
 
-/// A segment by its first run: how many there are, and where.
+/// Segments by their first run, each with its number of runs and its path.
 type Segments = BTreeMap<u64, (u64, PathBuf)>;
 
 impl Parts {
-    /// Opens the folder for `output`, which may have been begun.
+    /// Opens the folder for `output`, which may exist from an earlier call.
     fn open(output: &Path, fingerprint: String) -> Result<Self, Error> {
         let mut name = output.as_os_str().to_owned();
         name.push(".parts");
@@ -153,12 +153,12 @@ impl Parts {
         Ok(parts)
     }
 
-    /// Where a file is written before it has its name.
+    /// Path of a file that is not complete yet.
     fn unfinished(&self) -> PathBuf {
         self.folder.join("unfinished")
     }
 
-    /// Gives a file that is complete on the disk its name.
+    /// Renames a file that is complete on the disk.
     fn settle(&self, from: &Path, to: &Path) -> Result<(), Error> {
         fs::rename(from, to).map_err(|e| Error::io("write", to, e))?;
         let folder = to.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -191,9 +191,9 @@ impl Parts {
         Ok(found)
     }
 
-    /// Removes the folder with all that was put there.
+    /// Removes the folder with all its files.
     fn remove(self) -> Result<(), Error> {
-        // The last first: what is left of an interrupted removal has no gap.
+        // The last goes first, so that the rest of an interrupted removal has no gap.
         for (_, path) in self.segments()?.values().rev() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
         }
@@ -233,8 +233,8 @@ fn complete(campaign: &Campaign, output: &Path) -> Result<bool, Error> {
     if found == wanted { Ok(true) } else { Err(other_campaign(output, found, &wanted)) }
 }
 
-/// Makes the runs that are not there yet. Ends early once `stop` is set, with all complete runs kept that have
-/// no gap before them. `tell` gets the number of runs made so far.
+/// Makes the runs that are not there yet. Ends early once `stop` is set; then it keeps all complete runs with no
+/// gap before them. `tell` gets the number of runs made so far.
 ///
 /// # Errors
 ///
@@ -251,7 +251,7 @@ pub fn run(
         let mut folder = options.output.as_os_str().to_owned();
         folder.push(".parts");
         if Path::new(&folder).exists() {
-            // Killed between the last two steps of the last time.
+            // The last process was killed between its last two steps.
             Parts::open(&options.output, fingerprint)?.remove()?;
         }
         return Ok(Progress { done: runs, before: runs, wall_time: Duration::ZERO });
@@ -307,7 +307,7 @@ struct Crew<'a> {
     campaign: &'a Campaign,
     measures: &'a Measures,
     pool: ThreadPool,
-    /// By thread; each is only ever used by its own.
+    /// Simulations by thread; each is only ever used by its own.
     simulations: Vec<Mutex<Simulation<InProcess>>>,
 }
 
@@ -366,7 +366,7 @@ impl<'a> Crew<'a> {
 
     fn make(&self, number: u64) -> Row {
         let thread = rayon::current_thread_index().unwrap_or(0) % self.simulations.len();
-        // A run that panicked leaves nothing behind: the next one begins with a reset.
+        // A run that panicked leaves nothing behind, since the next one begins with a reset.
         let mut simulation =
             self.simulations[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         self.measures.run(self.campaign, &mut simulation, number)

@@ -1,8 +1,8 @@
 //! From the number of a run to its seed and its point of the unit cube: a function of (seed, runs, kind,
-//! dimensions, number) and of nothing else, so that any run can be had without those before it.
+//! dimensions, number) and of nothing else. So any run can be drawn without those before it.
 //!
-//! Everything random is read from ChaCha8 under the campaign's seed: stream k belongs to run k, the streams
-//! from [`SHARED`] on to what all runs share.
+//! All random numbers are read from ChaCha8 under the campaign's seed. Stream k belongs to run k. The streams
+//! from [`SHARED`] on belong to all runs together.
 
 use punctual_fmu::configuration::ConfigurationError;
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::sobol::{DIMENSIONS, Sobol};
 
-/// How points are spread over the cube.
+/// Ways to spread points over the cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
@@ -25,7 +25,7 @@ pub enum Sampling {
     Sobol,
 }
 
-/// The first stream that is no run's; so there are fewer runs than this.
+/// The first stream that belongs to no run; so there are fewer runs than this.
 const SHARED: u64 = 1 << 63;
 /// Streams that one dimension may use.
 const PER_DIMENSION: u64 = 16;
@@ -45,7 +45,7 @@ pub struct Sampler {
     dimensions: Vec<Dimension>,
 }
 
-/// How one coordinate is made.
+/// Ways to make one coordinate.
 #[derive(Clone, Debug)]
 enum Dimension {
     Random,
@@ -54,7 +54,7 @@ enum Dimension {
 }
 
 impl Sampler {
-    /// For `runs` points of `dimensions` coordinates.
+    /// A sampler of `runs` points with `dimensions` coordinates.
     ///
     /// # Errors
     ///
@@ -142,7 +142,7 @@ fn unit(bits: u64) -> f64 {
     ((bits >> 12) as f64 + 0.5) / (1_u64 << 52) as f64
 }
 
-/// Against rounding up at the end of the last slice.
+/// Guards against rounding up at the end of the last slice.
 fn below_one(u: f64) -> f64 {
     u.min(1.0 - f64::EPSILON / 2.0)
 }
@@ -198,7 +198,7 @@ mod tests {
         assert!(seen.iter().all(|s| *s));
     }
 
-    /// Recorded campaigns are replayed from these numbers: they must not change with a crate.
+    /// Recorded campaigns are replayed from these numbers, so a crate must not change them.
     #[test]
     fn the_streams_stay_what_they_are() {
         let mut point = Vec::new();

@@ -11,7 +11,7 @@ pub(super) const DIMENSIONS: usize = PRIMITIVE.len() + 1;
 /// Bits of a coordinate: there are 2³² points.
 const BITS: usize = 32;
 
-/// For each dimension but the first the inner coefficients `a` of its primitive polynomial, as bits, and its
+/// The inner coefficients `a` of the primitive polynomial of each dimension but the first, as bits, and its
 /// initial numbers `m`, as many as the degree.
 const PRIMITIVE: [(u32, &[u32]); 20] = [
     (0, &[1]),
@@ -41,7 +41,7 @@ const PRIMITIVE: [(u32, &[u32]); 20] = [
 pub(super) struct Sobol([u32; BITS]);
 
 impl Sobol {
-    /// Of `dimension`, from 0; `None` where there are no numbers for it.
+    /// The directions of `dimension`, from 0; `None` where there are no numbers for it.
     pub(super) fn new(dimension: usize) -> Option<Self> {
         let mut v = [0; BITS];
         let Some(row) = dimension.checked_sub(1) else {
@@ -65,7 +65,7 @@ impl Sobol {
         Some(Self(v))
     }
 
-    /// The coordinate of point `number` (the lower 32 bits count) in units of 2⁻³², in the order of the
+    /// The coordinate of point `number` (the lower 32 bits count) in units of 2⁻³². The order is that of the
     /// definition, not of the Gray code: each block of 2^m points from a multiple of 2^m on is the same set.
     pub(super) fn coordinate(&self, number: u64) -> u32 {
         self.0.iter().enumerate().filter(|(i, _)| number >> i & 1 == 1).fold(0, |sum, (_, v)| sum ^ v)
@@ -76,8 +76,8 @@ impl Sobol {
 mod tests {
     use super::*;
 
-    /// The first 2¹² points have one coordinate in each interval of 2⁻¹², in every dimension; and the first
-    /// two dimensions one point in each of the elementary boxes of that volume (a (0, 2)-sequence in base 2).
+    /// The first 2¹² points have one coordinate in each interval of 2⁻¹², in every dimension. The first two
+    /// dimensions have one point in each of the elementary boxes of that volume (a (0, 2)-sequence in base 2).
     #[test]
     fn points_are_stratified() {
         const M: usize = 12;

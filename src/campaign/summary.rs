@@ -1,4 +1,4 @@
-//! What the runs of a campaign come to: how many succeed, and which are the worst.
+//! Summary of a campaign: how many runs succeed, and which are the worst.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -9,30 +9,30 @@ use super::measures::Measures;
 use super::table::{Cell, Column, Kind, Reader};
 use crate::error::Error;
 
-/// The 0.975 quantile of the normal distribution: intervals hold with a confidence of 95 %.
+/// The 0.975 quantile of the normal distribution, for a confidence of 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
 /// A part of all runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
-    /// How many.
+    /// Number of runs.
     pub count: u64,
     /// Their part of all.
     pub rate: f64,
-    /// In which the part lies that infinitely many runs would have, with a confidence of 95 %: E. B. Wilson,
-    /// J. Amer. Statist. Assoc. 22 (1927), doi 10.1080/01621459.1927.10502953. It is for independent runs;
-    /// of spread ones it is wider than need be.
+    /// Interval for the part in infinitely many runs, with a confidence of 95 %: E. B. Wilson, J. Amer. Statist.
+    /// Assoc. 22 (1927), doi 10.1080/01621459.1927.10502953. It is for independent runs; for spread ones it is
+    /// wider than need be.
     pub interval: [f64; 2],
 }
 
 impl Rate {
-    /// `count` of `all` ≥ 1.
+    /// The rate of `count` runs of `all` ≥ 1.
     pub fn of(count: u64, all: u64) -> Self {
         let (n, p) = (all as f64, count as f64 / all as f64);
         let middle = p + Z * Z / (2.0 * n);
         let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
         let scale = 1.0 + Z * Z / n;
-        // The ends are exact there, round-off apart.
+        // At 0 and `all` the ends are exact, round-off apart.
         let low = if count == 0 { 0.0 } else { ((middle - half) / scale).max(0.0) };
         let high = if count == all { 1.0 } else { ((middle + half) / scale).min(1.0) };
         Self { count, rate: p, interval: [low, high] }
@@ -46,7 +46,7 @@ pub struct Spread {
     pub column: String,
     /// Its unit.
     pub unit: String,
-    /// How many runs have one.
+    /// Number of runs that have a number.
     pub count: u64,
     /// The least.
     pub min: f64,
@@ -56,12 +56,12 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// How many runs lack something that every run should have.
+/// Number of runs that lack something that every run should have.
 #[derive(Clone, Debug, Serialize)]
 pub struct Lack {
     /// The column that is false.
     pub column: String,
-    /// In how many runs.
+    /// The runs that lack it.
     #[serde(flatten)]
     pub rate: Rate,
 }
@@ -80,7 +80,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Greater is worse: first what failed, then what did not succeed, then the least h.
+    /// Orders cases, worse ones greater: failed runs first, then those without success, then by the least h.
     fn compare(&self, other: &Self) -> Ordering {
         let key = |case: &Self| (case.failure.is_some(), !case.success);
         let least = |case: &Self| case.least_h.unwrap_or(f64::NEG_INFINITY);
@@ -89,7 +89,7 @@ impl Case {
     }
 }
 
-/// The same, with the least bad at the top of the heap.
+/// A case ordered so that the least bad is at the top of the heap.
 struct Kept(Case);
 
 impl Ord for Kept {
@@ -112,16 +112,16 @@ impl PartialEq for Kept {
     }
 }
 
-/// What a campaign came to.
+/// Result of a campaign.
 #[derive(Debug, Serialize)]
 pub struct Summary {
-    /// How many runs there are.
+    /// Number of runs.
     pub runs: u64,
-    /// Those that succeeded.
+    /// The successful runs.
     pub success: Rate,
-    /// Those that did not.
+    /// The others.
     pub failure: Rate,
-    /// What was not so in how many runs.
+    /// The columns that are false in some runs.
     pub lacks: Vec<Lack>,
     /// The numbers of the runs.
     pub spreads: Vec<Spread>,
@@ -129,12 +129,13 @@ pub struct Summary {
     pub worst: Vec<Case>,
 }
 
-/// Goes through the rows in `reader` once; keeps the `worst` so many.
+/// Goes through the rows in `reader` once, and keeps the `worst` so many.
 ///
 /// # Errors
 ///
 /// A file that cannot be read or has no rows.
 pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Summary, Error> {
+    // Find the columns.
     let columns = measures.columns();
     let find = |name: &str| columns.iter().position(|column| column.name == name);
     let least: Vec<usize> =
@@ -145,6 +146,7 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
     let [Some(success), Some(failure)] = ["success", "failure"].map(find) else {
         return Err(Error::configuration("", "a campaign without its columns"));
     };
+    // Go through the rows.
     let (mut runs, mut succeeded) = (0_u64, 0_u64);
     let mut lacking = vec![0_u64; flags.len()];
     let mut spreads: Vec<Spread> = numbers.iter().map(|&c| Spread::nothing(&columns[c])).collect();
@@ -165,7 +167,7 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
                 Cell::Number(h) => h,
                 _ => None,
             };
-            // A barrier that was let go before its deadline has none.
+            // A barrier that was released before its deadline has none.
             let least_h = least.iter().filter_map(h).reduce(f64::min);
             let failed = match &row[failure] {
                 Cell::Text(text) => text.clone(),
@@ -178,6 +180,7 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
             runs += 1;
         }
     }
+    // Turn counts into rates.
     if runs == 0 {
         return Err(Error::configuration("", "a campaign without runs"));
     }
@@ -200,7 +203,7 @@ impl Spread {
         Self { column, unit, count: 0, min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }
     }
 
-    /// Until it is finished, the mean is the sum.
+    /// Takes a value. Until the spread is finished, its mean is the sum.
     fn take(&mut self, value: f64) {
         self.count += 1;
         self.min = self.min.min(value);

@@ -1,7 +1,7 @@
 //! The rows of a campaign as a Parquet file. The only module that names the crate `parquet`.
 //!
-//! Rows are in the order of the runs, in groups of [`GROUP`]; what is written depends on columns, metadata and
-//! rows alone, so the same rows give the same bytes.
+//! Rows are in the order of the runs, in groups of [`GROUP`]. The file depends on columns, metadata and rows
+//! alone, so the same rows give the same bytes.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -20,10 +20,10 @@ use parquet::schema::types::Type;
 
 use crate::error::Error;
 
-/// Rows of a row group, the last one of a file apart: what is held in memory at a time.
+/// Rows of a row group, except the last one of a file; one group is held in memory at a time.
 pub const GROUP: usize = 16_384;
 
-/// What the cells of a column are.
+/// The kinds of cells in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Whole numbers from 0 on.
@@ -43,9 +43,9 @@ pub struct Column {
     pub name: String,
     /// The unit of its numbers; empty where it has none.
     pub unit: String,
-    /// What it means.
+    /// Its meaning.
     pub description: String,
-    /// What its cells are.
+    /// The kind of its cells.
     #[serde(skip)]
     pub kind: Kind,
 }
@@ -64,7 +64,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Whether the other one is the same bit for bit.
+    /// Whether two cells are the same bit for bit.
     pub fn is(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Count(a), Self::Count(b)) => a == b,
@@ -164,7 +164,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Completes the file and has it on the disk.
+    /// Completes the file and waits until it is on the disk.
     ///
     /// # Errors
     ///

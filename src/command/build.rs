@@ -56,7 +56,7 @@ pub struct TryPluginArguments {
 ///
 /// # Errors
 ///
-/// What is wrong with the configuration or its plug-in.
+/// A defect of the configuration or its plug-in.
 pub fn execute_try_plugin(arguments: &TryPluginArguments) -> Result<ExitCode, Error> {
     package::plugin::perform(&arguments.configuration, &arguments.folder)?;
     Ok(ExitCode::SUCCESS)

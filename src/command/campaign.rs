@@ -15,7 +15,7 @@ use crate::output::{self, Counter, number};
 /// Exit code after Ctrl-C, as shells have it.
 const INTERRUPTED: u8 = 130;
 
-/// Lines of a list that are printed together.
+/// Lines of a list that are printed at once.
 const AT_ONCE: usize = 1000;
 
 /// Arguments of `punctual campaign`.
@@ -44,13 +44,13 @@ pub struct Arguments {
     list: Option<Range>,
 }
 
-/// What a campaign must come to.
+/// Requirements on a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Requirement {
     Success,
 }
 
-/// Runs by number, the last one not among them.
+/// A range of runs by number, without the last one.
 #[derive(Clone, Copy, Debug)]
 struct Range {
     first: u64,
@@ -73,7 +73,7 @@ struct Drawn<'a> {
     values: std::collections::BTreeMap<&'a str, f64>,
 }
 
-/// What a campaign tells, as JSON.
+/// The report on a campaign, as JSON.
 #[derive(Serialize)]
 struct Report {
     campaign: String,
@@ -87,7 +87,7 @@ struct Report {
     summary: Option<Summary>,
 }
 
-/// Makes the runs that are missing, and sums up.
+/// Makes the missing runs, and sums up.
 ///
 /// # Errors
 ///
@@ -101,18 +101,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let output = output.unwrap_or_else(|| arguments.campaign.with_extension("parquet"));
     let stop = Arc::new(AtomicBool::new(false));
     let handle = Arc::clone(&stop);
-    // The second time the program ends at once: what is kept is safe.
+    // A second Ctrl-C ends the program at once, since the kept rows are safe.
     let handler = move || {
         if handle.swap(true, Ordering::Relaxed) {
             std::process::exit(i32::from(INTERRUPTED));
         }
     };
     ctrlc::set_handler(handler).map_err(|e| Error::broken("Ctrl-C", format!("cannot be caught: {e}")))?;
+    // Run.
     let options = Options { output: output.clone(), threads: arguments.threads };
     let counter = Counter::new("runs", 0, campaign.runs());
     let progress = campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?;
     drop(counter);
 
+    // Sum up.
     let complete = progress.done == campaign.runs();
     let summary = if complete {
         let (reader, _) = campaign::recorded(&output)?;
@@ -131,6 +133,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         runs_per_second: (progress.done - progress.before) as f64 / seconds.max(1e-9),
         summary,
     };
+    // Tell.
     if progress.before > 0 {
         output::note(&format!("note: {} of {} runs were there already", progress.before, campaign.runs()));
     }

@@ -1,4 +1,4 @@
-//! `punctual check`: what a configuration comes to, before anything is built.
+//! `punctual check`: findings on a configuration before anything is built.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -42,7 +42,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What `check` tells about a filter.
+/// The report on a filter.
 #[derive(Serialize)]
 struct FilterReport {
     kind: &'static str,
@@ -59,10 +59,11 @@ struct FilterReport {
     /// The closed loop from the start, where the plant is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     closed_loop: Option<LoopReport>,
-    /// The same with damping, where that is known, not asked for, and the other does not keep every promise.
+    /// The same with damping, where that is known and was not asked for, and the run without it does not keep
+    /// every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     with_damping: Option<LoopReport>,
-    /// What profiles and rates need, the best first.
+    /// Inputs that profiles and rates need, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
 }
@@ -75,7 +76,7 @@ struct BarrierReport {
     unit: String,
     relative_degree: usize,
     method: &'static str,
-    /// In s; `null` for a barrier that is to be kept.
+    /// In s; `null` for a barrier without one, that is to be kept.
     deadline: Option<f64>,
     /// In 1/s; `null` for the repeated root without a start, where it is chosen.
     rate: Option<f64>,
@@ -90,18 +91,18 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
-    /// Whether the theorem applies from there, and the closed loop keeps its promise.
+    /// Whether the theorem applies from the start, and the closed loop keeps its promise.
     guaranteed: bool,
     /// Whether the theorem applies to the first step.
     first_step: bool,
-    /// What the closed loop came to, where the plant is known.
+    /// Verdict of the closed loop, where the plant is known.
     simulated: Option<Kept>,
-    /// What the input bounds allow, where there are any.
+    /// Limits that the input bounds set, where there are any.
     reach: Option<ReachReport>,
 }
 
 impl StartReport {
-    /// What the first step and the closed loop say together.
+    /// The first step and the closed loop together, in words.
     fn words(&self) -> &'static str {
         match (self.first_step, self.simulated) {
             (true, Some(Kept::Kept)) => "guaranteed",
@@ -114,7 +115,7 @@ impl StartReport {
     }
 }
 
-/// What `check` tells about a plant.
+/// The report on a plant.
 #[derive(Serialize)]
 struct PlantReport {
     kind: &'static str,
@@ -124,13 +125,13 @@ struct PlantReport {
     inputs: Vec<SignalReport>,
     /// Communication step in s.
     step: f64,
-    /// Runge-Kutta steps in it.
+    /// Number of Runge-Kutta steps in it.
     substeps: u64,
     /// Their length in s.
     inner_step: f64,
 }
 
-/// What `check` tells about a controller.
+/// The report on a controller.
 #[derive(Serialize)]
 struct ControllerReport {
     kind: &'static str,
@@ -183,6 +184,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
+            // Simulate and judge.
             let wanted = Wanted::parse(&arguments.u_ref, &configuration)?;
             let effort = match &start {
                 Some(x0) if arguments.effort => {
@@ -192,6 +194,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             };
             let mut report = filter(&configuration, start, &wanted).map_err(|e| e.in_file(file))?;
             report.effort = effort;
+            // Tell, and decide the exit code.
             if arguments.json {
                 output::json(&report);
             } else {
@@ -228,6 +231,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<Option<Vec<f64>>, Error> {
     let mut x0 = vec![0.0; configuration.plant.states().len()];
     x0.extend(configuration.barrier_inputs().iter().map(|input| input.start));
+    // The start of a plant's configuration.
     if let Some(file) = &arguments.plant {
         if let Some(barrier) = configuration.external() {
             let name = &barrier.name;
@@ -251,13 +255,14 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 Err(Error::configuration("plant.model", message).in_file(file))
             }
             None => {
-                // What the filter integrates itself begins with 0.
+                // A state that the filter integrates itself begins at 0.
                 let all = configuration.plant.states();
                 x0.iter_mut().zip(all).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
                 Ok(Some(x0))
             }
         };
     }
+    // The start of `--x0`.
     let Some(text) = &arguments.x0 else { return Ok(None) };
     let refuse = |message: String| Error::configuration("--x0", message);
     let names = measured(configuration);
@@ -277,7 +282,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
     Ok(Some(x0))
 }
 
-/// What the filter measures: the states, then the inputs of its barriers.
+/// The inputs that the filter measures: the states, then the inputs of its barriers.
 fn measured(c: &FilterConfiguration) -> Vec<String> {
     let states = c.plant.states().into_iter().map(|s| s.name);
     states.chain(c.barrier_inputs().into_iter().map(|input| input.name)).collect()
@@ -286,11 +291,12 @@ fn measured(c: &FilterConfiguration) -> Vec<String> {
 fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> Result<FilterReport, Error> {
     let mut filter = c.build()?;
     let inputs = c.plant.inputs().len();
+    // The first step from the start, then the closed loops.
     let status = match start.as_deref() {
         Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
         None => None,
     };
-    // Without a model nothing is simulated.
+    // A filter without a model is not simulated.
     let simulated = start.as_deref().filter(|_| c.external().is_none());
     let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
     let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
@@ -300,6 +306,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
     let mut warnings = Vec::new();
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let mut barriers = Vec::new();
+    // Each barrier: its settings, as given or chosen.
     for (i, section) in c.barrier.iter().enumerate() {
         let (name, unit) = (&section.name, section.unit(&c.plant));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
@@ -322,6 +329,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
         let stay_rate = settings.stay_rate.or(settings.rate).or(default_rate).or(chosen);
         let margin = if begun { filter.report().barriers[i].margin } else { settings.margin };
         let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
+        // Warnings on the settings.
         if c.sampling == SamplingName::Pointwise && margin == 0.0 {
             warn(format!(
                 "the margin is 0, so that an input held over {} s can cost the deadline",
@@ -356,6 +364,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
                 number((-rate * deadline).exp())
             ));
         }
+        // Findings from the start.
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
@@ -410,7 +419,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
     })
 }
 
-/// What a closed loop shows beyond its promises.
+/// Warnings on a closed loop beyond its promises.
 fn loop_warnings(run: &LoopReport) -> Vec<String> {
     let unmet = run.barriers.iter().filter(|b| b.unmet > 0).map(|b| {
         let name = &b.name;
@@ -426,7 +435,7 @@ fn loop_warnings(run: &LoopReport) -> Vec<String> {
     unmet.chain(run.beyond.iter().map(|state| state.words())).chain(loose).collect()
 }
 
-/// Anchors the filter at `x0` with u_ref = 0; the status in words.
+/// Anchors the filter at `x0` with u_ref = 0, and returns the status in words.
 fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) -> Result<&'static str, Error> {
     let u_ref = vec![0.0; inputs];
     let mut u = u_ref.clone();
@@ -490,6 +499,7 @@ fn filter_text(report: &FilterReport) -> String {
     if let Some(status) = &report.status {
         lines.push(format!("first step with u_ref = 0: {status}"));
     }
+    // Each barrier as a table.
     for b in &report.barriers {
         lines.push(format!("\n{} ({})", b.name, b.shape));
         let rate = match (b.rate, b.rate_times_deadline) {
@@ -518,6 +528,7 @@ fn filter_text(report: &FilterReport) -> String {
         }
         lines.extend(rows.into_iter().map(|(name, value)| format!("  {name:<16} {value}")));
     }
+    // Findings on the filter as a whole.
     lines.extend(report.closed_loop.iter().map(LoopReport::text));
     if let Some(run) = &report.with_damping {
         lines.push(run.head());

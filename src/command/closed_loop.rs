@@ -1,5 +1,5 @@
-//! What `check` finds by running the filter it checks in a closed loop, on the filter's own model and with the
-//! u_ref that is asked for: whether each promise is kept, the soonest deadline, the smallest bounds.
+//! Closed loops of `check`, on the filter's own model and with the wanted u_ref. They tell whether each promise
+//! is kept, the soonest deadline, and the smallest bounds.
 
 use punctual_core::filter::{ProfileKind, SafetyFilter};
 use punctual_fmu::configuration::{Automatic, FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
@@ -14,34 +14,34 @@ use crate::output::{self, number};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.
 const SAMPLES: f64 = 200.0;
-/// Part of the soonest deadline to which it is found.
+/// Relative tolerance of the soonest deadline.
 const TOLERANCE: f64 = 0.02;
 /// The longest deadline looked for, in units of the configured one.
 const HORIZON: f64 = 30.0;
-/// Per second.
+/// Gain of the damping in 1/s.
 const DAMPING: f64 = 1.0;
-/// How long a closed loop is watched, in units of its longest deadline.
+/// Length of a closed loop, in units of its longest deadline.
 const WATCHED: f64 = 2.0;
-/// The longest step in s by which the plant is integrated in a closed loop that is watched.
+/// The longest step in s by which the plant is integrated in a closed loop.
 const INNER_STEP: f64 = 0.002;
-/// The fewest instants of a period at which h is looked at there.
+/// The fewest instants of a period at which h is looked at.
 const INSTANTS: f64 = 4.0;
-/// The most samples of a closed loop that is watched: beyond, they are further apart.
+/// The most samples of a closed loop; a longer loop has them further apart.
 const MOST_SAMPLES: f64 = 1e6;
 
 /// The u_ref of the closed loops.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wanted {
-    /// Zero: what an FMU gets where nothing is connected.
+    /// Zero: the value in an FMU where nothing is connected.
     None,
-    /// −v per second, for the vehicles by name.
+    /// Damping: −v per second, for the vehicles by name.
     Damping,
     /// Constant.
     Constant(Vec<f64>),
 }
 
 impl Wanted {
-    /// As `--u-ref` says: `none`, `damping`, or values such as `a=0.5,omega=0`.
+    /// Parses `--u-ref`: `none`, `damping`, or values such as `a=0.5,omega=0`.
     pub(super) fn parse(text: &str, c: &FilterConfiguration) -> Result<Self, Error> {
         let refuse = |message: String| Err(Error::configuration("--u-ref", message));
         let inputs: Vec<String> = c.plant.inputs().into_iter().map(|input| input.name).collect();
@@ -110,16 +110,16 @@ pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
     c.plant.model.is_some() && c.plant.states().len() > 3
 }
 
-/// What a closed loop came to.
+/// Result of a closed loop.
 #[derive(Serialize)]
 pub(super) struct LoopReport {
-    /// In words.
+    /// u_ref in words.
     pub(super) u_ref: String,
     /// Whether every promise was kept.
     pub(super) kept: bool,
-    /// Until when it ran, in s.
+    /// End of the run in s.
     end: f64,
-    /// Between samples, in s.
+    /// Time between samples in s.
     step: f64,
     pub(super) barriers: Vec<LoopBarrier>,
     pub(super) inputs: Vec<LoopInput>,
@@ -127,7 +127,7 @@ pub(super) struct LoopReport {
     pub(super) beyond: Vec<LoopState>,
 }
 
-/// What was seen of a barrier.
+/// Findings on a barrier.
 #[derive(Serialize)]
 pub(super) struct LoopBarrier {
     pub(super) name: String,
@@ -140,18 +140,18 @@ pub(super) struct LoopBarrier {
     first_unmet: Option<f64>,
 }
 
-/// What an input came to.
+/// Findings on an input.
 #[derive(Serialize)]
 pub(super) struct LoopInput {
     pub(super) name: String,
     unit: String,
     /// Largest size.
     pub(super) peak: f64,
-    /// `null` where it has none.
+    /// Its bounds; `null` where it has none.
     pub(super) bounds: Option<[f64; 2]>,
 }
 
-/// A state beyond its range.
+/// A state that left its range.
 #[derive(Serialize)]
 pub(super) struct LoopState {
     name: String,
@@ -187,7 +187,7 @@ impl LoopInput {
 }
 
 impl LoopReport {
-    /// Whether it came to what was promised, in a line.
+    /// A line that tells whether the promises were kept.
     pub(super) fn head(&self) -> String {
         let verdict = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
         let (step, end) = (number(self.step), number(self.end));
@@ -223,6 +223,7 @@ fn watched(c: &FilterConfiguration) -> f64 {
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
     let (mut filter, plant) = (c.build()?, c.plant.build()?);
     let (length, deadlines) = (watched(c), deadlines(c));
+    // The closed loop, finely enough.
     let step = c.experiment.step_size.max(length / MOST_SAMPLES);
     let substeps = (step / INNER_STEP).max(INSTANTS).ceil() as usize;
     let steps = (length / step - 1e-9).ceil() as usize;
@@ -232,10 +233,11 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         schedule: Schedule { step, steps, substeps },
         deadlines: &deadlines,
         delay: c.actuation_delay,
-        // What is lost is not followed for long: steps that cannot be met take the longest.
+        // A lost promise is not followed for long, since steps that cannot be met take the longest.
         until: deadlines.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max),
     };
     let run = effort::run(&mut filter, &setting, |x, u_ref| wanted.write(c, x, u_ref))?;
+    // Findings by barrier, input and state.
     let barriers = c.barrier.iter().zip(&run.barriers).map(|(section, seen)| LoopBarrier {
         name: section.name.clone(),
         promise: seen.judgement.verdict().into(),
@@ -253,7 +255,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         peak,
     });
     let beyond = c.plant.states().into_iter().zip(&run.states).filter_map(|(state, seen)| {
-        // Not a number is beyond everything.
+        // A value that is not a number is beyond every range.
         let within = state.min.is_none_or(|min| seen[0] >= min) && state.max.is_none_or(|max| seen[1] <= max);
         let (seen, range) = (*seen, [state.min, state.max]);
         let finite = seen.iter().all(|x| x.is_finite());
@@ -276,16 +278,16 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
 pub(super) enum Verdict {
     /// The filter meets it in simulation.
     CanBeMet,
-    /// No input within the bounds is inside then.
+    /// No input within the bounds is inside at the deadline.
     CannotBeMet,
     NotKnown,
 }
 
-/// What the input bounds allow from the start.
+/// Deadlines that the input bounds allow from the start.
 #[derive(Serialize)]
 pub(super) struct ReachReport {
     pub(super) deadline: Verdict,
-    /// No input within the bounds is faster, in s.
+    /// Least time in s that any input within the bounds needs.
     soonest_at_least: Option<f64>,
     /// The soonest deadline that this filter meets in simulation, in s.
     soonest_at_most: Option<f64>,
@@ -310,12 +312,12 @@ impl ReachReport {
     }
 }
 
-/// What one candidate needs.
+/// Inputs that one candidate needs.
 #[derive(Serialize)]
 pub(super) struct RatingReport {
     profile: &'static str,
     rate_times_deadline: f64,
-    /// Of the inputs that are accelerations, without bounds on them, in m/s2.
+    /// Largest input among the accelerations, without bounds on them, in m/s2.
     peak: Option<f64>,
     /// The smallest bound on them with which the deadlines are kept, in m/s2.
     smallest_bound: Option<f64>,
@@ -351,7 +353,7 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// What the bounds allow barrier `index`, of that deadline, from `x0`.
+/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),
@@ -369,7 +371,7 @@ pub(super) fn reach(
         Ok::<_, Error>(run(c, &mut filter, (x0, wanted), &deadlines(&tried))?.kept)
     };
     let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
-    // Growing from what is not ruled out: the longest deadlines are the longest runs.
+    // The search grows from a deadline that is not ruled out, since the longest deadlines are the longest runs.
     let mut low = soonest.unwrap_or(0.0).max(1e-3 * deadline);
     let mut most = None;
     while low < horizon {
@@ -395,18 +397,20 @@ fn name(profile: ProfileKind) -> &'static str {
     }
 }
 
-/// A bound in m/s² as it is written in the lines to paste, and so tried: below the peak a little more can be worse.
+/// A bound in m/s² as the lines to paste write it. It is tried so, since below the peak a little more can be
+/// worse.
 fn written(bound: f64) -> f64 {
     (bound * 1e3).ceil() / 1e3
 }
 
-/// What the candidates of [`effort`] need from `x0`: bounds on the inputs that are accelerations; the others
-/// keep theirs.
+/// Rates the candidates of [`effort`] from `x0`, by the bounds on the inputs that are accelerations. The other
+/// inputs keep theirs.
 pub(super) fn ratings(
     c: &FilterConfiguration,
     x0: &[f64],
     wanted: &Wanted,
 ) -> Result<Vec<RatingReport>, Error> {
+    // The configuration of a candidate under a bound.
     let driven: Vec<usize> =
         c.plant.inputs().iter().enumerate().filter(|(_, s)| s.unit == "m/s2").map(|(i, _)| i).collect();
     let configured = |candidate: &Candidate, bound: f64| {
@@ -426,6 +430,7 @@ pub(super) fn ratings(
         }
         tried
     };
+    // Run each candidate.
     let try_out = |candidate: &Candidate, bound: f64| {
         let tried = configured(candidate, bound);
         let mut filter = tried.build()?;
@@ -433,10 +438,11 @@ pub(super) fn ratings(
         Ok::<_, Error>((run.kept, driven.iter().map(|&i| run.peak[i]).fold(0.0, f64::max)))
     };
     let ratings = effort::compare(&CANDIDATES, try_out)?;
+    // Write the lines to paste.
     let lines = |candidate: &Candidate, bound: Option<f64>| {
         let mut lines: Vec<String> = Vec::new();
         for section in &c.barrier {
-            // Without a deadline there is nothing to paste.
+            // A barrier without a deadline has nothing to paste.
             let Some(deadline) = section.deadline else { continue };
             let rate = candidate.rate_times_deadline / deadline;
             let profile = name(candidate.profile);

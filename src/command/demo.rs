@@ -36,8 +36,8 @@ struct Entry<'a> {
     summary: &'a Summary,
 }
 
-/// Runs the demonstration. The exit code is 1 if our method misses a deadline or leaves the disc; the
-/// paper's is shown for comparison and expected to.
+/// Runs the demonstration. The exit code is 1 if our method misses a deadline or leaves the disc. The paper's
+/// method is shown for comparison, and is expected to do so.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! `punctual inspect`: what an FMU offers.
+//! `punctual inspect`: the variables and capabilities of an FMU.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,7 +20,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Everything `inspect` tells, as JSON.
+/// The report on an FMU, as JSON.
 #[derive(Serialize)]
 struct Report<'a> {
     file: String,
@@ -243,7 +243,7 @@ fn variables(d: &Description) -> String {
     output::table(&rows, &[false, true, false, false, false, true, true, true, false])
 }
 
-/// One line for each set of inputs, with the outputs that depend on exactly these.
+/// The dependencies, a line for each set of inputs with the outputs that depend on exactly these.
 fn dependencies(d: &Description) -> String {
     let mut lines: Vec<(String, Vec<&str>)> = Vec::new();
     for output in &d.outputs {

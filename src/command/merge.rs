@@ -32,14 +32,14 @@ pub struct Arguments {
     no_trial: bool,
 }
 
-/// What `merge` tells, as JSON.
+/// The report on a merge, as JSON.
 #[derive(Serialize)]
 struct Told {
     file: String,
     model_name: String,
     guid: String,
     platforms: Vec<Platform>,
-    /// Errors that `validate` finds in the product and in what it was made from.
+    /// Errors that `validate` finds in the product, those of its parts among them.
     errors: usize,
     left_out: Vec<String>,
     not_examined: Vec<String>,

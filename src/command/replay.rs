@@ -28,7 +28,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What `replay` tells, as JSON.
+/// The report on a replay, as JSON.
 #[derive(Serialize)]
 struct Report {
     run: u64,
@@ -48,7 +48,7 @@ struct ValueReport {
     value: f64,
 }
 
-/// A cell of the row that is not as recorded.
+/// A cell of the row that differs from the recorded one.
 #[derive(Serialize)]
 struct Difference {
     column: String,
@@ -63,6 +63,7 @@ struct Difference {
 /// A file that is no campaign's, a run that it does not have, a file that cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let (path, run) = (&arguments.file, arguments.run);
+    // Read the recorded row.
     let (reader, source) = campaign::recorded(path)?;
     let campaign = Campaign::of(source, path, path)?;
     if run >= reader.rows() {
@@ -75,6 +76,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let recorded = reader.group(group, measures.columns())?.into_iter().nth((run % GROUP as u64) as usize);
     let recorded = recorded.ok_or_else(|| Error::configuration("--run", "is not in the file"))?;
 
+    // Measure the run again, and compare.
     let mut simulation = campaign.simulation(&campaign.system().clone().recording(measures.signals()))?;
     let found = measures.run(&campaign, &mut simulation, run);
     let cells = recorded.iter().zip(&found).zip(measures.columns());
@@ -87,7 +89,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         })
         .collect();
 
-    // Once more, with what the system records.
+    // Run once more, and record the signals that the system asks for.
     let choice = campaign.choice(run);
     let mut simulation = campaign.simulation(campaign.system())?;
     campaign.start(&mut simulation, &choice);
@@ -115,6 +117,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         failure: failure.map(|e| e.to_string()),
         files,
     };
+    // Tell, and decide the exit code.
     if arguments.json {
         output::json(&report);
     } else {
@@ -137,7 +140,7 @@ fn values(campaign: &Campaign, choice: &Choice) -> Vec<ValueReport> {
     campaign.varied().iter().zip(&choice.values).map(value).collect()
 }
 
-/// The system's pictures; where it has none, h with its bound for each barrier whose signals are recorded.
+/// The system's pictures. A system without any gets h with its bound for each barrier whose signals are recorded.
 fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<Picture> {
     if !system.pictures().is_empty() {
         return system.pictures().to_vec();

@@ -32,8 +32,8 @@ pub struct Arguments {
     bicycles: bool,
 }
 
-/// Runs the study. The exit code is 1 if our method misses a deadline or leaves the disc; among the bicycles, with the
-/// car.
+/// Runs the study. The exit code is 1 if our method misses a deadline or leaves the disc. Among the bicycles,
+/// only the car counts.
 ///
 /// # Errors
 ///
@@ -49,7 +49,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let options = Options { timed: !arguments.untimed, ..chosen };
     let progress = Mutex::new(Progress::new("reproduce"));
     let tell = |fraction| {
-        // Whoever comes while another one draws has nothing to add.
+        // Another thread is drawing the bar; this one has nothing to add.
         if let Ok(mut progress) = progress.try_lock() {
             progress.show(fraction);
         }

@@ -39,7 +39,7 @@ pub struct Arguments {
     watched: Option<PathBuf>,
 }
 
-/// What a run must come to.
+/// Requirements on a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 #[value(rename_all = "snake_case")]
 enum Requirement {
@@ -63,7 +63,7 @@ impl Requirement {
     }
 }
 
-/// What `run` tells, as JSON.
+/// The report on a run, as JSON.
 #[derive(Serialize)]
 struct Report {
     system: String,
@@ -116,12 +116,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     result
 }
 
-/// Where a watched run leaves its rows.
+/// The file to which a watched run writes its rows.
 fn rows_file(folder: &Path) -> PathBuf {
     folder.join("rows.csv")
 }
 
-/// Runs the system in a child process and tells how that ended.
+/// Runs the system in a child process and tells how the child ended.
 fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     let child = Child::new()?;
     let mut words: Vec<OsString> = vec!["run".into()];
@@ -139,7 +139,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     if let Some(folder) = &arguments.out {
         let (rows, csv) = (rows_file(child.folder()), csv_file(&arguments.system, folder));
-        // Empty where the run had not begun.
+        // The file is empty where the run had not begun.
         if std::fs::metadata(&rows).is_ok_and(|rows| rows.len() > 0) {
             std::fs::copy(&rows, &csv).map_err(|e| Error::io("write", &csv, e))?;
             output::note(&format!("note: what was recorded until then is in {}", csv.display()));
@@ -149,12 +149,12 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     Err(Error::broken(what, how.to_string()))
 }
 
-/// One write for each row, so that no row is lost with the process.
+/// Writes each row at once, so that no row is lost with the process.
 fn stream(rows: &mut Option<File>, write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) {
     let Some(file) = rows else { return };
     let mut line = Vec::new();
     if write(&mut line).and_then(|()| file.write_all(&line)).is_err() {
-        // The run and its own recording go on; only a crash would show less.
+        // The run and its own recording go on. Only a crash would show fewer rows.
         *rows = None;
     }
 }
@@ -167,7 +167,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let mut simulation = Simulation::new(&system, base).map_err(|e| e.in_file(path))?;
 
     if let Some(folder) = &arguments.out {
-        // Before the run, which may be long.
+        // The folder is made before the run, which may be long.
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
 
@@ -207,7 +207,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// The name of a system file without its ending: the head of all names of files written.
+/// The name of a system file without its ending. All files written begin with it.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned())
 }
@@ -216,8 +216,8 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.csv", stem(path)))
 }
 
-/// Writes the CSV file and the `pictures` into `folder`, which exists, under names that begin with `stem`;
-/// returns their paths.
+/// Writes the CSV file and the `pictures` into `folder`, which exists, under names that begin with `stem`.
+/// Returns their paths.
 pub(super) fn write_files(
     pictures: &[Picture],
     stem: &str,
@@ -304,7 +304,7 @@ fn text(report: &Report) -> String {
     text
 }
 
-/// Barriers that have no promise at all.
+/// Barriers without any promise.
 pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
     promises.iter().filter(|p| p.promise == Kept::NothingPromised).map(|p| {
         format!(
@@ -314,7 +314,7 @@ pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = Str
     })
 }
 
-/// A row for each promise and an empty line; nothing without one.
+/// A row for each promise and an empty line; nothing where there is no promise.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
         return String::new();

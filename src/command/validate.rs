@@ -1,4 +1,4 @@
-//! `punctual validate`: what is wrong with an FMU.
+//! `punctual validate`: the defects of an FMU.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -46,7 +46,7 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     }
 }
 
-/// What `validate` tells, as JSON.
+/// The report on an FMU, as JSON.
 #[derive(Serialize)]
 struct Report {
     file: String,

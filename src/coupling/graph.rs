@@ -1,10 +1,10 @@
 //! The order of components within a communication step.
 //!
-//! An output has direct feedthrough if it depends on an input at the same instant. A component
-//! with such an output must run before whoever reads it and after whoever feeds it; all others
-//! keep their outputs until they step, so they run last, in any order. The order is a topological
-//! one of the signals that leave feedthrough outputs. Where these form a cycle, the cycle is cut at
-//! its first component in file order, and the signals into it are read one step late.
+//! An output has direct feedthrough if it depends on an input at the same instant. A component with such an
+//! output must run before each reader of it, and after each component that feeds it. All others keep their
+//! outputs until they step, so they run last, in any order. The order is a topological one of the signals that
+//! leave feedthrough outputs. Where these form a cycle, the cycle is cut at its first component in file order,
+//! and the signals into it are read one step late.
 
 /// A signal between two components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,13 +13,13 @@ pub(super) struct Edge {
     pub(super) from: usize,
     /// The component that reads it.
     pub(super) to: usize,
-    /// Whether an output of `to` depends directly on it. Signals that only act through the state
-    /// are kept undelayed where possible, but never cut a chain of direct ones.
+    /// Whether an output of `to` depends directly on it. Signals that only act through the state are kept
+    /// undelayed where possible, but never cut a chain of direct ones.
     pub(super) direct: bool,
 }
 
-/// The components `members` (positions in file order) so that as few `edges` as possible point
-/// backwards. Edges that touch other components are ignored.
+/// Orders the components `members` (positions in file order) so that as few `edges` as possible point backwards.
+/// Edges that touch other components are ignored.
 pub(super) fn order(members: &[usize], edges: &[Edge]) -> Vec<usize> {
     let mut waiting = members.to_vec();
     let mut order = Vec::with_capacity(members.len());
@@ -37,8 +37,8 @@ pub(super) fn order(members: &[usize], edges: &[Edge]) -> Vec<usize> {
     order
 }
 
-/// The position in `waiting` of the first component of a cycle of direct edges that nothing else
-/// waiting leads into. There is one whenever every component waits for another.
+/// The position in `waiting` of the first component of a cycle of direct edges that nothing else waiting leads
+/// into. Such a cycle exists whenever every component waits for another.
 fn first_of_a_cycle(waiting: &[usize], edges: &[Edge]) -> usize {
     let reached_from = |start: usize| {
         let mut reached = vec![start];

@@ -3,8 +3,8 @@
 /// The greatest number of steps of a run.
 pub(super) const MAX_STEPS: f64 = 1e12;
 
-/// How far, in steps, an experiment may be from a whole number of steps and still count as whole.
-/// The rounding error of (stop − start)/h is below this up to about 10⁹ steps.
+/// Distance, in steps, from a whole number of steps within which an experiment still counts as whole. The
+/// rounding error of (stop − start)/h is below it up to about 10⁹ steps.
 const WHOLE: f64 = 1e-6;
 
 /// Fixed communication points.

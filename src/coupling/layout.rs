@@ -1,4 +1,4 @@
-//! Which signal has which slot, and how slots become recorded rows.
+//! Slots of signals, and the recording of slots as rows.
 
 use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
@@ -6,10 +6,10 @@ use super::system::System;
 use crate::host::{Causality, Description, ScalarType};
 use crate::recording::{Column, Recording};
 
-/// Rows for which room is made before a run; longer recordings grow while running.
+/// Rows reserved before a run; longer recordings grow while running.
 const ROWS_RESERVED: usize = 1 << 17;
 
-/// Which port has which slot.
+/// The slots of the ports.
 #[derive(Default)]
 pub(super) struct Layout {
     pub(super) ports: Vec<Port>,
@@ -21,8 +21,8 @@ impl Layout {
         self.ports.iter().position(|other| *other == port)
     }
 
-    /// Gives slots to the outputs of a component that are connected or `read` and to its
-    /// connected inputs: outputs without feedthrough, outputs with feedthrough, inputs.
+    /// Gives slots to the outputs of a component that are connected or `read`, and to its connected inputs. The
+    /// groups are outputs without feedthrough, outputs with feedthrough, inputs.
     pub(super) fn add(
         &mut self,
         system: &System,
@@ -59,7 +59,7 @@ impl Layout {
         })
     }
 
-    /// What the inputs of a component are computed from.
+    /// The sources of the inputs of a component.
     pub(super) fn sources(&self, component: usize, links: &[Link]) -> Vec<Source> {
         let of_link = |link: &Link| {
             let (input, output) = (self.slot(link.to)?, self.slot(link.from)?);
@@ -69,11 +69,11 @@ impl Layout {
     }
 }
 
-/// Takes a row where one is due.
+/// Records a row where one is due.
 pub(super) struct Recorder<'a> {
     every: u64,
     last: u64,
-    /// The last point a row was due or passed over at.
+    /// The last point at which a row was due or passed over.
     pub(super) reached: u64,
     slots: Vec<usize>,
     row: Vec<f64>,
@@ -83,8 +83,8 @@ pub(super) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Takes `slots` as `columns`, `every` so many of `last` steps and at the last point; only those that it
-    /// is to `keep` are recorded.
+    /// Records `slots` as `columns`, `every` so many of `last` steps and at the last point. They are stored with
+    /// `keep` only; `observer` sees all of them.
     pub(super) fn new(
         columns: &[Column],
         slots: &[usize],
@@ -109,7 +109,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Takes the row of point `k` at `time` (s), if one is due.
+    /// Records the row of point `k` at `time` (s), if one is due.
     pub(super) fn row(&mut self, k: u64, time: f64, values: &[f64]) {
         self.reached = k;
         if !k.is_multiple_of(self.every) && k != self.last {

@@ -7,9 +7,11 @@
 //! 2. the other components: inputs from the latest values; then the row of t_k is recorded;
 //! 3. these components: `doStep(t_k, h)`; then all outputs without feedthrough are read (t_{k+1}).
 //!
-//! So what a feedthrough component computes from the state at t_k acts over [t_k, t_k + h], and no
-//! component sees a state of t_{k+1} before all have reached it. Jacobi order: at t_k all inputs
-//! are set from what was read after the previous step, the row is recorded, all step, all is read.
+//! So the sample that a feedthrough component computes from the state at t_k acts over [t_k, t_k + h]. No
+//! component sees a state of t_{k+1} before all have reached it.
+//!
+//! Jacobi order: at t_k all inputs are set to the values read after the previous step, the row is recorded, all
+//! step, all is read.
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -67,19 +69,18 @@ pub struct Simulation<P = Slave> {
     used: bool,
 }
 
-/// What a run gives.
+/// Result of a run.
 #[derive(Debug)]
 pub struct Outcome {
     /// The rows recorded.
     pub recording: Recording,
-    /// How long it took.
+    /// Numbers of the run.
     pub statistics: Statistics,
-    /// What became of the promises of the filters, in the order of the components.
+    /// The promises of the filters, in the order of the components.
     pub promises: Vec<Promise>,
-    /// What the user should know: signals read late, values that are not finite, warnings.
+    /// Notes for the user: signals read late, values that are not finite, warnings.
     pub notes: Vec<String>,
-    /// The FMI call that ended the run before its stop time, if one did; what was recorded until then
-    /// is kept.
+    /// The FMI call that ended the run before its stop time, if one did. The rows until then are kept.
     pub failure: Option<Error>,
 }
 
@@ -137,8 +138,7 @@ impl Simulation<Slave> {
         Self::with_fmus(system, &fmus)
     }
 
-    /// Instantiates `fmus`, one for each component of `system`, in order; the paths in the system
-    /// are not looked at.
+    /// Instantiates `fmus`, one for each component of `system`, in order. The paths in the system are not used.
     ///
     /// # Errors
     ///
@@ -156,8 +156,8 @@ impl Simulation<Slave> {
 }
 
 impl<P: Participant> Simulation<P> {
-    /// Couples what `participant` makes for each component of `system`, by position; `descriptions` say what
-    /// they offer.
+    /// Couples the participants that `participant` makes for each component of `system`, by position.
+    /// `descriptions` are their model descriptions.
     ///
     /// # Errors
     ///
@@ -174,6 +174,7 @@ impl<P: Participant> Simulation<P> {
         let Network { links, mut starts, recorded, direct, delayed, notes } =
             network::resolve(system, descriptions)?;
 
+        // Give slots to all signals that are recorded, watched or connected.
         let watched = promises::ports(system, descriptions);
         let mut read = recorded.clone();
         read.extend(watched.iter().flat_map(|ports| ports.fields.iter().chain([&ports.status])));
@@ -194,6 +195,7 @@ impl<P: Participant> Simulation<P> {
                 }
             })
             .collect();
+        // Make the participants.
         let mut members = Vec::new();
         for (component, [states, direct, inputs]) in groups.into_iter().enumerate() {
             members.push(Member {
@@ -205,6 +207,7 @@ impl<P: Participant> Simulation<P> {
                 sources: layout.sources(component, &links),
             });
         }
+        // The simulation at its start, with notes that hold for every run.
         let experiment = system.experiment();
         let mut simulation = Self {
             members,
@@ -251,9 +254,8 @@ impl<P: Participant> Simulation<P> {
         &self.grid
     }
 
-    /// Runs from start to stop and records. `observer` gets the time (s) and the values of each
-    /// recorded row, in the order of [`Simulation::columns`]. Can be called again: instances are
-    /// then reset first.
+    /// Runs from start to stop and records. `observer` gets the time (s) and the values of each recorded row, in
+    /// the order of [`Simulation::columns`]. A second call resets the instances first.
     ///
     /// # Errors
     ///
@@ -263,7 +265,7 @@ impl<P: Participant> Simulation<P> {
         self.run_as(true, &mut observer)
     }
 
-    /// As [`Simulation::run`], for observers only: the recording stays empty.
+    /// Runs like [`Simulation::run`], for observers only: the recording stays empty.
     ///
     /// # Errors
     ///
@@ -355,9 +357,10 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Start values, then initialisation mode: outputs and inputs are passed on until nothing
+    /// Sets start values and initialises. In initialization mode, outputs and inputs are passed on until nothing
     /// changes, at most once for each component (enough wherever there is no loop).
     fn initialise(&mut self) -> Result<(), Error> {
+        // Forget the run before; deadlines may have start values.
         self.notes.truncate(self.standing_notes);
         self.reported.fill(false);
         for watched in &mut self.promises {
@@ -371,6 +374,7 @@ impl<P: Participant> Simulation<P> {
             });
             watched.reset(deadline);
         }
+        // Set start values, and go to initialization mode.
         let used = std::mem::replace(&mut self.used, true);
         for member in &mut self.members {
             if used {
@@ -390,6 +394,7 @@ impl<P: Participant> Simulation<P> {
             }
             member.participant.enter_initialization_mode()?;
         }
+        // Pass outputs and inputs on until nothing changes.
         let mut before: Vec<f64> = Vec::new();
         for _ in 0..=self.members.len() {
             for member in &mut self.members {
@@ -411,6 +416,7 @@ impl<P: Participant> Simulation<P> {
             }
             before.clone_from(&self.values);
         }
+        // Go to step mode.
         for member in &mut self.members {
             member.participant.exit_initialization_mode()?;
         }
@@ -420,7 +426,7 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Records point `k` at `time` and looks at the promises there.
+    /// Records point `k` at `time`, and looks at the promises there.
     fn take(&mut self, recorder: &mut Recorder<'_>, k: u64, time: f64) {
         recorder.row(k, time, &self.values);
         self.promises.iter_mut().for_each(|watched| watched.see(time, &self.values));

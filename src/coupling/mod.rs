@@ -1,5 +1,5 @@
-//! Couples FMUs: a system file says which FMUs, how they are wired and for how long; a fixed-step
-//! master runs them and records. Knows FMUs only through [`crate::host`], and steps whatever is a [`Participant`].
+//! Couples FMUs. A system file says which FMUs, how they are wired and for how long; a fixed-step master runs
+//! them and records. Knows FMUs only through [`crate::host`], and steps any [`Participant`].
 
 mod graph;
 mod grid;

@@ -1,5 +1,5 @@
-//! A system file checked against the descriptions of its FMUs: names become positions, and every
-//! error says which field of the file it comes from. Runs nothing.
+//! Resolves a system file against the descriptions of its FMUs. Names become positions, and every error says
+//! which field of the file it comes from. Runs nothing.
 
 use super::graph::{self, Edge};
 use super::system::{Component, Picture, StartValue, System};
@@ -48,7 +48,7 @@ pub(super) struct Network {
     pub(super) direct: Vec<usize>,
     /// Components without, in file order.
     pub(super) delayed: Vec<usize>,
-    /// What the user should know, such as a signal read one step late.
+    /// Notes for the user, such as a signal read one step late.
     pub(super) notes: Vec<String>,
 }
 
@@ -63,8 +63,8 @@ pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<
     Ok(Network { links, starts, recorded, direct, delayed, notes })
 }
 
-/// The connections of `system`, those by name included, checked against the descriptions of its components'
-/// FMUs, one for each, in order. Start values, recordings and pictures are checked too.
+/// Checks the connections of `system`, those by name included, against the descriptions of its components' FMUs,
+/// one for each, in order. Start values, recordings and pictures are checked too.
 ///
 /// # Errors
 ///
@@ -73,11 +73,11 @@ pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>
     resolve(system, descriptions).map(|network| network.links)
 }
 
-/// The variable that `text`, `component.variable`, names; `field` is where it stands.
+/// Resolves `text`, `component.variable`, to a variable; `field` is its place in the file.
 ///
 /// # Errors
 ///
-/// A component or variable that there is not, with those that there are.
+/// A component or variable that does not exist, with those that do.
 pub fn port(system: &System, descriptions: &[&Description], field: &str, text: &str) -> Result<Port, Error> {
     Resolver { system, descriptions }.port(field, text)
 }

@@ -1,21 +1,21 @@
-//! What the master asks of a component: the calls of FMI 2.0 co-simulation, whoever answers them.
+//! The calls of FMI 2.0 co-simulation that the master makes, whoever answers them.
 
 use crate::error::Error;
 use crate::host::Slave;
 
 /// An instance that the master steps: an FMU's, or one of this program's own blocks in process.
 pub trait Participant {
-    /// The instance name: its component's.
+    /// The instance name, which is that of its component.
     fn name(&self) -> &str;
 
-    /// Back to the state after instantiation.
+    /// Goes back to the state after instantiation.
     ///
     /// # Errors
     ///
     /// The call is refused; so for every call below.
     fn reset(&mut self) -> Result<(), Error>;
 
-    /// Says from when to when the run goes, in s.
+    /// Sets start and stop time of the run, in s.
     ///
     /// # Errors
     ///
@@ -36,7 +36,7 @@ pub trait Participant {
     /// As above; also for parameters that contradict each other.
     fn exit_initialization_mode(&mut self) -> Result<(), Error>;
 
-    /// The step from `time` by `step` (s).
+    /// Makes the step from `time` by `step` (s).
     ///
     /// # Errors
     ///
@@ -92,11 +92,11 @@ pub trait Participant {
     /// As above.
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), Error>;
 
-    /// What it had to say in the course of a run that succeeded, if anything.
+    /// The instance's remark on a run that succeeded, if it has one.
     fn remark(&self) -> Option<String>;
 }
 
-/// The calls that a slave answers under the same name.
+/// Passes calls on to a slave, which answers them under the same name.
 macro_rules! calls {
     ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
         fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {

@@ -1,5 +1,5 @@
-//! Where the values of a run live: one vector of doubles, in which every output and every
-//! connected input has a slot; and how they come from and go to instances without allocation.
+//! The values of a run: one vector of doubles, in which every output and every connected input has a slot. They
+//! come from and go to instances without allocation.
 
 use super::participant::Participant;
 use crate::error::Error;
@@ -20,8 +20,8 @@ pub(super) struct Group {
 pub(super) type Position = usize;
 
 impl Group {
-    /// Lays out `variables` (position, value reference, type) from slot `first` on. Returns the
-    /// group and the positions in slot order. Strings are left out.
+    /// Lays out `variables` (position, value reference, type) from slot `first` on. Returns the group and the
+    /// positions in slot order. Strings are left out.
     pub(super) fn new(first: usize, variables: &[(Position, u32, ScalarType)]) -> (Self, Vec<Position>) {
         let of = |wanted: &[ScalarType]| {
             variables.iter().copied().filter(|v| wanted.contains(&v.2)).collect::<Vec<_>>()
@@ -89,7 +89,7 @@ impl Group {
     }
 }
 
-/// What an input slot is computed from.
+/// The source of an input slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Source {
     /// The slot of the input.

@@ -1,8 +1,9 @@
-//! What became of the promises of filters in the course of a run, recorded or not. A filter is known by the names
-//! of its outputs: `status`, and `<barrier>.h` with the others of [`FIELDS`].
+//! Verdicts on the promises of filters in the course of a run, recorded or not. A filter is known by the names of
+//! its outputs: `status`, and `<barrier>.h` with the others of [`FIELDS`].
 //!
-//! A promise is judged by h itself ([`punctual_core::judge`]), at the deadline and at the communication points. Where
-//! a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is of the point before.
+//! A promise is judged by h itself ([`punctual_core::judge`]), at the deadline and at the communication points.
+//! Where a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is that of the point
+//! before.
 
 use punctual_core::filter::{Phase, Status};
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
@@ -14,25 +15,25 @@ use super::network::{self, Link, Port};
 use super::system::{Order, System};
 use crate::host::{Causality, Description};
 
-/// The outputs of a barrier that are looked at.
+/// The outputs of a barrier that are read.
 const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
 
-/// What a promise came to.
+/// Verdicts on a promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
-    /// On time, and inside from then on; always inside where it began inside.
+    /// On time, and inside from then on; from the start on where it began inside.
     Kept,
     /// Late, or left.
     Broken,
-    /// The run ends before it is decided.
+    /// The run ends before the verdict.
     Open,
     /// It began outside and has no deadline.
     NothingPromised,
 }
 
 impl Kept {
-    /// In words.
+    /// The verdict in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Kept => "kept",
@@ -54,12 +55,12 @@ impl From<Verdict> for Kept {
     }
 }
 
-/// What became of one barrier: its promise, which is about h, and its constraint, which is about steps.
+/// Findings on one barrier: its promise, which is about h, and its constraint, which is about steps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Promise {
     /// `component.barrier`.
     pub barrier: String,
-    /// On time and inside, by h itself.
+    /// The verdict by h itself.
     pub promise: Kept,
     /// Whether every sample met the constraint.
     pub constraint_met: bool,
@@ -71,17 +72,17 @@ pub struct Promise {
     pub on_time: bool,
     /// Whether h ≥ 0 held from the deadline on; from the start on where it began inside.
     pub inside: bool,
-    /// When h ≥ 0 held first, in s: between two samples where it was there.
+    /// First time in s with h ≥ 0, between two samples where it lies there.
     pub arrival: Option<f64>,
-    /// When it was known in s that the deadline is missed.
+    /// Time in s at which it became certain that the deadline is missed.
     pub late: Option<f64>,
-    /// When it was left in s, after it had been inside and was to stay so.
+    /// Time in s at which it was left, after it had been inside and was to stay so.
     pub left: Option<f64>,
     /// Least h while it was to be inside.
     pub least_h: Option<f64>,
     /// Samples that did not meet its constraint, or had no valid input to meet it with.
     pub unmet: u64,
-    /// The longest row of them.
+    /// The greatest number of such samples in a row.
     pub longest: u64,
     /// The largest violation of its constraint at one of them, in the unit of its slack; 0 without one.
     pub violation: f64,
@@ -93,7 +94,7 @@ impl Promise {
         self.promise == Kept::Kept && self.constraint_met
     }
 
-    /// Takes what became of h.
+    /// Takes over the judgement on h.
     fn judged(&mut self, seen: &Judgement) {
         self.promise = seen.verdict().into();
         (self.deadline, self.began_inside) = (seen.deadline, seen.began_inside);
@@ -103,7 +104,7 @@ impl Promise {
     }
 }
 
-/// The outputs that tell of a promise, and what is known of it before a run.
+/// The outputs that tell of a promise, and the facts known before a run.
 pub(super) struct Ports {
     /// `component.barrier`.
     name: String,
@@ -113,7 +114,7 @@ pub(super) struct Ports {
     /// The value reference of its deadline, and the value where none is set.
     deadline: Option<(u32, f64)>,
     course: Course,
-    /// Whether h is of the communication point at which it is read.
+    /// Whether h belongs to the communication point at which it is read.
     prompt: bool,
 }
 
@@ -129,7 +130,7 @@ pub(super) struct Watched {
     status: usize,
     rearm: Option<usize>,
     fields: [usize; FIELDS.len()],
-    /// What changes in the course of a run.
+    /// The state that changes in the course of a run.
     run: Run,
 }
 
@@ -137,7 +138,7 @@ pub(super) struct Watched {
 struct Run {
     judge: Judge,
     deadline: Option<f64>,
-    /// Promises that were given up for a new start.
+    /// The judgement before the last re-arming; a broken one stays.
     before: Option<Judgement>,
     rearm: bool,
     started: bool,
@@ -199,8 +200,8 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
     found
 }
 
-/// What nothing feeds of a filter: measured states, and u_ref where none of it is fed. An input with a start value
-/// in the system file is meant to be constant.
+/// Notes on the inputs of a filter that nothing feeds: measured states, and u_ref where none of it is fed. An
+/// input with a start value in the system file is meant to be constant.
 pub(super) fn unfed(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
     let mut notes = Vec::new();
     for (component, (owner, description)) in system.components().iter().zip(descriptions).enumerate() {
@@ -299,7 +300,7 @@ impl Watched {
         }
     }
 
-    /// What became of it until now.
+    /// The promise until now.
     pub(super) fn promise(&self) -> Promise {
         let run = &self.run;
         let mut promise = Promise {
@@ -318,7 +319,7 @@ impl Watched {
             longest: run.longest,
             violation: run.violation,
         };
-        // One that was broken before it was started anew stays so.
+        // A promise that was broken before its new start stays broken.
         let before = run.before.filter(|before| before.verdict() == Verdict::Broken);
         promise.judged(&before.unwrap_or_else(|| run.judge.judgement()));
         promise

@@ -1,5 +1,5 @@
-//! The system file: TOML text to a checked [`System`]. Everything that can be checked without
-//! opening an FMU is checked here; the rest in `network`.
+//! The system file: TOML text to a checked [`System`]. All that can be checked without opening an FMU is checked
+//! here; the rest in `network`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -28,7 +28,7 @@ pub struct System {
     plot: Vec<Picture>,
 }
 
-/// When, in which steps and in which order.
+/// Times, step and order of a run.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
@@ -65,7 +65,7 @@ pub struct Component {
     /// Its FMU, relative to the folder of the system file.
     pub fmu: String,
     /// Whether outputs whose dependencies the FMU does not declare depend on its inputs at the same instant.
-    /// Default true, as the standard says; false for a plant, whose outputs change in steps only.
+    /// Default true, as the standard says; false suits a plant, whose outputs change in steps only.
     #[serde(default = "yes")]
     pub feedthrough: bool,
     /// Start values of parameters and inputs, in the variable's unit.
@@ -140,7 +140,7 @@ pub struct ByName {
     pub components: [String; 2],
 }
 
-/// What is recorded.
+/// The recorded signals.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -259,7 +259,7 @@ pub enum Variant {
     /// All values, linear.
     #[default]
     Linear,
-    /// Linear, without the rare extremes; what is cut off is said in the picture.
+    /// Linear, without the rare extremes; the picture tells what is cut off.
     Clipped,
     /// Logarithm of the absolute values.
     Log,
@@ -316,7 +316,7 @@ impl System {
         self
     }
 
-    /// When, in which steps and in which order.
+    /// Times, step and order of a run.
     pub fn experiment(&self) -> &Experiment {
         &self.experiment
     }
@@ -336,7 +336,7 @@ impl System {
         &self.connect_by_name
     }
 
-    /// What is recorded.
+    /// The recorded signals.
     pub fn record(&self) -> &Record {
         &self.record
     }

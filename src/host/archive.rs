@@ -1,6 +1,6 @@
-//! An `.fmu` file unpacked into a directory of its own, which goes when the value goes. The file may
-//! come from anyone: names and sizes are looked at before a byte is written, and what is written is
-//! counted. Knows the layout of the archive, not the content of its files.
+//! An `.fmu` file unpacked into a directory of its own, which is removed with the value. The file may come from
+//! anyone. So names and sizes are checked before a byte is written, and the bytes written are counted. Knows the
+//! layout of the archive, not the content of its files.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -63,12 +63,12 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// The file cannot be read, is not a zip archive, exceeds one of the limits above, or holds an entry
-    /// that points out of the archive (an absolute name, a drive, a backslash, a `..`), that is there
-    /// twice, or that is neither a file nor a folder. Nothing is written before all of this is known.
+    /// The file cannot be read, is not a zip archive, or exceeds one of the limits above. An entry points out of
+    /// the archive (an absolute name, a drive, a backslash, a `..`), is there twice, or is neither a file nor a
+    /// folder. Nothing is written before all of this is known.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let problem = |problem| Error::fmu(path, problem);
-        // Opened here first: "no such file" is told from "not an archive".
+        // The file is opened here first, to tell "no such file" from "not an archive".
         let mut file = File::open(path).map_err(|e| Error::io("read", path, e))?;
         let metadata = file.metadata().map_err(|e| Error::io("read", path, e))?;
         if !metadata.is_file() {
@@ -114,7 +114,7 @@ impl Archive {
         &self.platforms
     }
 
-    /// Where an entry of this name is.
+    /// The path of an entry of this name.
     pub fn path(&self, entry: &str) -> PathBuf {
         self.directory.path().join(entry)
     }
@@ -141,7 +141,7 @@ impl Archive {
         Ok(text)
     }
 
-    /// Where this platform's shared library should be.
+    /// The expected path of this platform's shared library.
     pub(super) fn library(&self, model_identifier: &str) -> PathBuf {
         let file = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
         self.directory.path().join("binaries").join(super::PLATFORM).join(file)
@@ -168,8 +168,8 @@ fn limit(what: &'static str, value: u64, unit: &'static str, allowed: u64) -> Re
     if value <= allowed { Ok(()) } else { Err(FmuProblem::Limit { what, value, unit, allowed }) }
 }
 
-/// Refuses a file whose end says that it has too many entries, before memory is taken for them. (The
-/// plain form counts in 16 bits; a larger count stands in a record of its own.)
+/// Refuses a file whose end announces too many entries, before memory is taken for them. (The plain form counts
+/// in 16 bits; a larger count stands in a record of its own.)
 fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
     let io = |e: io::Error| FmuProblem::Archive(e.to_string());
     let length = file.seek(SeekFrom::End(0)).map_err(io)?;
@@ -197,7 +197,7 @@ fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
     Ok(())
 }
 
-/// Looks at every entry's name and sizes.
+/// Checks every entry's name and sizes.
 fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<Entry>, FmuProblem> {
     let damaged = |e: zip::result::ZipError| FmuProblem::Archive(chain(&e));
     limit("the archive has", zip.len() as u64, "entries", MAX_ENTRIES)?;
@@ -225,7 +225,7 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
         if file.encrypted() {
             return Err(FmuProblem::Archive(format!("the entry {name:?} is encrypted")));
         }
-        // Two names that are one file where case does not count would overwrite each other there.
+        // Two names that differ in case only would overwrite each other where case does not count.
         if !names.insert(name.to_lowercase()) {
             let text = format!("the entry {name:?} is there twice (upper and lower case apart)");
             return Err(FmuProblem::Archive(text));
@@ -246,7 +246,7 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
     Ok(plan)
 }
 
-/// Writes one entry below `folder`; no more bytes than the archive announced for it.
+/// Writes one entry below `folder`, and no more bytes than the archive announced for it.
 fn unpack(zip: &mut ZipArchive<BufReader<File>>, entry: &Entry, folder: &Path) -> Result<(), FmuProblem> {
     let name = &entry.name;
     let failed = |e: &dyn std::error::Error| FmuProblem::Archive(format!("entry {name:?}: {}", chain(e)));
@@ -258,7 +258,7 @@ fn unpack(zip: &mut ZipArchive<BufReader<File>>, entry: &Entry, folder: &Path) -
         std::fs::create_dir_all(parent).map_err(|e| failed(&e))?;
     }
     let source = zip.by_index(entry.index).map_err(|e| failed(&e))?;
-    // Never over a file that is there already.
+    // An existing file is never overwritten.
     let mut file = File::create_new(&target).map_err(|e| failed(&e))?;
     let written =
         io::copy(&mut source.take(entry.size.saturating_add(1)), &mut file).map_err(|e| failed(&e))?;

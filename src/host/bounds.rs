@@ -1,6 +1,6 @@
-//! How deep, wide and long an XML text may be before a parser that builds a tree gets it, and that it
-//! brings no document type (whose entities can expand without bound). Tells nothing of its meaning:
-//! a text that is no XML passes here and fails in the parser.
+//! Limits on the depth, width and length of an XML text, checked before a parser builds a tree from it. A
+//! document type is refused too, since its entities can expand without bound. Knows nothing of meaning: a text
+//! that is no XML passes here and fails in the parser.
 
 use crate::error::FmuProblem;
 
@@ -72,7 +72,7 @@ fn tag(rest: &[u8]) -> Option<(usize, usize)> {
     }
 }
 
-/// Where `wanted` begins first, from `from` on.
+/// First position of `wanted`, from `from` on.
 fn find(bytes: &[u8], from: usize, wanted: &[u8]) -> Option<usize> {
     let tail = bytes.get(from..)?;
     if let [one] = wanted {
@@ -98,7 +98,7 @@ mod tests {
     fn what_is_within_bounds_passes() {
         let good = "<?xml version=\"1.0\"?><!-- <!DOCTYPE> --><a x='>' y=\"'\"><b/><![CDATA[<!DOCTYPE]]></a>";
         assert!(check(good).is_ok());
-        // Not for this module to judge.
+        // Such texts are not for this module to judge.
         for text in ["", "<", "<a", "<!--", "</a></a>", "<a x=\"", "<?"] {
             assert!(check(text).is_ok(), "{text}");
         }

@@ -1,14 +1,14 @@
-//! A model description as an importer holds it: what declared types give filled in, outputs and what they
-//! depend on as positions of variables.
+//! A model description as an importer holds it: attributes from declared types are filled in, outputs and their
+//! dependencies are positions of variables.
 //!
-//! The file is parsed once. `fmi-rs` reads the tree as the importer of someone else: what it refuses is no
-//! description, and what it finds against the standard is told as a problem. The model itself is read by
-//! `punctual_modeldescription`, from the same tree, because of `fmi-rs` 0.3.4:
+//! The file is parsed once. `fmi-rs` reads the tree as an importer by someone else: a text that it refuses is no
+//! description, and its findings against the standard are told as problems. The model itself is read by
+//! `punctual_modeldescription`, from the same tree, because `fmi-rs` 0.3.4:
 //!
-//! - it keeps the first of the declared types only;
-//! - it reads bounds of declared types as 32-bit numbers;
-//! - it looks for units in an element with a misspelled name, so it finds none;
-//! - it fills in `initial` and so hides what the file says.
+//! - keeps the first of the declared types only;
+//! - reads bounds of declared types as 32-bit numbers;
+//! - looks for units in an element with a misspelled name, so it finds none;
+//! - fills in `initial` and so hides what the file says.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -22,28 +22,28 @@ use roxmltree::{Document, Node};
 
 use crate::error::FmuProblem;
 
-/// An output, and what it depends on at the same communication point.
+/// An output, and its dependencies at the same communication point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     /// Position in [`ModelDescription::variables`].
     pub variable: usize,
-    /// Positions of the variables it depends on; `None` = not said, so every input.
+    /// Positions of the variables it depends on; `None`: not said, so every input.
     pub dependencies: Option<Vec<usize>>,
 }
 
-/// What a co-simulation FMU says of itself: a [`ModelDescription`], and what follows from it.
+/// The description of a co-simulation FMU: a [`ModelDescription`], and what follows from it.
 ///
 /// Variables have the unit and range of their declared type where they have none of their own; a bound or
 /// time that is not a number is absent.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// What it says.
+    /// The model description, as read.
     pub model: ModelDescription,
     /// The start values of the variables, as written.
     pub starts: Vec<Option<String>>,
     /// All outputs, in the order of the variables.
     pub outputs: Vec<Output>,
-    /// Where the description breaks the standard, found by `fmi-rs`; empty for a valid one.
+    /// Violations of the standard, found by `fmi-rs`; empty for a valid description.
     pub problems: Vec<String>,
 }
 
@@ -91,14 +91,15 @@ impl Description {
     }
 }
 
-/// What `fmi-rs` has against it.
+/// The findings of `fmi-rs` against it.
 fn judged(root: Node<'_, '_>) -> Result<Vec<String>, FmuProblem> {
     let read =
         importer::ModelDescription::from_node(&root).map_err(|e| FmuProblem::Description(e.to_string()))?;
     Ok(read.validate().into_iter().map(|problem| problem.message).collect())
 }
 
-/// Gives variables what their declared types say. Of a type that is declared twice the first counts.
+/// Fills in the attributes of variables from their declared types. Of a type that is declared twice the first
+/// counts.
 fn fill_in(model: &mut ModelDescription) {
     let number = |value: Option<f64>| value.filter(|value| !value.is_nan());
     if let Some(experiment) = &mut model.default_experiment {
@@ -191,7 +192,7 @@ mod tests {
         assert_eq!((d.starts[0].as_deref(), d.variables[0].kind.start_number()), (Some("0"), Some(0.0)));
         let stop = &d.items(&d.variables[2])[1];
         assert_eq!((stop.name.as_str(), stop.value), ("stop", 2));
-        // From the second declared type, what the variable does not say itself.
+        // The second declared type gives the attributes that the variable leaves out.
         let l = &d.variables[3].kind;
         assert_eq!((l.unit(), l.range()), (Some("m"), (Some(-4.0), Some(5.0))));
         assert_eq!(d.default_experiment.unwrap().step_size, Some(1e-3));

@@ -1,6 +1,5 @@
-//! A file that always says which call into an FMU was made last, for a process that watches this one:
-//! when an FMU ends its process, nobody else is left to tell. Off unless [`begin`] is called; then each
-//! call costs one small write.
+//! A file that always names the last call into an FMU, for a process that watches this one. When an FMU ends its
+//! process, nobody else is left to tell. Off unless [`begin`] is called; then each call costs one small write.
 
 use std::fmt;
 use std::fs::File;
@@ -12,7 +11,7 @@ use crate::error::brief_time;
 
 /// Bytes of the one record; longer names are cut.
 const RECORD: usize = 512;
-/// What stands in the file when no FMU is called any more.
+/// The content of the file when no FMU is called any more.
 const FINISHED: &str = "finished";
 
 static JOURNAL: OnceLock<File> = OnceLock::new();
@@ -20,7 +19,7 @@ static JOURNAL: OnceLock<File> = OnceLock::new();
 /// The last call that a journal tells of.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LastCall {
-    /// What was called, such as `fmi2DoStep`.
+    /// The function, such as `fmi2DoStep`.
     pub call: String,
     /// The instance, or the empty text before there is one.
     pub instance: String,
@@ -79,12 +78,12 @@ pub fn begin(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Says that no FMU is called any more.
+/// Writes that no FMU is called any more.
 pub fn finish() {
     write(FINISHED, "", "", None);
 }
 
-/// Says which call comes next.
+/// Writes which call comes next.
 #[inline]
 pub fn entering(call: &str, instance: &str, fmu: &Path, time: Option<f64>) {
     if JOURNAL.get().is_some() {
@@ -100,7 +99,7 @@ fn write(call: &str, instance: &str, fmu: &str, time: Option<f64>) {
     let mut record = [b' '; RECORD];
     let length = text.len().min(RECORD);
     record[..length].copy_from_slice(&text.as_bytes()[..length]);
-    // A journal that cannot be written makes the report poorer, not the run.
+    // A failure to write makes the report poorer, not the run.
     let _ = write_at_start(file, &record);
 }
 

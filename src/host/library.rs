@@ -50,9 +50,9 @@ pub(super) struct Library {
     pub(super) functions: Functions,
     /// `fmi2GetString`, which couplings do without.
     pub(super) get_string: Option<fmi2::GetString>,
-    /// What `fmi2GetVersion` answered.
+    /// The answer of `fmi2GetVersion`.
     pub(super) version: String,
-    /// What `fmi2GetTypesPlatform` answered.
+    /// The answer of `fmi2GetTypesPlatform`.
     pub(super) types_platform: String,
     _library: libloading::Library,
 }
@@ -64,8 +64,8 @@ impl std::fmt::Debug for Library {
 }
 
 impl Library {
-    /// Loads the library, resolves every function used and asks for its version. Its undefined
-    /// symbols are resolved now, so that none is missed in mid-run; its own stay its own.
+    /// Loads the library, resolves every function used and asks for its version. Its undefined symbols are
+    /// resolved now, so that none is missed in mid-run. Its own symbols stay its own.
     pub(super) fn load(path: &Path) -> Result<Self, FmuProblem> {
         let library = open(path).map_err(|e| FmuProblem::Load(chain(&e)))?;
         let functions = Functions::resolve(&library)?;
@@ -103,7 +103,7 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
 #[cfg(windows)]
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // What it needs lies beside it (section 2.3), where the system would not look otherwise.
+    // Libraries that it needs lie beside it (section 2.3), where the system would not look otherwise.
     // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
     let library = unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())

@@ -1,5 +1,5 @@
-//! What an FMU says through its logger: the callbacks handed to `fmi2Instantiate`, and the last
-//! messages kept for error texts. Knows nothing of calls and their order.
+//! Log messages of an FMU: the callbacks handed to `fmi2Instantiate`, and the last messages kept for error texts.
+//! Knows nothing of calls and their order.
 
 use std::collections::VecDeque;
 use std::ffi::{CStr, c_char, c_void};
@@ -38,7 +38,7 @@ impl fmt::Display for LogMessage {
 
 type Receive = unsafe extern "C" fn(*const Environment, Text, Status, Text, Text);
 
-/// What `componentEnvironment` points to. `logger.c` reads the first member.
+/// The target of `componentEnvironment`. `logger.c` reads the first member.
 #[repr(C)]
 pub(super) struct Environment {
     receive: Receive,
@@ -85,7 +85,7 @@ impl Logging {
         Rc::as_ptr(&self.callbacks)
     }
 
-    /// Never gives back what the FMU was told of: for an FMU that may still use it.
+    /// Keeps the callbacks for ever, for an FMU that may still use them.
     pub(super) fn leak(&self) {
         std::mem::forget((Rc::clone(&self.environment), Rc::clone(&self.callbacks)));
     }
@@ -126,7 +126,7 @@ unsafe extern "C" fn receive(
     });
 }
 
-/// The text without control characters, which could make a terminal do things; line breaks and tabs stay.
+/// The text without control characters, which could control a terminal; line breaks and tabs stay.
 fn printable(text: &str) -> String {
     let harmless = |c: char| !c.is_control() || c == '\n' || c == '\t';
     text.chars().map(|c| if harmless(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()

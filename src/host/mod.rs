@@ -1,6 +1,6 @@
-//! A host for FMI 2.0 co-simulation FMUs: unpack, describe, load, instantiate, call. The only
-//! module of this crate with unsafe code; everything it offers is safe, as far as the FMU itself
-//! keeps to the standard. Knows nothing of coupling.
+//! A host for FMI 2.0 co-simulation FMUs: unpack, describe, load, instantiate, call. The only module of this
+//! crate with unsafe code. All it offers is safe, as far as the FMU itself keeps to the standard. Knows nothing
+//! of coupling.
 
 mod archive;
 mod bounds;
@@ -33,7 +33,7 @@ use crate::error::{Error, FmuProblem};
 #[derive(Debug)]
 pub struct Fmu {
     description: Description,
-    // Dropped before the archive: the library is unloaded before its file goes.
+    // Dropped before the archive: the library is unloaded before its file is removed.
     library: OnceCell<Library>,
     /// Set once an instance was left in a state in which it may still run: see [`Slave`].
     abandoned: Cell<bool>,
@@ -61,7 +61,7 @@ impl Fmu {
         self.archive.source()
     }
 
-    /// What its model description says.
+    /// Its model description.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -86,7 +86,7 @@ impl Fmu {
         Ok(self.library.get_or_init(|| library))
     }
 
-    /// What `fmi2GetVersion` and `fmi2GetTypesPlatform` answer; loads the library.
+    /// The answers of `fmi2GetVersion` and `fmi2GetTypesPlatform`; loads the library.
     ///
     /// # Errors
     ///
@@ -109,7 +109,7 @@ impl Fmu {
 impl Drop for Fmu {
     fn drop(&mut self) {
         match self.library.take() {
-            // Its code may still be running: it stays loaded.
+            // Its code may still be running, so it stays loaded.
             Some(library) if self.abandoned.get() => std::mem::forget(library),
             Some(library) => {
                 journal::entering("unloading its library", "", self.archive.source(), None);

@@ -1,5 +1,5 @@
-//! One instance of an FMU, as a safe value: every call checked, every failure told with its name,
-//! time, status and the instance's last log messages. No call allocates unless it fails.
+//! One instance of an FMU, as a safe value. Every call is checked, and every failure is told with its name, time,
+//! status and the instance's last log messages. No call allocates unless it fails.
 
 use std::ffi::CString;
 use std::ptr::NonNull;
@@ -12,13 +12,13 @@ use super::logging::{Logging, owned};
 use super::{Fmu, LogMessage, Status, journal};
 use crate::error::{CallFailure, Error};
 
-/// An instance. Freed on drop, unless it returned a status after which the standard forbids that
-/// (fmi2Fatal; fmi2Pending, since its step may still be running; a number that is no status): then it
-/// and its library are left as they are until the process ends.
+/// An instance, freed on drop unless it returned a status after which the standard forbids that: fmi2Fatal;
+/// fmi2Pending, since its step may still be running; a number that is no status. Then it and its library are left
+/// as they are until the process ends.
 pub struct Slave {
     component: NonNull<std::ffi::c_void>,
     name: String,
-    // What the FMU last got as its time, in seconds; for error texts only.
+    // The last time that the FMU got, in seconds; for error texts only.
     time: Option<f64>,
     warnings: u64,
     abandoned: bool,
@@ -34,7 +34,7 @@ impl std::fmt::Debug for Slave {
 }
 
 impl Slave {
-    /// Makes an instance of `fmu`, loading its library if it is the first.
+    /// Makes an instance of `fmu`; the first one loads its library.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl Slave {
         &self.name
     }
 
-    /// How many calls returned `fmi2Warning` (they count as done).
+    /// Number of calls that returned `fmi2Warning` (they count as done).
     pub fn warnings(&self) -> u64 {
         self.warnings
     }

@@ -1,11 +1,11 @@
-//! Where two model descriptions say different things. How they are written does not count: comments, blanks
-//! between elements, the order of attributes, line ends. Nor does when: `generationDateAndTime`.
+//! Differences in meaning between two model descriptions. Their writing does not count: comments, blanks between
+//! elements, the order of attributes, line ends. Nor does the time of writing, `generationDateAndTime`.
 
 use roxmltree::{Attribute, Document, Node};
 
-/// The element that a model description is.
+/// The root element of a model description.
 const ROOT: &str = "fmiModelDescription";
-/// The attribute of the root that two builds of the same may differ in.
+/// The attribute of the root in which two builds of the same model may differ.
 const TIME: &str = "generationDateAndTime";
 /// The most characters of a value that are told.
 const SHOWN: usize = 60;
@@ -23,17 +23,17 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>, String> {
     }
 }
 
-/// What `here` says otherwise than `there`: of the attributes of the model everything, with the GUID first,
-/// else the first thing.
+/// The differences of `here` from `there`: every attribute of the model that differs, with the GUID first. Where
+/// none does, the first difference in the content.
 pub(super) fn of(here: &Document<'_>, there: &Document<'_>) -> Option<String> {
     let (here, there) = (here.root_element(), there.root_element());
     let mut told = attributes(here, there);
-    // The rest is another model's, once this is.
+    // With another GUID, the rest belongs to another model.
     told.sort_by_key(|difference| !difference.starts_with("guid "));
     if told.is_empty() { children(here, there) } else { Some(told.join("; ")) }
 }
 
-/// A value as it is told.
+/// A value as a message shows it.
 fn shown(value: Option<&str>) -> String {
     match value {
         None => "not given".to_owned(),
@@ -51,7 +51,7 @@ fn attributes(here: Node<'_, '_>, there: Node<'_, '_>) -> Vec<String> {
     let all = |a: Attribute<'_, '_>, b: Attribute<'_, '_>| {
         (a.namespace(), a.name(), a.value()) == (b.namespace(), b.name(), b.value())
     };
-    // The usual case, without looking for each.
+    // The usual case: all are equal in their order, and none has to be looked up.
     if here.attributes().len() == there.attributes().len()
         && here.attributes().zip(there.attributes()).all(|(a, b)| all(a, b))
     {
@@ -68,7 +68,7 @@ fn attributes(here: Node<'_, '_>, there: Node<'_, '_>) -> Vec<String> {
     here.attributes().chain(missing).filter_map(different).collect()
 }
 
-/// The first difference of two elements, which may be inside.
+/// The first difference of two elements, or of their content.
 fn element(here: Node<'_, '_>, there: Node<'_, '_>) -> Option<String> {
     let place = || {
         let line = here.document().text_pos_at(here.range().start).row;
@@ -104,7 +104,7 @@ fn children(here: Node<'_, '_>, there: Node<'_, '_>) -> Option<String> {
     (mine != theirs).then(|| format!("{name} has {mine} elements, there {theirs}"))
 }
 
-/// What stands directly in the element besides elements.
+/// The text directly in the element, outside its child elements.
 fn text(node: Node<'_, '_>) -> String {
     let parts = node.children().filter(Node::is_text).filter_map(|part| part.text());
     parts.map(str::trim).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")

@@ -1,11 +1,12 @@
-//! `documentation/index.html` of an FMU: what it does, how to couple it, its variables.
+//! `documentation/index.html` of an FMU: its purpose, its coupling, its variables.
 
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::product::Product;
 use punctual_modeldescription::{ModelDescription, Real, VariableKind};
 
-/// The page.
+/// Writes the page.
 pub(super) fn page(product: &Product, description: &ModelDescription, canonical: &str) -> String {
+    // The rows of variables, and the enumerations.
     let mut rows = String::new();
     for v in &description.variables {
         let (unit, start, range) = match &v.kind {
@@ -46,6 +47,7 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
         enumerations +=
             &format!("<h2>{}: {}</h2>\n<table>\n{items}</table>\n", e.name, escape(&e.description));
     }
+    // The texts for this kind of FMU.
     let use_of = match &product.configuration {
         Configuration::Filter(_) => FILTER,
         Configuration::Plant(_) => PLANT,

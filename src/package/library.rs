@@ -9,8 +9,8 @@ use crate::error::Error;
 /// The environment variable that names the library's file.
 pub const VARIABLE: &str = "PUNCTUAL_FMU_LIBRARY";
 
-/// The shared library: `given` if there is one, else what [`VARIABLE`] names, else the one beside this
-/// executable (an installed `punctual`), in its `deps/` folder (`cargo run`), or in `../lib/`. Of several
+/// Reads the shared library: `given` if there is one, else the one that [`VARIABLE`] names, else the one beside
+/// this executable (an installed `punctual`), in its `deps/` folder (`cargo run`), or in `../lib/`. Of several
 /// the newest is taken, which matters in a build folder only.
 ///
 /// # Errors

@@ -1,8 +1,8 @@
 //! FMUs of the same content, built on different systems, joined to one with the binaries of all.
 //!
-//! A platform's own are the folders `binaries/<platform>/` and, for the platforms that have one, `resources/<platform>/`,
-//! where plug-ins lie. All else must be the same in every FMU: the bytes of each file, and what the model description
-//! says.
+//! Each platform owns the folders `binaries/<platform>/` and `resources/<platform>/`, if it has one, where
+//! plug-ins lie. All else must be the same in every FMU: the bytes of each file, and the content of the model
+//! description.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ pub const MAX_MERGED_BYTES: u64 = 1 << 30;
 
 const MODEL_DESCRIPTION: &str = "modelDescription.xml";
 
-/// What was joined.
+/// Result of a merge.
 #[derive(Clone, Debug)]
 pub struct Merged {
     /// The model's name.
@@ -32,7 +32,7 @@ pub struct Merged {
     pub platforms: Vec<(String, PathBuf)>,
     /// Folders without a file, which the product does not have.
     pub left_out: Vec<String>,
-    /// What `validate` finds in the product.
+    /// Findings of `validate` on the product.
     pub report: Report,
 }
 
@@ -89,21 +89,24 @@ fn group<'a>(entry: &'a str, platforms: &BTreeSet<&str>) -> Option<Group<'a>> {
     (["binaries", "resources"].contains(&root) && platforms.contains(platform)).then_some((root, platform))
 }
 
-/// Joins the FMUs at `paths` and writes the product to `file`, which may be one of them; then examines it as `validate`
-/// does. `limit` is the time of the trial, which there is where this system's platform is among those joined; `None`
-/// leaves it out, and nothing of an FMU is run. The order of `paths` changes no byte of the product.
+/// Joins the FMUs at `paths` and writes the product to `file`, which may be one of them. Then examines it as
+/// `validate` does. `limit` is the time of the trial, which is made where this system's platform is among those
+/// joined. `None` leaves it out, and nothing of an FMU is run. The order of `paths` changes no byte of the
+/// product.
 ///
 /// # Errors
 ///
 /// A file that cannot be read or written; FMUs that differ in more than their platforms, or in one that
 /// both have; a product that does not work. `file` is then as before.
 pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<Merged, Error> {
+    // Open the FMUs.
     let parts = paths.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>()?;
     let Some((first, others)) = parts.split_first() else {
         return Err(Error::configuration("files", "are none, must be at least one"));
     };
     let platforms: BTreeSet<&str> =
         parts.iter().flat_map(|part| part.archive.platforms()).map(String::as_str).collect();
+    // All but the platforms' folders is the same.
     let (model_name, guid) = compare_descriptions(first, others)?;
     if let Some(part) = parts.iter().find(|part| part.archive.platforms().is_empty()) {
         return Err(unfit(part.path(), "there is nothing in its binaries/"));
@@ -112,6 +115,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
         let common = |entry: &str| entry != MODEL_DESCRIPTION && group(entry, &platforms).is_none();
         compare(first, other, "", common)?;
     }
+    // Each platform's folders come from one FMU; others that have them have the same.
     let mut owners: BTreeMap<Group<'_>, &Part> = BTreeMap::new();
     for part in &parts {
         let groups: BTreeSet<_> = part.files.iter().filter_map(|entry| group(entry, &platforms)).collect();
@@ -121,10 +125,12 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
             compare(owner, part, &context, |entry| group(entry, &platforms) == Some(own))?;
         }
     }
-    // Written in another way they say the same; one of them is taken, whatever the order.
+    // The descriptions may be written in different ways, with the same meaning. The least is taken, whatever the
+    // order.
     let descriptions =
         parts.iter().map(|part| part.read(MODEL_DESCRIPTION)).collect::<Result<Vec<_>, _>>()?;
     let description = descriptions.into_iter().min().unwrap_or_default();
+    // Put the product together, within the limit.
     let mut total = description.len() as u64;
     let mut product = written::Archive::new().with_timestamp(super::timestamp()?);
     product.add(MODEL_DESCRIPTION, description).map_err(broken(first.path()))?;
@@ -144,6 +150,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
             product.add(entry, part.read(entry)?).map_err(broken(part.path()))?;
         }
     }
+    // Examine the product, and tell what it lacks.
     let empty = |folder: &&String| {
         let all = parts.iter().flat_map(|part| &part.files);
         folder.ends_with('/') && !all.clone().any(|entry| entry.starts_with(folder.as_str()))
@@ -162,7 +169,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
     })
 }
 
-/// The name and GUID that all descriptions have, if they say the same.
+/// The name and GUID of all descriptions, if their contents agree.
 fn compare_descriptions(first: &Part, others: &[Part]) -> Result<(String, String), Error> {
     let problem = |part: &Part, text| Error::fmu(part.path(), FmuProblem::Description(text));
     let there = difference::parse(&first.description).map_err(|e| problem(first, e))?;
@@ -184,7 +191,7 @@ fn compare_descriptions(first: &Part, others: &[Part]) -> Result<(String, String
     Ok((attribute("modelName"), attribute("guid")))
 }
 
-/// Refuses `other` where one of the files that `belong` is not as in `first`.
+/// Refuses `other` where one of the files that `belong` differs from that in `first`.
 fn compare(first: &Part, other: &Part, context: &str, belong: impl Fn(&str) -> bool) -> Result<(), Error> {
     let name = first.path().display();
     let refuse = |text: String| Err(unfit(other.path(), format!("{context}{text}")));
@@ -222,7 +229,7 @@ fn write(product: &written::Archive, file: &Path, limit: Option<Duration>) -> Re
         let (from, to) = (draft.display().to_string(), file.display().to_string());
         finding.message = finding.message.replace(&from, &to);
     }
-    // What else is wrong was wrong before; these are what joining, or this system's library, may have broken.
+    // Other errors were there before. Only these rules can be broken by joining, or by this system's library.
     let rules = ["archive.readable", "archive.name", "archive.limit", "trial."];
     let fatal = report.findings.iter().find(|finding| {
         finding.severity == Severity::Error && rules.iter().any(|rule| finding.rule.starts_with(rule))

@@ -1,6 +1,6 @@
-//! From a configuration to an `.fmu` file: model description, library, resources, documentation and
-//! icon; from a system to an `.ssp` file; and from FMUs of several systems to one. No compiler is needed; the
-//! same configuration and library give the same bytes.
+//! From a configuration to an `.fmu` file: model description, library, resources, documentation and icon. Also
+//! from a system to an `.ssp` file, and from FMUs of several systems to one. No compiler is needed; the same
+//! configuration and library give the same bytes.
 
 mod difference;
 mod documentation;
@@ -22,7 +22,8 @@ use crate::host::{Fmu, PLATFORM, Slave};
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
 
-/// Reads a configuration file and completes it. A plug-in is tried in a process of its own before it is loaded here.
+/// Reads a configuration file and completes it. A plug-in is tried in a process of its own before it is loaded
+/// here.
 ///
 /// # Errors
 ///
@@ -32,7 +33,7 @@ pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
     plugin::read(path, &loader)
 }
 
-/// What cannot be written, as it is told.
+/// The error that an archive cannot be written.
 fn broken(error: &punctual_modeldescription::Error) -> Error {
     Error::configuration("", error.to_string())
 }
@@ -76,9 +77,8 @@ pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
     Ok(archive)
 }
 
-/// Writes the FMU of `configuration` to `file`, then opens the file as an importer would: reads its
-/// description, loads the library, makes an instance and initialises it. A product that does not work
-/// is removed again.
+/// Writes the FMU of `configuration` to `file`, then opens the file as an importer would: reads its description,
+/// loads the library, makes an instance and initialises it. A product that does not work is removed again.
 ///
 /// # Errors
 ///

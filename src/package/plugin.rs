@@ -1,4 +1,4 @@
-//! Plug-ins of configurations: tried in a child process, where they may crash, before this one loads them.
+//! Plug-ins of configurations. A child process, where they may crash, tries them before this one loads them.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,14 +13,14 @@ use crate::isolation::{self, Child, End, Voice};
 /// The hidden command of the child.
 pub const COMMAND: &str = "try-plugin";
 
-/// The longest that a plug-in may take.
+/// Most time that a plug-in may take.
 const LIMIT: Duration = Duration::from_secs(20);
 
 fn folder(configuration: &Path) -> PathBuf {
     configuration.parent().unwrap_or(Path::new("")).to_owned()
 }
 
-/// Plug-ins beside a configuration file.
+/// The plug-ins beside a configuration file.
 pub(super) struct Tried<'a> {
     configuration: &'a Path,
     folder: PluginFolder,
@@ -39,7 +39,7 @@ impl PluginLoader for Tried<'_> {
             let words = [COMMAND.into(), "--".into(), self.configuration.into(), child.folder().into()];
             child.run(words, Voice::Silent, Some(LIMIT))
         };
-        // What is refused there is refused here with the same words.
+        // A plug-in that the child refuses is refused here with the same words.
         if let End::Broken { how, last } = tried().map_err(|e| e.to_string())? {
             let place = last.map_or_else(String::new, |last| format!(" in {}", last.call));
             let file = plugin_file_name(name);
@@ -55,7 +55,7 @@ pub(super) fn read(path: &Path, loader: &dyn PluginLoader) -> Result<Configurati
     Configuration::parse_with(&text, loader).map_err(|e| Error::from(e).in_file(path))
 }
 
-/// For the child: reads the configuration at `path` with its plug-in, and unloads that again.
+/// Reads, in the child, the configuration at `path` with its plug-in, and unloads that again.
 ///
 /// # Errors
 ///

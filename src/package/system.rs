@@ -16,7 +16,7 @@ use crate::host::{Description, Fmu, Variable, VariableKind};
 /// The parameter set with the start values, in the archive.
 const START_VALUES: &str = "resources/start_values.ssv";
 
-/// What was packed.
+/// Numbers of a package.
 #[derive(Clone, Copy, Debug)]
 pub struct Packed {
     /// Number of components.
@@ -47,9 +47,9 @@ pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
 
 /// The FMUs of a system, each file once.
 struct Store {
-    /// Each with its place in the archive and its bytes.
+    /// The FMUs, each with its place in the archive and its bytes.
     fmus: Vec<(Fmu, String, Vec<u8>)>,
-    /// Which of them each component has.
+    /// The index of the FMU of each component.
     of_component: Vec<usize>,
 }
 
@@ -83,7 +83,7 @@ impl Store {
         Ok(store)
     }
 
-    /// A place in the archive that is no one else's, whose name is also a URI.
+    /// A place in the archive that no other FMU has, with a name that is also a URI.
     fn place(&self, path: &Path) -> String {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
         let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
@@ -103,6 +103,7 @@ impl Store {
 }
 
 fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed), Error> {
+    // Read the FMUs, and resolve the connections.
     let store = Store::open(system, base)?;
     let descriptions: Vec<&Description> =
         (0..system.components().len()).map(|c| store.of(c).0.description()).collect();
@@ -116,8 +117,8 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
             let shown = |v: &usize| {
                 let variable = &description.variables[*v];
                 let port = Port { component: c, variable: *v };
-                // An input that is neither connected nor set keeps the start value of its FMU; some masters
-                // write zero to every input that is a connector.
+                // An input that is neither connected nor set keeps the start value of its FMU, so it is no
+                // connector. Some masters write zero to every input that is one.
                 variable.causality != Causality::Input
                     || component.start.contains_key(&variable.name)
                     || links.iter().any(|link| link.to == port)
@@ -132,6 +133,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
             }
         })
         .collect();
+    // Name the ends of the connections, and write the structure.
     let end = |port: Port| {
         let variable = &descriptions[port.component].variables[port.variable];
         (system.components()[port.component].name.clone(), variable.name.clone())
@@ -162,6 +164,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
         connections: links.len(),
         start_values: parameters.len(),
     };
+    // Pack.
     let broken = |e: punctual_modeldescription::Error| super::broken(&e);
     let mut archive = Archive::new().with_timestamp(super::timestamp()?);
     archive.add("SystemStructure.ssd", structure.to_xml().map_err(broken)?).map_err(broken)?;
@@ -175,15 +178,15 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
     Ok((archive, packed))
 }
 
-/// The enumerations of all components, each once. Where two share a name but not the items, the later one
-/// is named after its component too.
+/// The enumerations of all components, each once. Where two share a name but not the items, the later one is
+/// named after its component too.
 #[derive(Default)]
 struct Enumerations(Vec<SimpleType>);
 
 impl Enumerations {
     /// Declares the type of a variable, which has these items.
     fn declare(&mut self, component: &str, variable: &Variable, items: &[EnumerationItem]) -> String {
-        // What items mean has no place in the format.
+        // The format has no place for the meaning of items.
         let plain = |item: &EnumerationItem| EnumerationItem { description: String::new(), ..item.clone() };
         let items: Vec<_> = items.iter().map(plain).collect();
         let mut name = variable.kind.declared_type().unwrap_or(&variable.name).to_owned();
@@ -198,7 +201,7 @@ impl Enumerations {
     }
 }
 
-/// The connector of a variable that can have one.
+/// The connector of a variable, if it can have one.
 fn connector(
     component: &str,
     description: &Description,

@@ -20,7 +20,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// Where a point lies; NaN where it has no place.
+    /// The place of a point; NaN where it has none.
     pub(super) fn place(&self, x: f64, y: f64) -> Point {
         let [left, top, right, bottom] = self.area;
         (left + self.x.fraction(x) * (right - left), bottom - self.y.fraction(y) * (bottom - top))
@@ -76,8 +76,8 @@ impl Axes {
         });
     }
 
-    /// Draws a curve, cut to the rectangle, broken where a point has no place. Steps are taken
-    /// right from point to point.
+    /// Draws a curve, cut to the rectangle, broken where a point has no place. Steps are taken right from point
+    /// to point.
     pub(super) fn curve(
         &self,
         canvas: &mut Canvas,

@@ -31,7 +31,7 @@ pub(super) const SAFE: [u8; 3] = [0, 158, 115];
 /// A point in pixels.
 pub(super) type Point = (f64, f64);
 
-/// Where a text stands relative to its point.
+/// Position of a text relative to its point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
     /// The point is at the left end, half-way up.

@@ -1,5 +1,5 @@
-//! Curves in a plane with axes of any kind: what the other pictures do not cover. A chart is data; the same
-//! one is drawn as SVG here and by a script in a page.
+//! Curves in a plane with axes of any kind, for pictures that the other kinds do not cover. A chart is data: it
+//! is drawn as SVG here and by a script in a page.
 
 use serde::Serialize;
 
@@ -88,7 +88,7 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// Points along y, as many as in `x`.
     pub y: Vec<f64>,
-    /// How the line is drawn.
+    /// Style of the line.
     pub style: Style,
     /// Position in [`PALETTE`](super::PALETTE).
     pub colour: usize,

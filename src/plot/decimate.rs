@@ -1,11 +1,10 @@
 //! Thinning of long series for drawing. Extremes stay: a spike of one sample is still in the
 //! picture.
 
-/// Which points of a curve to draw: about `limit` of them, rising, the first and the last always.
-/// The curve is given by its `channels` (equally long; x and y of a path, or only the values of a
-/// time series). It is cut into runs of equal length; of each the first point, the last, and in
-/// each channel the least and the greatest value are kept, as is the first that is not finite (it
-/// breaks the line).
+/// Chooses the points of a curve to draw: about `limit` of them, rising, the first and the last always. The curve
+/// is given by its `channels` (equally long; x and y of a path, or only the values of a time series). It is cut
+/// into runs of equal length. Each run keeps its first point, its last, and in each channel the least and the
+/// greatest value. It also keeps its first point that is not finite, which breaks the line.
 pub(super) fn decimate(channels: &[&[f64]], limit: usize) -> Vec<usize> {
     let length = channels.iter().map(|c| c.len()).min().unwrap_or(0);
     if length <= limit.max(2) {

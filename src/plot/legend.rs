@@ -9,7 +9,7 @@ const ROW: f64 = 21.0;
 /// Width of the key in pixels.
 const KEY: f64 = 26.0;
 
-/// What stands before the text of an entry.
+/// The key before the text of an entry.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Line(Pen),
@@ -47,12 +47,12 @@ pub(super) fn draw(canvas: &mut Canvas, entries: &[Entry], at: Point) {
     }
 }
 
-/// A ring.
+/// Draws a ring.
 pub(super) fn start_marker(canvas: &mut Canvas, at: Point, colour: [u8; 3]) {
     canvas.circle(at, 4.5, ([255; 3], 1.0), Pen::solid(colour, 1.8));
 }
 
-/// A diamond with a white rim.
+/// Draws a diamond with a white rim.
 pub(super) fn arrival_marker(canvas: &mut Canvas, at: Point, colour: [u8; 3]) {
     let diamond = |r: f64| [(at.0, at.1 - r), (at.0 + r, at.1), (at.0, at.1 + r), (at.0 - r, at.1)];
     canvas.polygon(&diamond(8.0), [255; 3], 1.0);

@@ -62,7 +62,7 @@ pub struct Path {
     pub y: Vec<f64>,
     /// The point that gets the arrival marker.
     pub arrival: Option<usize>,
-    /// How the line is drawn.
+    /// Style of the line.
     pub style: Style,
 }
 
@@ -105,14 +105,14 @@ pub struct Series {
     pub time: Vec<f64>,
     /// Values in the unit of the axis, as many as times; what is not finite breaks the line.
     pub values: Vec<f64>,
-    /// How the line is drawn.
+    /// Style of the line.
     pub style: Style,
-    /// Position in [`PALETTE`]; default the number of the series. Give a reference and what
-    /// follows it the same.
+    /// Position in [`PALETTE`]; default the number of the series. Give a reference and the signal that follows it
+    /// the same.
     pub colour: Option<usize>,
 }
 
-/// How a line is drawn.
+/// Styles of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -128,9 +128,9 @@ pub enum Style {
 /// A straight line across the picture.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Mark {
-    /// What it is, written beside it; empty for nothing.
+    /// The text beside it; empty for none.
     pub label: String,
-    /// Where it is: seconds for an instant, the unit of the axis for a bound. Finite.
+    /// Position: seconds for an instant, the unit of the axis for a bound. Finite.
     pub at: f64,
 }
 
@@ -151,8 +151,8 @@ pub enum Scale {
     /// Linear, over all values.
     #[default]
     Linear,
-    /// Linear, between these two percentiles (0 to 100) of all values; the picture says so and
-    /// tells the extremes.
+    /// Linear, between these two percentiles (0 to 100) of all values; the picture says so and tells the
+    /// extremes.
     Percentiles(f64, f64),
     /// Linear, between these two values; the picture says so where values lie beyond.
     Fixed(f64, f64),

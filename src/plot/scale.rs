@@ -20,7 +20,7 @@ impl Axis {
         let (mut low, mut high) = if low < high {
             (low, high)
         } else {
-            // A constant: show it in the middle of a range of its own size.
+            // A constant is shown in the middle of a range of its own size.
             let half = if low == 0.0 { 1.0 } else { low.abs() / 2.0 };
             (low - half, low + half)
         };
@@ -48,7 +48,7 @@ impl Axis {
         Self { low: 10_f64.powi(from), high: 10_f64.powi(to), logarithmic: true, ticks }
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end; NaN where it has no place.
+    /// The position of `value`: 0 at the low end, 1 at the high end; NaN where it has no place.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         if self.logarithmic {
             if value == 0.0 {

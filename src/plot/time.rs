@@ -15,7 +15,7 @@ const SINGLE: f64 = 460.0;
 const PANEL: f64 = 290.0;
 /// Room below the last panel, in pixels.
 const BOTTOM: f64 = 58.0;
-/// Decades shown on a logarithmic axis at most.
+/// Most decades shown on a logarithmic axis.
 const DECADES: f64 = 12.0;
 
 /// Height of the sheet for this many panels.
@@ -85,7 +85,7 @@ fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
             continue;
         }
         canvas.line(&[(left, y), (right, y)], dashed);
-        // One label where several would cover one another, as of both bounds on a logarithmic axis.
+        // Only one label is drawn where several would cover one another, as of both bounds on a logarithmic axis.
         if labelled.iter().all(|other| (other - y).abs() > 14.0) {
             let above = if y - top > 18.0 { y - 9.0 } else { y + 10.0 };
             canvas.text(&mark.label, (right - 6.0, above), 12.0, Anchor::Right, MARK);
@@ -115,7 +115,7 @@ fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String
     let bounds = || plot.bounds.iter().map(|mark| mark.at);
     let (low, high) = extent(values()).ok_or("there is no finite value")?;
     let count = ((height / 45.0) as usize).max(2);
-    // An axis over a range and the bounds: its ends are ticks, but bounds stand clear of the frame.
+    // An axis over a range and the bounds. Its ends are ticks, but bounds stand clear of the frame.
     let linear = |(low, high): (f64, f64)| {
         let (from, to) = extent([low, high].into_iter().chain(bounds())).unwrap_or((low, high));
         let axis = Axis::linear(from, to, count, true);
@@ -145,7 +145,7 @@ fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String
         Scale::Logarithmic => {
             let sizes = || values().map(f64::abs).filter(|size| *size > 0.0);
             let high = extent(sizes().chain(bounds().map(f64::abs))).map_or(1.0, |range| range.1);
-            // Passing through zero must not stretch the axis without end.
+            // A signal that passes through zero must not stretch the axis without end.
             let low = percentiles(sizes(), 1.0, 100.0).map_or(0.1, |range| range.0);
             (Axis::logarithmic(low.max(high * 10_f64.powf(-DECADES)), high), None)
         }

@@ -1,4 +1,4 @@
-//! What is compared: constraints with their parameters, and the settings they are run in.
+//! Baselines with their parameters, and our own methods, in the settings they are run in.
 
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
@@ -8,13 +8,14 @@ use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tub
 /// A constraint with its parameters, for relative degree 2.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Baseline {
-    /// The paper's.
+    /// The paper's method: the repeated root.
     RepeatedRoot,
-    /// Ours: the Hermite profile with its default rate, held inputs accounted for, their period known from the start.
+    /// Ours: the Hermite profile with its default rate. Held inputs are accounted for, their period known from
+    /// the start.
     Profile,
-    /// The same, enforced at the samples only.
+    /// Ours, enforced at the samples only.
     ProfilePointwise,
-    /// The profile of least peak.
+    /// Ours with the profile of least peak.
     LowPeak,
     /// Exponential, the same rate (1/s) twice.
     Exponential(f64),
@@ -56,7 +57,7 @@ impl Baseline {
         }
     }
 
-    /// How many numbers have to be chosen.
+    /// Number of parameters that have to be chosen.
     pub fn parameter_count(self) -> usize {
         match self {
             Self::RepeatedRoot | Self::Profile | Self::ProfilePointwise | Self::LowPeak => 0,
@@ -66,8 +67,8 @@ impl Baseline {
         }
     }
 
-    /// Each of the literature's with parameters that are ours: a = 20/T as in our own default where it is a rate
-    /// of errors against a moving bound, 1 for the gains of chains, 1/2 for exponents.
+    /// The baselines of the literature with default parameters, which are ours: a = 20/T as in our own default
+    /// where it is a rate of errors against a moving bound, 1 for the gains of chains, 1/2 for exponents.
     pub fn defaults(deadline: f64) -> [Self; 5] {
         let rate = BarrierSettings::default_rate(deadline, 0.0);
         [
@@ -79,7 +80,7 @@ impl Baseline {
         ]
     }
 
-    /// What [`super::search`] looks through for the same method; nothing where there is nothing to choose.
+    /// The candidates of [`super::search`] for the same method; none where there is nothing to choose.
     pub fn candidates(self) -> Vec<Self> {
         let powers = |from: i32, to: i32| (from..=to).map(|e| 2_f64.powi(e));
         match self {
@@ -88,7 +89,7 @@ impl Baseline {
                 rates.map(Self::Exponential).into()
             }
             Self::HighOrder(_) => {
-                // The order of the two makes no difference.
+                // The order of the two gains makes no difference.
                 let pairs = powers(-2, 5).flat_map(|p| powers(-2, 5).map(move |q| [p, q]));
                 pairs.filter(|[p, q]| p <= q).map(Self::HighOrder).collect()
             }
@@ -145,7 +146,7 @@ impl Baseline {
         builder.sampling(self.sampling(setup.step)).and_then(FilterBuilder::build)
     }
 
-    /// Whether the period between samples is accounted for; `step` is the first, in s.
+    /// The treatment of the period between samples; `step` is the first, in s.
     pub fn sampling(self, step: f64) -> Sampling {
         match self {
             Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(step) },

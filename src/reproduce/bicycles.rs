@@ -1,5 +1,5 @@
-//! How much of the promise survives where the plant is another bicycle than the filter's, and what restores it: the
-//! table of docs/bicycle.md.
+//! The table of docs/bicycle.md: how much of the promise survives where the plant is another bicycle than the
+//! filter's, and what restores it.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{DynPlant, Erased};
@@ -23,7 +23,7 @@ const DEADLINE: f64 = 5.0;
 const ACCELERATION: f64 = 40.0;
 /// Largest rate of the slip or steering angle in rad/s.
 const RATE: f64 = 4.0;
-/// How fast the angle follows what is wanted, which is 0, in 1/s.
+/// Rate in 1/s at which the angle follows its wanted value, which is 0.
 const GAIN: f64 = 2.0;
 
 /// A vehicle.
@@ -38,7 +38,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// It turns on a circle of 3 m; a steering angle of 0.83 rad.
+    /// A car that turns on a circle of 3 m, with a steering angle of 0.83 rad.
     pub const CAR: Self = Self { title: "car", length: 1.5, slip: 0.5 };
     /// The paper's, on a circle of 20 m.
     pub const LONG: Self = Self { title: "paper's, 0.5 rad", length: 10.0, slip: 0.5 };
@@ -58,14 +58,14 @@ impl Size {
     }
 }
 
-/// A model of a bicycle: what a filter believes in, or the plant.
+/// A model of a bicycle, for a filter or for the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// The slip angle turns the heading only.
     Simplified,
-    /// It moves the vehicle sideways too, in proportion.
+    /// The slip angle moves the vehicle sideways too, in proportion.
     SmallSlip,
-    /// Without approximation.
+    /// The bicycle without approximation.
     Kinematic,
 }
 
@@ -94,16 +94,16 @@ impl Model {
     }
 }
 
-/// What a filter is given beside its model.
+/// Settings of a filter that make up for its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Remedy {
     /// Its name in the table.
     pub title: &'static str,
-    /// μ in m.
+    /// Margin μ in m.
     pub margin: f64,
-    /// Of both phases, in 1/s.
+    /// Rate of both phases, in 1/s.
     pub rate: f64,
-    /// Bound on what the model does not know of ḧ, in m/s².
+    /// Bound on the part of ḧ that the model does not know, in m/s².
     pub disturbance: f64,
 }
 
@@ -126,16 +126,16 @@ pub struct Pairing {
     pub size: Size,
     /// The bicycle that the filter believes in.
     pub filter: Model,
-    /// What it is given beside.
+    /// Its settings against the error of the model.
     pub remedy: Remedy,
-    /// The bicycle that it is.
+    /// The bicycle that the plant is.
     pub plant: Model,
     /// Sampling period in s.
     pub step: f64,
 }
 
 impl Pairing {
-    /// Those of the table with steps above `finest` (in s), in its order.
+    /// The pairings of the table with steps above `finest` (in s), in its order.
     fn all(finest: f64) -> Vec<Self> {
         let mut all = Vec::new();
         let steps = [(0.01, &Remedy::ALL[..]), (0.001, &[Remedy::NONE])];
@@ -187,7 +187,8 @@ impl Pairing {
         IntegratedFilter::new(filter, angle).map(FilterLoop::Integrated)
     }
 
-    /// From `x0` until 2T: the outcome, and whether a step before the deadline was not satisfied.
+    /// Runs from `x0` until 2T. Returns the outcome, and whether a step before the deadline did not meet its
+    /// constraint.
     fn run(&self, x0: [f64; 4]) -> Result<(Outcome, bool), punctual_core::Error> {
         let setup = Setup::advised(DEADLINE, self.step);
         let plant = self.plant.plant(self.size, self.filter)?;
@@ -207,7 +208,7 @@ impl Pairing {
         Ok((outcome, unmet))
     }
 
-    /// From each of `starts`.
+    /// Runs from each of `starts`.
     ///
     /// # Errors
     ///
@@ -227,20 +228,20 @@ impl Pairing {
     }
 }
 
-/// What the runs of a pairing came to.
+/// Result of the runs of a pairing.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
-    /// How many there were.
+    /// Number of runs.
     pub runs: usize,
-    /// Inside at a sample up to the deadline.
+    /// Runs that are inside at a sample up to the deadline.
     pub on_time: usize,
-    /// Inside at every sample from the deadline to 2T.
+    /// Runs that are inside at every sample from the deadline to 2T.
     pub inside: usize,
     /// Least h at these samples, in m.
     pub least: f64,
-    /// Runs in which a step before the deadline was not satisfied: what is promised there is nothing.
+    /// Runs in which a step before the deadline did not meet its constraint, so that nothing is promised.
     pub unmet: usize,
-    /// Largest |a| of half of the runs, in m/s².
+    /// Median of the largest |a| of the runs, in m/s².
     pub peak: Option<f64>,
 }
 
@@ -251,8 +252,8 @@ impl Tally {
     }
 }
 
-/// The table, and whether the car was kept by every filter on every plant; `tell` hears of the fraction done, from any
-/// thread.
+/// The table, and whether the car was kept by every filter on every plant. `tell` hears of the fraction done,
+/// from any thread.
 ///
 /// # Errors
 ///

@@ -1,4 +1,5 @@
-//! What the study and the demonstration run: vehicles, barriers, nominal controllers, and the settings of a loop.
+//! The cases of the study and the demonstration: vehicles, barriers, nominal controllers, and the settings of a
+//! loop.
 
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
@@ -68,7 +69,7 @@ impl Vehicle {
         self.signals()[1]
     }
 
-    /// The speed that each input changes, by its place among the states; the input that damps it is its negative.
+    /// The position among the states of the speed that each input changes. The damping input is its negative.
     pub fn damped(self) -> [Option<usize>; 2] {
         match self {
             Self::PointMass => [Some(2), Some(3)],
@@ -148,7 +149,7 @@ pub fn label(signal: &Signal) -> String {
     format!("{symbol} ({})", unit(signal))
 }
 
-/// The form of the barrier; the set is the same.
+/// The forms of the barrier; the set is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// R² − d², in m²: the paper's.
@@ -167,18 +168,18 @@ impl Shape {
     }
 }
 
-/// u_ref.
+/// The choices of u_ref.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nominal {
     /// 0: the paper's.
     Coast,
     /// −v on the accelerations: ours.
     Damping,
-    /// This acceleration (m/s²) away from the disc: the constraint alone leads there, and is active throughout.
+    /// This acceleration (m/s²) away from the disc. The constraint alone leads there, and is active throughout.
     Away(f64),
 }
 
-/// How the plant moves under a held input. Which one the paper uses it does not say.
+/// Integrators of the plant under a held input. The paper does not say which one it uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// x + f dt.
@@ -225,16 +226,16 @@ impl Integrator {
     }
 }
 
-/// What a loop is run with beside vehicle and constraint.
+/// The settings of a loop beside vehicle and constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// The barrier.
     pub shape: Shape,
     /// u_ref.
     pub nominal: Nominal,
-    /// μ in the unit of h.
+    /// Margin μ in the unit of h.
     pub margin: f64,
-    /// T in s.
+    /// Deadline T in s.
     pub deadline: f64,
     /// Sampling period in s.
     pub step: f64,
@@ -242,12 +243,12 @@ pub struct Setup {
     pub end: f64,
     /// Bounds on |u_1| and |u_2|, if any.
     pub bounds: Option<[f64; 2]>,
-    /// How the plant moves.
+    /// The integrator of the plant.
     pub integrator: Integrator,
 }
 
 impl Setup {
-    /// As in the paper: R² − d², u_ref = 0, no margin, until 2T.
+    /// The paper's settings: R² − d², u_ref = 0, no margin, until 2T.
     pub fn paper(deadline: f64, step: f64) -> Self {
         Self {
             shape: Shape::Quadratic,
@@ -261,7 +262,7 @@ impl Setup {
         }
     }
 
-    /// As we advise: the distance-shaped disc, damping, a margin of 0.02 m, until 2T.
+    /// The settings that we advise: the distance-shaped disc, damping, a margin of 0.02 m, until 2T.
     pub fn advised(deadline: f64, step: f64) -> Self {
         Self {
             shape: Shape::Distance,

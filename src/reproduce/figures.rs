@@ -1,4 +1,4 @@
-//! The pictures: the paper's two figures beside ours, and what depends on step and deadline.
+//! The pictures: the paper's two figures beside ours, and the effects of step and deadline.
 
 use rayon::prelude::*;
 
@@ -15,10 +15,10 @@ const POINTS: usize = 800;
 /// Bounds on |u_1| and |u_2| in the pictures of inputs.
 const BOUNDS: [f64; 2] = [8.0, 3.0];
 
-/// Existing method in the pictures: gains and exponent as [`Baseline::defaults`] has them.
+/// Baseline in the pictures: gains and exponent as [`Baseline::defaults`] has them.
 const EXISTING: Baseline = Baseline::FiniteTime([1.0, 1.0], 0.5);
 
-/// The same as [`super::search`] finds it for all three vehicles in the setting that we advise.
+/// The same baseline as [`super::search`] finds it for all three vehicles in the setting that we advise.
 const SEARCHED: Baseline = Baseline::FiniteTime([4.0, 4.0], 0.5);
 
 /// A recorded loop.
@@ -51,7 +51,7 @@ impl Trace {
         self.t.iter().position(|t| *t > at - self.period / 2.0)
     }
 
-    /// Only what is up to its arrival, where it has one.
+    /// The part up to its arrival, if it arrives.
     fn cut_at_arrival(mut self) -> Self {
         if let Some(k) = self.arrival() {
             self.t.truncate(k + 1);
@@ -95,7 +95,7 @@ fn zero() -> Vec<Mark> {
     vec![Mark { label: String::new(), at: 0.0 }]
 }
 
-/// All pictures, and the table of what was fitted to them.
+/// All pictures, and the table of the fits to them.
 ///
 /// # Errors
 ///
@@ -136,7 +136,7 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
     };
     let chart = Chart {
         title: format!("{}: into the disc within {T} s", vehicle.title()),
-        // What does not arrive would shrink everything else to a point.
+        // A trajectory that does not arrive would shrink everything else to a point.
         x: Scaling::linear("x_p (m)").over(-40.0, 70.0),
         y: Scaling::linear("y_p (m)").over(-15.0, 60.0),
         equal: true,
@@ -190,7 +190,7 @@ fn depths(vehicle: Vehicle) -> Result<Figure, Error> {
     })
 }
 
-/// h and the bound it is promised to stay above.
+/// h and its promised lower bound.
 fn profile(vehicle: Vehicle) -> Result<Figure, Error> {
     let x0 = [0.0, 0.0, -10.0, 0.0];
     let trace = Trace::new(vehicle, Baseline::Profile, &Setup::advised(DEADLINE, STEP), x0)?;
@@ -272,11 +272,11 @@ fn phase_portrait() -> Result<Figure, Error> {
         (Baseline::RepeatedRoot, Setup { margin: 0.0, ..Setup::advised(T, STEP) }, 1, Style::Dashed),
     ] {
         for (i, speed) in speeds.into_iter().enumerate() {
-            // Along the line of sight, from the middle of the box.
+            // The velocity lies along the line of sight, from the middle of the box.
             let part = speed / f64::sqrt(2.0);
             let mut trace = Trace::new(Vehicle::PointMass, method, &setup, [10.0, 10.0, part, part])?;
             if method == Baseline::RepeatedRoot {
-                // What follows would hide everything else.
+                // The rest would hide everything else.
                 trace = trace.cut_at_arrival();
             }
             let slope = |k: usize| {
@@ -332,7 +332,7 @@ fn order(x: &[f64], y: &[f64]) -> Option<f64> {
     Some(above / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>())
 }
 
-/// When h passes 0, between samples, less the deadline; none without an arrival.
+/// The time at which h passes 0, between samples, less the deadline; none without an arrival.
 fn lateness(trace: &Trace, deadline: f64) -> Option<f64> {
     let k = trace.arrival()?;
     let (before, after) = (trace.h.get(k.checked_sub(1)?)?, trace.h[k]);
@@ -353,13 +353,14 @@ fn moving(vehicle: Vehicle) -> [f64; 4] {
     }
 }
 
-/// What held inputs cost, against the step.
+/// The cost of held inputs, against the step.
 fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
-    /// u_ref of the second half, in m/s².
+    /// u_ref of the shortfall's runs, in m/s².
     const PUSH: f64 = 5.0;
     /// Period in s from which the order of the margin that compensation adds is fitted.
     const CLEAR: f64 = 5e-3;
     const MARGIN: &str = "margin added (m), order from 5 ms";
+    // The table, and how a row and a curve are made.
     let all = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2];
     let periods: Vec<f64> = all.into_iter().filter(|p| *p >= options.finest).collect();
     let mut table = Table::new(
@@ -380,7 +381,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
                 Some(v) => format!("{v:.2e}").into(),
             }
         };
-        // Below that the margin is a part of h for round-off more than anything.
+        // At smaller periods, round-off is more of the margin than compensation is.
         let from = if what == MARGIN { CLEAR } else { 0.0 };
         let (x, y): (Vec<f64>, Vec<f64>) = periods.iter().zip(values).filter(|(p, _)| **p >= from).unzip();
         let fitted = order(&x, &y).filter(|_| values.iter().all(|v| *v > 0.0));
@@ -403,6 +404,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
         (Baseline::ProfilePointwise, "profile, pointwise", Style::Solid),
         (Baseline::Profile, "profile, compensated", Style::Solid),
     ];
+    // Lateness in the settings of each method.
     let mut late = Vec::new();
     for (i, vehicle) in Vehicle::ALL.into_iter().enumerate() {
         for (method, name, style) in methods {
@@ -422,6 +424,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
             }
         }
     }
+    // Shortfall where the constraint alone leads, and the margin that compensation adds.
     let mut short = Vec::new();
     let origin = |_: Vehicle| [0.0; 4];
     let starts: [(&str, Start); 2] = [("from rest", origin), ("moving", moving)];
@@ -454,6 +457,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
             }
         }
     }
+    // The two pictures.
     let figure = |key: &str, title: &str, label: &str, curves, caption: String| Figure {
         key: key.into(),
         caption,
@@ -488,6 +492,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
 fn deadlines() -> Result<Figure, Error> {
     const PERIOD: f64 = 2e-3;
     let times = [2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0];
+    // The peaks of one method over all deadlines.
     let curve = |label: &str, method, setup: fn(f64, f64) -> Setup, colour, style| {
         let mut y = Vec::new();
         for t in times {

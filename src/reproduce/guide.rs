@@ -6,7 +6,7 @@ use super::{Options, figures, tables, write};
 use crate::error::Error;
 use crate::plot;
 
-/// What the guide's runs are: no random ones, and steps that a test has the time for.
+/// Options of the guide's runs: no random ones, and steps that a test has the time for.
 const OPTIONS: Options = Options { finest: 1e-3, ..Options::QUICK };
 /// The tables of the guide.
 const TABLES: [&str; 2] = ["discretisation", "step_size"];
@@ -23,12 +23,12 @@ const PICTURES: [&str; 9] = [
     "deadlines",
 ];
 
-/// Makes the pictures in `folder`/guide anew, and the tables of `folder`/guide.md: each stands between a line
-/// `<!-- table KEY -->` and a line `<!-- end -->`.
+/// Makes the pictures in `folder`/guide anew, and the tables of `folder`/guide.md. Each table stands between a
+/// line `<!-- table KEY -->` and a line `<!-- end -->`.
 ///
 /// # Errors
 ///
-/// No guide.md in the folder, or a table in it that there is not; a file that cannot be written.
+/// No guide.md in the folder, or a table in it that does not exist; a file that cannot be written.
 pub fn update(folder: &Path) -> Result<(), Error> {
     let path = folder.join("guide.md");
     let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;

@@ -1,8 +1,8 @@
-//! The paper's tables and figures beside ours, and beside the constraints of the literature.
+//! The paper's tables and figures beside ours, and beside the baselines of the literature.
 //!
-//! Tables and figures run in process: the filter of `punctual-core`, a plant that moves by the integrator named, inputs
-//! held between samples. Every number is a pure function of the options but the times. [`demo`] runs its cases through
-//! FMI.
+//! Tables and figures run in process: the filter of `punctual-core`, a plant that moves by the integrator named,
+//! inputs held between samples. Every number except the times is a pure function of the options. [`demo`] runs
+//! its cases through FMI.
 
 pub mod baseline;
 pub mod bicycles;
@@ -27,14 +27,15 @@ use crate::plot::{self, Chart};
 pub use cases::{Setup, Vehicle};
 pub use table::{Cell, Table};
 
-/// How much is run.
+/// The extent of the study.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Options {
     /// Random starts of every table, 1 to 100.
     pub runs: usize,
-    /// Seeds 1 to this number are drawn from.
+    /// Number of seeds drawn from: 1 to this number.
     pub seeds: u64,
-    /// Starts of the search for parameters on its first pass and its second, and how many go on to that.
+    /// Starts of the search for parameters on its first pass and on its second, and the number of candidates that
+    /// reach the second.
     pub search: (usize, usize, usize),
     /// The smallest step in s.
     pub finest: f64,
@@ -43,7 +44,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// The tables of the paper.
+    /// The extent of the paper's tables.
     pub const FULL: Self = Self { runs: 100, seeds: 10, search: (6, 8, 4), finest: 1e-4, timed: true };
     /// A few runs, for a first look and for tests: the same tables, with fewer starts.
     pub const QUICK: Self = Self { runs: 4, seeds: 2, search: (1, 1, 1), finest: 1e-3, timed: true };
@@ -74,16 +75,16 @@ impl<'a> Watch<'a> {
 pub struct Figure {
     /// Its name in files.
     pub key: String,
-    /// What is to be seen, with runs and steps.
+    /// Description of the picture, with runs and steps.
     pub caption: String,
     /// The picture.
     pub chart: Chart,
 }
 
-/// All that the command finds.
+/// Everything that the command finds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// What was run.
+    /// The options of the study.
     pub options: Options,
     /// The tables, the paper's three first.
     pub tables: Vec<Table>,

@@ -1,11 +1,12 @@
-//! The report as one page of HTML: tables, pictures that can be zoomed and read off, nothing from a network.
+//! The report as one page of HTML: tables, and pictures that can be zoomed and read off. It loads nothing from a
+//! network.
 
 use super::table::escape;
 use super::{Figure, Report, Table};
 use crate::error::Error;
 use crate::plot;
 
-/// Draws the charts; by hand, so that a page needs no library.
+/// Draws the charts. It is written by hand, so that a page needs no library.
 const SCRIPT: &str = include_str!("page.js");
 const STYLE: &str = include_str!("page.css");
 
@@ -24,7 +25,7 @@ pub fn document(report: &Report) -> Result<String, Error> {
         .chain(report.figures.iter().map(|f| (f.key.as_str(), f.chart.title.as_str())))
         .map(|(key, title)| format!("<li><a href=\"#{key}\">{}</a></li>\n", escape(title)))
         .collect();
-    // In a script no end tag may be read: `</` cannot stand in JSON but in strings.
+    // A script must not contain an end tag: `</` can stand in JSON within strings only.
     let charts: Vec<_> = report.figures.iter().map(|f| (&f.key, &f.chart)).collect();
     let charts = serde_json::to_string(&charts).unwrap_or_else(|_| "[]".to_owned()).replace("</", "<\\/");
     let palette = serde_json::to_string(&plot::PALETTE).unwrap_or_default();
@@ -52,7 +53,7 @@ fn section(table: &Table) -> String {
     )
 }
 
-/// The picture as SVG, which the script replaces by one to work with.
+/// The picture as SVG, which the script replaces by an interactive one.
 fn figure(figure: &Figure) -> Result<String, Error> {
     let svg = plot::chart(&figure.chart, &figure.key)?;
     Ok(format!(

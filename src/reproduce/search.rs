@@ -1,4 +1,4 @@
-//! The best parameters of a method, for one vehicle and one setting: a grid, then the best of it again.
+//! The best parameters of a method, for one vehicle and one setting: a grid, then its best points again.
 
 use std::cmp::Ordering;
 
@@ -9,12 +9,12 @@ use super::starts::drawn;
 use super::{Options, Setup, Vehicle, Watch, trial};
 use crate::error::Error;
 
-/// Seed of the starts that parameters are chosen on: none of the tables'.
+/// Seed of the starts that parameters are chosen on, which no table uses.
 pub const SEED: u64 = 1000;
 /// Sampling period in s of the first pass; the second has that of the tables.
 pub const COARSE: f64 = 0.005;
 
-/// What counts: how many kept their deadline, how many were on time, then the smaller median peak.
+/// Score of a candidate: the runs that kept their deadline, those on time, then the smaller median peak.
 #[derive(Clone, Copy, Debug)]
 struct Score {
     kept: usize,
@@ -42,13 +42,13 @@ fn score(vehicle: Vehicle, baseline: Baseline, setup: &Setup, starts: &[[f64; 4]
     Ok(Score { kept, on_time, peak: peaks[peaks.len() / 2] })
 }
 
-/// How many loops [`best`] runs, for the progress.
+/// Number of loops that [`best`] runs, for the progress.
 pub fn loops(method: Baseline, options: &Options) -> usize {
     let (coarse, fine, finalists) = options.search;
     method.candidates().len() * coarse + finalists * fine
 }
 
-/// The best parameters of `method`, whatever its own are.
+/// The best parameters of `method`; its own are not used.
 ///
 /// # Errors
 ///

@@ -9,9 +9,9 @@ use crate::output;
 pub enum Cell {
     /// A word.
     Text(String),
-    /// A number, and how many digits people see after the point.
+    /// A number, and the digits that people see after the point.
     Number(f64, usize),
-    /// No number: what people see in its place.
+    /// No number: the text that people see in its place.
     Nothing(&'static str),
 }
 
@@ -21,12 +21,12 @@ impl Cell {
         Self::Number(n as f64, 0)
     }
 
-    /// A number, or what stands for none.
+    /// A number, or the text in its place.
     pub fn optional(value: Option<f64>, digits: usize, nothing: &'static str) -> Self {
         value.filter(|v| v.is_finite()).map_or(Self::Nothing(nothing), |v| Self::Number(v, digits))
     }
 
-    /// As people see it.
+    /// The text that people see.
     pub fn shown(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -36,7 +36,7 @@ impl Cell {
         }
     }
 
-    /// As in a CSV file: numbers in full.
+    /// The text in a CSV file: numbers in full.
     fn plain(&self) -> String {
         match self {
             Self::Text(text) if text.contains([',', '"', '\n']) => {
@@ -88,13 +88,13 @@ pub struct Table {
 }
 
 impl Table {
-    /// Without rows.
+    /// A table without rows.
     pub fn new(key: &'static str, title: &str, header: &[&str]) -> Self {
         let header = header.iter().map(|&head| head.to_owned()).collect();
         Self { key, title: title.to_owned(), notes: Vec::new(), header, rows: Vec::new() }
     }
 
-    /// With one more note.
+    /// The same table with one more note.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
@@ -104,7 +104,7 @@ impl Table {
         self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(..))))
     }
 
-    /// Columns lined up, under the title and its notes.
+    /// The table as text: columns lined up, under the title and its notes.
     pub fn text(&self) -> String {
         let mut rows = vec![self.header.clone()];
         rows.extend(self.rows.iter().map(|row| row.iter().map(Cell::shown).collect()));
@@ -113,14 +113,14 @@ impl Table {
         format!("{}\n{notes}\n{}\n", self.title, output::table(&rows, &right))
     }
 
-    /// A header and rows, numbers in full.
+    /// The table as CSV: a header and rows, numbers in full.
     pub fn csv(&self) -> String {
         let header = self.header.iter().map(|head| Cell::Text(head.clone()).plain()).collect::<Vec<_>>();
         let rows = self.rows.iter().map(|row| row.iter().map(Cell::plain).collect::<Vec<_>>());
         std::iter::once(header).chain(rows).map(|row| row.join(",") + "\n").collect()
     }
 
-    /// A table of Markdown.
+    /// The table in Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | ").replace('\n', " "));
         let rule: Vec<String> = (0..self.header.len())
@@ -135,7 +135,7 @@ impl Table {
         text
     }
 
-    /// A table of HTML.
+    /// The table in HTML.
     pub fn html(&self) -> String {
         let cell = |tag: &str, column: usize, text: &str| {
             let class = if self.is_number(column) { " class=\"n\"" } else { "" };
@@ -151,7 +151,7 @@ impl Table {
     }
 }
 
-/// Text for HTML.
+/// Escapes text for HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -15,7 +15,7 @@ const RANDOM: f64 = 5.0;
 /// Sampling periods at which other seeds are run, in s.
 const SEED_STEP: f64 = 0.01;
 
-/// A method with its parameters in one setting, and what came of it.
+/// A method with its parameters in one setting, and the outcome of its runs.
 struct Row {
     baseline: Baseline,
     origin: &'static str,
@@ -60,7 +60,7 @@ fn fixed(setup: &Setup) -> Vec<Baseline> {
     }
 }
 
-/// How many loops [`all`] runs.
+/// Number of loops that [`all`] runs.
 pub(super) fn loops(options: &Options) -> usize {
     let mut loops = 0;
     for setup in settings() {
@@ -105,7 +105,8 @@ fn methods(options: &Options, watch: &Watch) -> Result<Vec<Row>, Error> {
             }
         }
     }
-    // Alone on the machine, as far as this program can see to it: after all that runs in parallel.
+    // Times are measured after all that runs in parallel: then this program has the machine to itself, as far as
+    // it can see to it.
     if options.timed {
         for row in &mut rows {
             let x0 = starts.first().copied().unwrap_or_default();
@@ -182,7 +183,7 @@ pub(super) fn discretisation(options: &Options) -> Result<Table, Error> {
     Ok(table)
 }
 
-/// On time, and by 1.5 T, of 100, as the paper has them.
+/// Runs on time, and by 1.5 T, of 100, in the paper.
 const PAPER_COUNTS: [[usize; 2]; 3] = [[99, 100], [1, 100], [5, 99]];
 
 /// The runs of a table, in words.
@@ -284,6 +285,7 @@ fn comparison(rows: &[Row], options: &Options) -> Table {
 }
 
 fn every_method(rows: &[Row], options: &Options) -> Table {
+    // The head, and the conditions of the runs.
     let mut table = Table::new(
         "methods",
         "Every method on the same random starts",
@@ -317,6 +319,7 @@ fn every_method(rows: &[Row], options: &Options) -> Table {
         options.search.1,
         search::SEED
     ));
+    // A row for each method, vehicle and setting.
     for row in rows {
         let [earliest, latest] = row.arrivals();
         table.rows.push(vec![

@@ -12,11 +12,11 @@ use crate::error::Error;
 
 /// One sample of a loop.
 pub struct Sample<'a> {
-    /// In s.
+    /// Time in s.
     pub t: f64,
     /// The state.
     pub x: [f64; 4],
-    /// The input wanted.
+    /// The wanted input.
     pub u_ref: [f64; 2],
     /// The input.
     pub u: [f64; 2],
@@ -24,7 +24,7 @@ pub struct Sample<'a> {
     pub report: &'a Report,
 }
 
-/// What a loop came to.
+/// Result of a loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     /// First sample with h ≥ 0, in s.
@@ -45,24 +45,24 @@ pub struct Outcome {
     pub whole_peak: [f64; 2],
     /// Largest ‖u‖ of the whole run.
     pub whole_longest: f64,
-    /// How far h fell below the bound that is promised, up to the deadline, in the unit of h: for ours r + μ
-    /// without what compensation adds to μ.
+    /// Largest fall of h below its promised bound, up to the deadline, in the unit of h. For ours the bound is r
+    /// + μ without the part of μ that compensation adds.
     pub shortfall: f64,
-    /// What compensation adds to the margin, in the unit of h.
+    /// The part of the margin that compensation adds, in the unit of h.
     pub added: f64,
     /// Samples whose constraint was not met.
     pub unmet: usize,
 }
 
-/// What is measured at a sample, whatever runs the loop.
+/// Measurements at a sample, for any kind of loop.
 pub struct Measured {
-    /// In s.
+    /// Time in s.
     pub t: f64,
-    /// In m.
+    /// Position in m.
     pub position: [f64; 2],
     /// The input.
     pub u: [f64; 2],
-    /// In its unit.
+    /// h in its unit.
     pub h: f64,
     /// First sample with h ≥ 0 so far, in s.
     pub arrival: Option<f64>,
@@ -71,7 +71,7 @@ pub struct Measured {
 }
 
 impl Default for Outcome {
-    /// Of no sample.
+    /// The outcome of no sample.
     fn default() -> Self {
         Self {
             arrival: None,
@@ -101,14 +101,14 @@ impl Outcome {
         }
         self.whole_longest = self.whole_longest.max(u[0].hypot(u[1]));
         self.whole_effort += (u[0] * u[0] + u[1] * u[1]) * setup.step;
-        // The arrival's own sample already belongs to what keeps it inside.
+        // The arrival's own sample already belongs to the time inside.
         if before && self.arrival.is_none() {
             (self.peak, self.longest, self.effort) = (self.whole_peak, self.whole_longest, self.whole_effort);
         }
         self.unmet += usize::from(!sample.satisfied);
-        // Half a step early, so that round-off in t cannot skip the sample at the deadline.
+        // Compares half a step early, so that round-off in t cannot skip the sample at the deadline.
         if t > setup.deadline - setup.step / 2.0 {
-            // Not `f64::min`, which drops what is not a number.
+            // Not `f64::min`, which drops a value that is not a number.
             let depth = RADIUS - (position[0] - CENTRE[0]).hypot(position[1] - CENTRE[1]);
             self.least_h = if h < self.least_h || h.is_nan() { h } else { self.least_h };
             self.least_depth =
@@ -181,7 +181,7 @@ pub fn run(vehicle: Vehicle, baseline: Baseline, setup: &Setup, x0: [f64; 4]) ->
     observed(vehicle, baseline, setup, x0, |_| {})
 }
 
-/// Seconds of a filter's step, along the states of the loop from `x0`: the least mean of several passes.
+/// Mean time in s of a filter's step, along the states of the loop from `x0`: the least of several passes.
 ///
 /// # Errors
 ///

@@ -1,18 +1,18 @@
-//! How a finding is told: severity, rule, place, words.
+//! Findings: severity, rule, place, words.
 
 use std::fmt;
 
 use punctual_modeldescription::{self as description, Located, Severity, Violation, brief};
 use serde::{Deserialize, Serialize};
 
-/// Where a finding is.
+/// The place of a finding.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
-    /// The entry of the archive; empty for the archive as a whole, `trial` for what an instance did.
+    /// The entry of the archive; empty for the archive as a whole, `trial` for the behaviour of an instance.
     pub file: String,
     /// The line, from 1, and the column, from 1, in bytes.
     pub position: Option<(u32, u32)>,
-    /// The variable, where it is about one.
+    /// The variable, where the finding is about one.
     pub variable: Option<String>,
 }
 
@@ -29,16 +29,16 @@ impl fmt::Display for Place {
     }
 }
 
-/// Something that is wrong with an FMU.
+/// A defect of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Its severity.
     pub severity: Severity,
     /// The name of one of [`rules`].
     pub rule: String,
-    /// Where it is.
+    /// Its place.
     pub place: Place,
-    /// What is wrong, with the values and those allowed.
+    /// The defect, with the values found and those allowed.
     pub message: String,
 }
 
@@ -57,10 +57,10 @@ impl fmt::Display for Finding {
 
 use Severity::{Error, Warning};
 
-/// A rule: its name, how bad it is to break it, and what it asks.
+/// A rule: its name, the severity of breaking it, and its demand.
 type Rule = (&'static str, Severity, &'static str);
 
-/// The rules on what comes before the description's meaning.
+/// The rules on the archive and the schema, before the description's meaning.
 const BEFORE: &[Rule] = &[
     (
         "archive.readable",
@@ -83,7 +83,7 @@ const BEFORE: &[Rule] = &[
     ("schema.text", Error, "there is no text between elements"),
 ];
 
-/// The rules on libraries and what instances do.
+/// The rules on libraries and the behaviour of instances.
 const AFTER: &[Rule] = &[
     ("symbols.readable", Error, "libraries are of the format and processor of their folder"),
     ("symbols.missing", Error, "libraries export every function of FMI 2.0 co-simulation"),
@@ -100,13 +100,12 @@ const AFTER: &[Rule] = &[
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
 
-/// Every rule: its name, how bad it is to break it, and what it asks. A rule's name never changes its
-/// meaning.
+/// Every rule: its name, the severity of breaking it, and its demand. A rule's name never changes its meaning.
 pub fn rules() -> impl Iterator<Item = &'static (&'static str, Severity, &'static str)> {
     BEFORE.iter().chain(description::RULES).chain(AFTER)
 }
 
-/// How bad it is to break a rule. One that is not among [`rules`] counts as an error.
+/// The severity of breaking a rule. A rule that is not among [`rules`] counts as an error.
 pub(super) fn severity(rule: &str) -> Severity {
     rules().find(|known| known.0 == rule).map_or(Error, |known| known.1)
 }
@@ -129,14 +128,14 @@ pub(super) const DESCRIPTION: &str = "modelDescription.xml";
 /// Findings while they are collected.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// Where the lines of the model description begin, in bytes.
+    /// The beginnings of the lines of the model description, in bytes.
     lines: Vec<usize>,
     list: Vec<Finding>,
     left_out: Vec<(String, usize)>,
 }
 
 impl Findings {
-    /// Takes the text that marks are in.
+    /// Takes the text of the model description, in which marks stand.
     pub(super) fn read(&mut self, text: &str) {
         let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         self.lines = std::iter::once(0).chain(breaks.map(|(at, _)| at + 1)).collect();
@@ -187,12 +186,12 @@ impl Findings {
         }
     }
 
-    /// Whether a rule whose name begins so is broken.
+    /// Whether a rule is broken whose name begins with `head`.
     pub(super) fn any(&self, head: &str) -> bool {
         self.list.iter().any(|finding| finding.severity == Error && finding.rule.starts_with(head))
     }
 
-    /// All findings; where some were left out, the last of their rule says how many.
+    /// All findings. Where some were left out, the last of their rule says how many.
     pub(super) fn finish(mut self) -> Vec<Finding> {
         for (rule, count) in self.left_out {
             if let Some(last) = self.list.iter_mut().rev().find(|finding| finding.rule == rule) {

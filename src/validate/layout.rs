@@ -1,11 +1,11 @@
-//! Which entries the archive must and may have (FMI 2.0.4, section 2.3).
+//! Rules on the entries of the archive (FMI 2.0.4, section 2.3).
 
 use punctual_modeldescription::Located;
 
 use super::finding::Findings;
 use crate::host::{Archive, PLATFORM};
 
-/// What may stand at the top of the archive.
+/// Entries allowed at the top of the archive.
 const TOP: [&str; 8] = [
     "modelDescription.xml",
     "model.png",
@@ -27,6 +27,7 @@ pub(super) fn ending(platform: &str) -> Option<&'static str> {
 }
 
 pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
+    // Entries at the top.
     let mut odd: Vec<&str> = archive.entries().iter().filter_map(|entry| entry.split('/').next()).collect();
     odd.retain(|top| !TOP.contains(top));
     odd.sort_unstable();
@@ -35,6 +36,7 @@ pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings)
         let message = format!("{top:?} at the top of the archive; the standard has {}", TOP.join(", "));
         findings.archive("archive.top-folder", top, message);
     }
+    // The library of each platform.
     let Some(identifier) = model.model_identifier() else { return };
     let mut libraries = 0;
     for platform in archive.platforms() {
@@ -58,6 +60,7 @@ pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings)
         );
         findings.archive("archive.binary", &folder, message);
     }
+    // Something to run, and a library for this platform.
     let sources = !model.description.co_simulation.source_files.is_empty()
         || archive.entries().iter().any(|entry| entry.starts_with("sources/") && !entry.ends_with('/'));
     if libraries == 0 && !sources && !findings.any("archive.binary") {

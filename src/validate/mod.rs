@@ -1,5 +1,5 @@
-//! What is wrong with an FMI 2.0 co-simulation FMU, ours or another's, as a list of findings. Each
-//! module asks one kind of question and uses only those above it:
+//! Defects of an FMI 2.0 co-simulation FMU, ours or another's, as a list of findings. Each module asks one kind
+//! of question and uses only those above it:
 //!
 //! | module | asks |
 //! |---|---|
@@ -9,8 +9,8 @@
 //! | `symbols` | whether the libraries export what they must, without loading them |
 //! | `trial` | whether an instance does what it should, in a child process |
 //!
-//! What the standard says of a description beyond the schema is asked by `punctual_modeldescription`, of the
-//! same model and with the same rules as where a description is written.
+//! The rules of the standard on a description beyond the schema are those of `punctual_modeldescription`, for the
+//! same model as where a description is written.
 
 mod finding;
 mod layout;
@@ -29,12 +29,12 @@ use crate::host::Archive;
 use finding::Findings;
 use punctual_modeldescription::Located;
 
-/// What was found in one FMU.
+/// Findings on one FMU.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// All findings: those of the archive first, then of the description from top to bottom.
     pub findings: Vec<Finding>,
-    /// What was not looked at, and why.
+    /// Checks that were not made, each with the reason.
     pub skipped: Vec<String>,
 }
 
@@ -45,13 +45,12 @@ impl Report {
     }
 }
 
-/// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of
-/// the FMU is run.
+/// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of the FMU is
+/// run.
 ///
 /// # Errors
 ///
-/// The file cannot be read, or the trial's process cannot be started. Whatever is wrong with the FMU
-/// is a finding.
+/// The file cannot be read, or the trial's process cannot be started. Any defect of the FMU is a finding.
 pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
@@ -89,7 +88,7 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     Ok(Report { findings: findings.finish(), skipped })
 }
 
-/// The rule that an FMU breaks which cannot be opened at all.
+/// The rule that is broken by an FMU which cannot be opened at all.
 fn rule(problem: &FmuProblem) -> &'static str {
     match problem {
         FmuProblem::UnsafeEntry(_) => "archive.name",

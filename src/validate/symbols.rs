@@ -1,5 +1,5 @@
-//! Whether libraries export what FMI 2.0 co-simulation needs: read from their files, so that nothing of
-//! them runs and those of other platforms can be looked at too.
+//! Checks that libraries export the functions that FMI 2.0 co-simulation needs. It reads their files, so that
+//! nothing of them runs, and those of other platforms can be checked too.
 
 use std::collections::HashSet;
 
@@ -57,7 +57,7 @@ fn library(archive: &Archive, platform: &str, entry: &str, findings: &mut Findin
     }
 }
 
-/// The names that a library exports, if it is one for the platform; else what is wrong with it.
+/// The names that a library exports, if it is one for the platform; else its defect.
 fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
     if is_fat(bytes) && platform.starts_with("darwin") {
         return fat_exports(bytes);
@@ -92,7 +92,7 @@ fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
         if file.format() == BinaryFormat::MachO { name.trim_start_matches('_').to_owned() } else { name }
     };
     if file.format() == BinaryFormat::Elf {
-        // Only these are found by a loader.
+        // A loader finds only these.
         let defined = file.dynamic_symbols().filter(|symbol| symbol.is_definition() && symbol.is_global());
         return Ok(defined.filter_map(|symbol| symbol.name_bytes().ok().map(text)).collect());
     }
@@ -100,7 +100,7 @@ fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
     let exports = file.exports().map_err(damaged)?;
     let mut names = HashSet::new();
     for export in exports {
-        // Those without a name cannot be asked for by one.
+        // An export without a name cannot be asked for by one.
         if let NameOrOrdinal::Name(name) = export.map_err(damaged)?.name() {
             names.insert(text(name));
         }
@@ -117,7 +117,7 @@ fn fat_exports(bytes: &[u8]) -> Result<HashSet<String>, String> {
     use object::read::macho::{FatArch, MachOFatFile32};
     let damaged = |e: object::Error| format!("is not a shared library: {e}");
     let fat = MachOFatFile32::parse(bytes).map_err(damaged)?;
-    // Every part must export everything: what is common to all.
+    // Every part must export everything, so the common names count.
     let mut common: Option<HashSet<String>> = None;
     for part in fat.arches() {
         let data = part.data(bytes).map_err(damaged)?;

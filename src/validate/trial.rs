@@ -1,5 +1,5 @@
-//! Whether an instance does what it should: `run` starts this program again, [`perform`] is what it
-//! does there. The FMU runs only there, so that its crash, hang or `exit()` is a finding.
+//! Trial of an FMU: `run` starts this program again, and [`perform`] does the trial there. The FMU runs only
+//! there, so that its crash, hang or `exit()` is a finding.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -19,16 +19,17 @@ use crate::isolation::{self, Child, End, Voice};
 
 /// The name of the trial's instance.
 const INSTANCE: &str = "trial";
-/// What findings name as their file.
+/// The file that findings name.
 const PLACE: &str = "trial";
 /// The greatest number of steps of one pass.
 const STEPS: u32 = 10;
-/// The step where the FMU suggests none, in seconds.
+/// The step in seconds where the FMU suggests none.
 const STEP: f64 = 0.01;
-/// How far a real value may be from its start value, relative to its size: other ways to read decimals.
+/// Relative difference of a real value from its start value that is allowed, since decimals can be read in other
+/// ways.
 const CLOSE: f64 = 1e-12;
 
-/// Why there can be no trial, if so.
+/// The reason why there can be no trial, if there is one.
 pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Findings) -> Option<String> {
     for (head, reason) in [
         ("schema.", "the description breaks the schema"),
@@ -53,7 +54,7 @@ pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Resu
     let child = Child::new()?;
     let words = ["trial".into(), "--".into(), path.into(), child.folder().into()];
     let end = child.run(words, Voice::Silent, Some(limit))?;
-    // What it told before its end. A line cut off by a crash is no finding.
+    // Findings that the child wrote before its end. A line cut off by a crash is no finding.
     let told = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
     for finding in told.lines().filter_map(|line| serde_json::from_str(line).ok()) {
         findings.push(finding);
@@ -88,7 +89,7 @@ fn findings_file(folder: &Path) -> PathBuf {
     folder.join("findings.jsonl")
 }
 
-/// Tries the FMU at `path` in this process. What it finds goes into files in `folder`, at once.
+/// Tries the FMU at `path` in this process. Its findings go into files in `folder`, at once.
 ///
 /// # Errors
 ///
@@ -112,7 +113,7 @@ pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
 
 struct Trial {
     file: File,
-    /// Rule and variable of what was told: the same at every step teaches nothing.
+    /// Rule and variable of the findings told: the same finding at every step teaches nothing.
     told: HashSet<(&'static str, Option<String>)>,
 }
 
@@ -124,7 +125,7 @@ impl Trial {
         let severity = severity(rule);
         let place = Place { file: PLACE.to_owned(), position: None, variable: variable.map(str::to_owned) };
         let finding = Finding { severity, rule: rule.to_owned(), place, message: message.to_owned() };
-        // The watching process will say that this one left nothing, if so.
+        // The watching process tells that this one left nothing, if so.
         let _ = serde_json::to_string(&finding).map(|line| self.file.write_all((line + "\n").as_bytes()));
     }
 
@@ -190,7 +191,7 @@ impl Trial {
         Ok(last)
     }
 
-    /// Reads every output; looks at the Real ones.
+    /// Reads every output, and checks the Real ones.
     fn outputs(&mut self, slave: &mut Slave, variables: &[Variable]) -> Result<Vec<(String, f64)>, Error> {
         let mut values = Vec::new();
         for v in variables.iter().filter(|v| v.causality == Causality::Output) {
@@ -278,7 +279,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// The suggested one, cut short.
+    /// The suggested experiment, cut short.
     fn of(fmu: &Fmu) -> Self {
         let suggested = fmu.description().default_experiment.unwrap_or_default();
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());

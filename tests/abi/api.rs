@@ -36,8 +36,8 @@ pub(crate) fn callbacks(logger: FixedLogger, environment: *mut c_void) -> Callba
 
 macro_rules! api {
     ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
-        /// The functions. They are declared safe so that tests read as tests: each keeps the contract
-        /// of the standard, or breaks it only where the library promises to survive.
+        /// The functions. They are declared safe so that tests read as tests. Each keeps the contract of the
+        /// standard, or breaks it only where the library promises to survive.
         pub(crate) struct Api {
             $(pub(crate) $field: extern "C" fn($($argument),*) -> $result,)*
             _library: libloading::Library,
@@ -64,7 +64,7 @@ macro_rules! api {
 
 punctual_modeldescription::fmi2_functions!(api);
 
-/// Where cargo puts the library of the tested build: beside the test's executable.
+/// The path where cargo puts the library of the tested build: beside the test's executable.
 pub(crate) fn library_path() -> PathBuf {
     let name = format!("{}punctual_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     std::env::current_exe().expect("the path of this test").with_file_name(name)

@@ -1,4 +1,4 @@
-//! Directional derivatives: against central differences of what is read, and what is refused.
+//! Directional derivatives: against central differences of the outputs read, and those that are refused.
 
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
@@ -12,7 +12,7 @@ use crate::slave::Slave;
 /// Step of the differences, in units of inputs of order 1 to 10.
 const STEP: f64 = 1e-4;
 
-/// Of a derivative of size 1: outputs are known to 1e-9 of numbers up to 100, which STEP divides.
+/// Tolerance of a derivative of size 1: outputs are known to 1e-9 of numbers up to 100, which STEP divides.
 const TOLERANCE: f64 = 1e-3;
 
 /// A unicycle with an obstacle that is an input, tight bounds and a second barrier.
@@ -78,8 +78,8 @@ fn get(slave: &Slave, references: &[u32]) -> Vec<f64> {
     values
 }
 
-/// Every real output by every real input, each seed alone, against differences of what is read. Leaves the
-/// inputs at `values`.
+/// Compares every real output by every real input, each seed alone, with differences of the outputs read. Leaves
+/// the inputs at `values`.
 fn compare(slave: &Slave, values: &[f64], when: &str) {
     let (inputs, outputs) = (reals(slave.fmu, Causality::Input), reals(slave.fmu, Causality::Output));
     for (i, input) in inputs.iter().enumerate() {
@@ -135,11 +135,11 @@ fn of_a_filter_in_every_mode_that_has_them() {
         slave.set_flag("rearm", true);
         compare(&slave, values, "with a re-arming that is due");
         slave.set_flag("rearm", false);
-        // Wanted beyond the bounds.
+        // The wanted input is beyond the bounds.
         let mut far = values.to_vec();
         *far.last_mut().unwrap() = 90.0;
         compare(&slave, &far, "with a bound that holds");
-        // An input that is none: u is a constant.
+        // An input that is not a number makes u a constant.
         far[0] = f64::NAN;
         set(&slave, &inputs, &far);
         let outputs = reals(&fmu, Causality::Output);
@@ -167,7 +167,7 @@ fn of_a_controller() {
         let fmu = Fmu::new(text);
         let slave = Slave::ready(&fmu);
         compare(&slave, values, text);
-        // Where there is no value there is no derivative.
+        // An output without a value has no derivative.
         let (inputs, outputs) = (reals(&fmu, Causality::Input), reals(&fmu, Causality::Output));
         if text == HEADING {
             slave.set("x.x_p", f64::NAN);
@@ -218,7 +218,7 @@ fn what_cannot_be_asked() {
     }
     assert!(before == slave.now());
 
-    // None is fine, and NULL then; nothing known means no change.
+    // No unknowns are allowed, with NULL then. No knowns mean no change.
     let c = slave.component;
     slave.ok((API.directional_derivative)(c, null(), 0, null(), 0, null(), null_mut()));
     slave.ok((API.directional_derivative)(c, null(), 0, &x, 1, &1.0, null_mut()));

@@ -13,11 +13,11 @@ use crate::api::{API, ERROR, library_path};
 fn all_34_functions_resolve() {
     let unique: BTreeSet<_> = FUNCTIONS.iter().collect();
     assert_eq!(unique.len(), 34, "{FUNCTIONS:?}");
-    // Loading resolves each.
+    // Loading resolves each symbol.
     let _ = &*API;
 }
 
-/// What a tool of binutils says of the library.
+/// Output of a tool of binutils on the library.
 fn told(tool: &str, arguments: &[&str]) -> String {
     match Command::new(tool).args(arguments).arg(library_path()).output() {
         Ok(output) if output.status.success() => String::from_utf8(output.stdout).unwrap(),

@@ -1,5 +1,5 @@
-//! A filter that is given the derivatives, by a simulator that computes them: the bits of the filter that has the
-//! model.
+//! A filter that is given the derivatives by a simulator that computes them: it gives the bits of the filter that
+//! has the model.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
@@ -88,7 +88,7 @@ fn what_is_no_number_is_an_invalid_input() {
     }
     slave.set_inputs(&good);
     assert_eq!((slave.integer("status"), slave.real("u.u_x")), (1, before));
-    // No input changes h: the constraint cannot be met, and that is said.
+    // No input changes h. So the constraint cannot be met, and the filter says so.
     slave.set_inputs(&[-30.0, 3.0, -0.5, 0.0, 0.0, -1.0, 1.0]);
     assert_eq!(slave.integer("status"), 3, "no_authority");
 }

@@ -18,7 +18,7 @@ radius = 2.0
 deadline = 10.0
 "#;
 
-/// The same for a plant that is not known: its derivatives are inputs.
+/// The same filter for a plant that is not known: its derivatives are inputs.
 pub(crate) const EXTERNAL: &str = r#"
 kind = "filter"
 bounds = { u_x = [-50.0, 50.0], u_y = [-40.0, 40.0] }

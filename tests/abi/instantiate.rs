@@ -1,4 +1,4 @@
-//! `fmi2Instantiate`: what is refused with which message, and names and paths of every kind.
+//! `fmi2Instantiate`: refusals with their messages, and names and paths of every kind.
 
 use std::ffi::{CString, c_int};
 use std::ptr::{null, null_mut};
@@ -40,7 +40,7 @@ impl Arguments {
         let callbacks = log.callbacks();
         let component = self.instantiate(&raw const callbacks);
         assert!(component.is_null());
-        // Without callbacks, and without a logger, there is nobody to tell, and still no crash.
+        // Without callbacks, or without a logger, there is nobody to tell, and still no crash.
         assert!(self.instantiate(null()).is_null());
         let silent = Callbacks { logger: None, ..callbacks };
         assert!(self.instantiate(&raw const silent).is_null());
@@ -244,7 +244,7 @@ fn resources_are_not_needed_after_instantiation() {
     slave.step(0.0, 0.1);
 }
 
-/// Only `resources/` and `binaries/` are sure to be extracted, and what lies beside them is not ours.
+/// Only `resources/` and `binaries/` are sure to be extracted, and files beside them are not ours.
 #[test]
 fn the_model_description_beside_the_resources_is_never_read() {
     let fmu = Fmu::new(FILTER);

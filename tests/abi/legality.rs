@@ -11,7 +11,8 @@ use crate::slave::Slave;
 
 const MODES: [Mode; 4] = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED];
 
-/// A function, the call it is in the table (`None`: legal in every mode), and what it answers where legal: OK, or what its capability flag or meaning says.
+/// A function, its call in the table (`None`: legal in every mode), and its answer where legal: OK, or as its
+/// capability flag or meaning says.
 type Function = (&'static str, Option<Call>, fn(&Slave) -> c_int, c_int);
 
 /// Each function with arguments that are right for either FMU in every mode that allows it; reference 0
@@ -111,7 +112,7 @@ fn into_mode(fmu: &Fmu, mode: Mode) -> Slave<'_> {
     slave
 }
 
-/// Goes on from `mode` by the calls that only this mode allows, to a step; returns what is seen there.
+/// Goes on from `mode` by the calls that only this mode allows, to a step; returns all that was seen there.
 fn finish(slave: &Slave, mode: Mode) -> Vec<String> {
     let c = slave.component;
     if mode == Mode::TERMINATED {
@@ -216,7 +217,7 @@ fn setup_experiment_refuses_times_that_are_none() {
     assert_eq!(message, "fmi2SetupExperiment: stopTime is 1, must be >= startTime = 2");
     assert!(slave.refused(setup(2.0, f64::NAN)).contains("stopTime is NaN"));
     slave.ok(setup(-2.0, f64::INFINITY));
-    // What is not defined is not read.
+    // A value that is not defined is not read.
     slave.ok((API.setup_experiment)(slave.component, 0, f64::NAN, -2.5, 0, f64::NAN));
     assert_eq!(slave.time(), -2.5);
 }

@@ -14,7 +14,7 @@ fn inputs(k: usize, slave: &Slave) -> Vec<f64> {
     inputs[..slave.fmu.product.layout.outputs.min(6)].to_vec()
 }
 
-/// A run of `steps` steps with changing inputs, all that is seen on the way.
+/// Makes a run of `steps` steps with changing inputs; returns all that was seen on the way.
 fn run(slave: &Slave, steps: usize) -> Vec<Vec<String>> {
     let mut t = 0.0;
     (0..steps)

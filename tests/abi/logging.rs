@@ -1,4 +1,4 @@
-//! Categories, what is logged, and functions that the capability flags exclude.
+//! Categories, the messages logged, and functions that the capability flags exclude.
 
 use std::ffi::CString;
 use std::ptr::null;
@@ -118,7 +118,7 @@ fn excluded_functions_name_their_flag() {
     }
 }
 
-/// Nothing is asynchronous: what there is to say is the time and whether the run has ended.
+/// Nothing is asynchronous: only the time and the end of the run have a status.
 #[test]
 fn get_status_family() {
     let fmu = Fmu::new(PLANT);

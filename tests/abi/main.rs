@@ -5,17 +5,17 @@
 //! | module | asks |
 //! |---|---|
 //! | `api`, `fmu`, `slave` | nothing: the library, an extracted FMU, an instance with its log |
-//! | `exports` | which symbols there are, and what a NULL component does |
-//! | `instantiate` | what is refused with which message, names and paths of every kind |
+//! | `exports` | which symbols there are, and the answer to a NULL component |
+//! | `instantiate` | refusals with their messages, names and paths of every kind |
 //! | `legality` | every function in every mode |
 //! | `arguments` | NULL arrays, value references, ranges; that a failed call changes nothing |
-//! | `logging` | categories, what is logged, flags that exclude functions |
+//! | `logging` | categories, messages logged, flags that exclude functions |
 //! | `outputs` | lazy outputs of a filter, anchors, re-arming |
 //! | `times` | odd communication points and steps |
 //! | `plant` | inner steps, initial states, refusals |
-//! | `derivatives` | directional derivatives against differences, and what is refused |
+//! | `derivatives` | directional derivatives against differences, and refusals |
 //! | `external` | derivatives that are inputs, against the filter that computes them |
-//! | `states` | snapshots: layout, lifetime, what is refused |
+//! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
 

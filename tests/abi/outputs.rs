@@ -1,4 +1,4 @@
-//! Lazy outputs of a filter: which inputs and which time they belong to, and what is remembered.
+//! Lazy outputs of a filter: the inputs and the time that they belong to, and the samples that are remembered.
 //!
 //! The oracle is the filter of `punctual-core` with the same configuration.
 
@@ -22,7 +22,7 @@ fn oracle(fmu: &Fmu) -> SafetyFilter {
     fmu.filter().build().unwrap()
 }
 
-/// A sample of the oracle: remembered with `commit`; returns u.
+/// Makes a sample of the oracle, which `commit` remembers; returns u.
 fn sample(filter: &mut SafetyFilter, t: f64, inputs: &[f64; 6], commit: bool) -> [f64; 2] {
     let (x, u_ref) = inputs.split_at(4);
     let mut u = [f64::NAN; 2];

@@ -1,4 +1,4 @@
-//! The plants: inner steps, initial states, what they refuse.
+//! The plants: inner steps, initial states, refusals.
 
 use punctual_fmu::configuration::Configuration;
 
@@ -45,8 +45,7 @@ fn steps_are_those_of_core() {
     }
 }
 
-/// With the input held and the same inner steps, how a time is cut into communication steps leaves no
-/// trace.
+/// With the input held and the same inner steps, the division of a time into communication steps leaves no trace.
 #[test]
 fn one_step_or_several_of_the_same_inner_steps() {
     let fmu = Fmu::new(PLANT);

@@ -1,6 +1,6 @@
 //! Going back to a snapshot and on again: the same bits as without.
 //!
-//! What is compared is every variable and the bytes of the state, which hold all that is remembered.
+//! The tests compare every variable and the bytes of the state, which hold all that is remembered.
 
 use punctual_modeldescription::{BaseType, Causality};
 
@@ -39,7 +39,7 @@ radius = 0.75
 deadline = 1.0
 "#;
 
-/// Of the unicycle, with values that last longer than some steps and shorter than others.
+/// A disturbance of the unicycle, with values that last longer than some steps and shorter than others.
 const DISTURBANCE: &str = "[disturbance]
 seed = 7
 period = 0.02
@@ -89,7 +89,7 @@ impl Random {
     }
 }
 
-/// What is done between two communication points.
+/// The actions between two communication points.
 struct Step {
     inputs: Vec<f64>,
     rearm: Option<bool>,
@@ -151,21 +151,21 @@ fn values(slave: &Slave) -> Vec<u64> {
     bits
 }
 
-/// All that can be seen, and all that is remembered.
+/// All visible values, and all that is remembered.
 fn all(slave: &Slave) -> (Vec<u64>, Vec<u8>) {
     (values(slave), slave.now())
 }
 
-/// Snapshot points of one FMU: of `PUNCTUAL_SNAPSHOTS` in all, or 10,000, fewer in a debug build.
+/// Number of snapshot points of one FMU: its part of `PUNCTUAL_SNAPSHOTS`, or of 10,000, fewer in a debug build.
 fn snapshots(fmus: usize) -> usize {
     let default = if cfg!(debug_assertions) { 2_000 } else { 10_000 };
     let all: usize = std::env::var("PUNCTUAL_SNAPSHOTS").map_or(default, |n| n.parse().expect("a number"));
     all.div_ceil(fmus)
 }
 
-/// At random places of a run, also between inputs and step, a snapshot; then some steps that are thrown
-/// away, and the way on beside an instance that never went back. The snapshot is used as it is, or as
-/// bytes, or in an instance that was new.
+/// Takes snapshots at random places of a run, also between inputs and step. Then makes some steps that are thrown
+/// away, and goes on beside an instance that never went back. The snapshot is used as it is, or as bytes, or in
+/// an instance that was new.
 #[test]
 #[expect(clippy::print_stdout, reason = "the number of points is the result")]
 fn random_snapshots() {
@@ -305,15 +305,15 @@ fn every_mode_into_a_fresh_instance() {
                 assert_eq!(copy.now(), bytes, "mode {mode}, used before: {used}");
                 assert_eq!(finish(&copy), wanted, "mode {mode}, used before: {used}");
             }
-            // Back from where it ended.
+            // Goes back from where it ended.
             slave.restore(slave.read(&bytes));
             assert_eq!(finish(&slave), wanted, "mode {mode}");
         }
     }
 }
 
-/// A master tries long steps of both FMUs, throws them away where it does not like them and goes on with
-/// short ones: the same as one that knew which steps it would take.
+/// A master tries long steps of both FMUs, and throws them away where it does not like them. It goes on with
+/// short ones, the same as a master that knew which steps it would take.
 #[test]
 fn an_adaptive_master() {
     let (filter, plant) = (Fmu::new(CONFLICTS), Fmu::new(PLANT));

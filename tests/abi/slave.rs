@@ -18,7 +18,7 @@ pub(crate) struct Entry {
     pub(crate) message: String,
 }
 
-/// What the logger of one instance received; its address is the component environment.
+/// The messages that the logger of one instance received; its address is the component environment.
 #[derive(Default)]
 pub(crate) struct Log(Mutex<Vec<Entry>>);
 
@@ -237,8 +237,8 @@ impl<'a> Slave<'a> {
         self.fmu.product.variables.iter().map(|v| format!("{}: {}", v.name, value(v))).collect()
     }
 
-    /// What [`Self::snapshot`] shows after a refused step, where it showed `before` until then: a filter
-    /// says so in `status` (4: `invalid_input`) and `u`; a plant cannot.
+    /// Expected [`Self::snapshot`] after a refused step, where it was `before` until then. A filter shows the
+    /// refusal in `status` (4: `invalid_input`) and `u`; a plant cannot.
     pub(crate) fn after_refusal(before: &[String]) -> Vec<String> {
         let filter = before.iter().any(|line| line.starts_with("status: "));
         let shown = |line: &String| match line.split_once(": ") {

@@ -1,4 +1,4 @@
-//! States: their bytes, their lifetime, and everything that is none.
+//! States: their bytes, their lifetime, and bytes that are no state.
 
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -7,7 +7,7 @@ use crate::api::API;
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
 
-/// Where the parts of a state lie: what `fmu/src/state.rs` says.
+/// Positions of the parts of a state, as `fmu/src/state.rs` has them.
 const VERSION: usize = 8;
 const GUID: usize = 12;
 const LENGTH: usize = 50;
@@ -25,7 +25,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// `bytes` with a checksum that is right.
+/// `bytes` with the right checksum.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - 4;
     let checksum = crc32(&bytes[..end]).to_le_bytes();
@@ -128,7 +128,7 @@ fn the_message_says_what_is_wrong() {
         assert!(state.is_null() && message.ends_with(&wanted), "{message} should end with {wanted}");
     }
     assert_eq!(slave.now(), bytes);
-    // Room that an importer has left over.
+    // Room that an importer has to spare.
     let state = slave.state();
     let mut room = vec![1_u8; size + 3];
     slave.ok((API.serialize)(slave.component, state, room.as_mut_ptr().cast(), size + 3));

@@ -1,4 +1,4 @@
-//! What a case is read as: numbers, choices, edits of texts.
+//! Readings of a case: numbers, choices, edits of texts.
 
 /// The bytes that are still to be read; zeros after the end.
 pub(crate) struct Bytes<'a> {

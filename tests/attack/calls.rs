@@ -12,7 +12,7 @@ use crate::campaign;
 use crate::fleet::FLEET;
 use crate::machine::{Machine, Pool};
 
-/// Every so many cases, one is run again with new instances.
+/// Number of cases after which one is run again with new instances.
 const AGAIN: usize = 16;
 
 #[test]
@@ -105,7 +105,7 @@ fn call(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     }
 }
 
-/// Something with a state that is, or was, there, or with a number that never was one.
+/// Uses a state that is, or was, there, or a number that never was one.
 fn state(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let c = machine.slots[k].instance.component;
     let place = bytes.below(machine.held.len());
@@ -161,7 +161,7 @@ fn values(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let odd = bytes.byte() % 16;
     let refs = if odd == 0 { null() } else { references.as_ptr() };
     let length = if odd == 1 { usize::MAX - 7 } else { count };
-    // Only where the array is not read anyhow.
+    // NULL is passed only where the array is not read anyhow.
     let (real, int, text) = if odd == 2 {
         (null_mut(), null_mut(), null_mut())
     } else {
@@ -210,10 +210,10 @@ fn logging(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert_eq!(machine.answered(k, "set_debug_logging", None, status), usable);
 }
 
-/// Derivatives of some outputs by some inputs, or of what has none: the state stays as it is, and so do the
-/// numbers of a call that fails.
+/// Asks for derivatives of some outputs by some inputs, or of variables that have none. The state stays as it is,
+/// and so do the numbers of a call that fails.
 fn derivatives(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
-    // Outputs are computed where they are read, and then known.
+    // Outputs are computed when they are read; from then on they are known.
     machine.look(k);
     let instance = &machine.slots[k].instance;
     let some = |causality, bytes: &mut Bytes| -> Vec<_> {
@@ -245,7 +245,7 @@ fn derivatives(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert!(before == machine.slots[k].instance.now(), "a derivative changed the state");
 }
 
-/// What there is not: derivatives in time, asynchronous steps.
+/// Calls functions that are not supported: derivatives in time, asynchronous steps.
 fn absent(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let c = machine.slots[k].instance.component;
     let (reference, order, mut real, mut int, mut text) = (0, 1, 0.5, 7, null());

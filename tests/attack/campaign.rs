@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What a case may take on a loaded machine.
+/// Longest time of a case, on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The most bytes of a generated case.
@@ -48,9 +48,9 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Gives every case of the corpus and `usual` generated ones (times `PUNCTUAL_ATTACK`) to `attack`; prints
-/// how many there were, and the sum of what `attack` counts as `counted`. A case that fails is printed as
-/// a line for the corpus. What ends the process is in a file beside the tests.
+/// Gives every case of the corpus and `usual` generated ones (times `PUNCTUAL_ATTACK`) to `attack`. Prints their
+/// number, and the sum of the numbers that `attack` counts as `counted`. A case that fails is printed as a line
+/// for the corpus. A case that ends the process is in a file beside the tests.
 pub(crate) fn run(name: &str, usual: usize, counted: &str, mut attack: impl FnMut(&[u8]) -> usize) {
     let factor =
         std::env::var("PUNCTUAL_ATTACK").map_or(1, |n| n.parse().expect("PUNCTUAL_ATTACK: a number"));

@@ -83,7 +83,7 @@ const WORDS: &[&str] = &[
     "\\u0000",
 ];
 
-/// What an unreasonable file may take on a loaded machine.
+/// Longest time of an unreasonable file, on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The most bytes of an error, which may quote a line of the file, cut off.

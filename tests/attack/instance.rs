@@ -10,13 +10,13 @@ use punctual_modeldescription::{BaseType, Causality};
 use crate::api::{API, Component, ERROR, OK, State, Text, callbacks};
 use crate::fmu::Fmu;
 
-/// What the logger saw.
+/// Observations of the logger.
 #[derive(Default)]
 pub(crate) struct Log {
     /// Messages of failed calls since the last look, and the last of them.
     errors: usize,
     last: String,
-    /// What no message may be.
+    /// A message that breaks the rules of messages.
     wrong: Option<String>,
 }
 
@@ -64,8 +64,8 @@ impl Instance {
         Self { fmu, component, mode: Mode::INSTANTIATED, log }
     }
 
-    /// Judges the answer of a call: a known status, and a message where it failed and only there. Whether
-    /// the call did what it was asked for.
+    /// Judges the answer of a call: a known status, and a message where it failed and only there. Returns whether
+    /// the call did as asked.
     #[track_caller]
     pub(crate) fn answered(&self, call: &str, status: c_int) -> bool {
         let mut log = self.log.borrow_mut();

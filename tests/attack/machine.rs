@@ -1,4 +1,4 @@
-//! One to three instances, their states, and what must hold after each call.
+//! One to three instances, their states, and the conditions that must hold after each call.
 
 use std::ffi::c_int;
 use std::ptr::null_mut;
@@ -16,7 +16,8 @@ use crate::instance::Instance;
 /// Most inner steps that a plant is asked for in one step, so that a case takes no time.
 const INNER_STEPS: f64 = 1000.0;
 
-/// Inputs and parameters whose products overflow: what a controller wants of them may be no number, which a filter shows.
+/// Size of inputs and parameters whose products overflow. A controller may want no number of them, which a filter
+/// shows.
 const HUGE: f64 = 1e150;
 
 /// The parameter of a bound that is none.
@@ -58,7 +59,7 @@ impl Machine {
         self.digest = (self.digest ^ bits).wrapping_mul(0x0100_0000_01B3).rotate_left(17);
     }
 
-    /// Judges a call of slot `k`: the answer, and that one which is illegal in this mode failed.
+    /// Judges a call of slot `k`: its answer, and that it failed where it is illegal in this mode.
     #[track_caller]
     pub(crate) fn answered(&mut self, k: usize, name: &str, call: Option<Call>, status: c_int) -> bool {
         let done = self.slots[k].instance.answered(name, status);
@@ -69,7 +70,8 @@ impl Machine {
         done
     }
 
-    /// A call that changes the mode; `usable` if its arguments are, so that it must succeed where legal.
+    /// Makes a call that changes the mode. `usable` tells that its arguments are right, so that it must succeed
+    /// where legal.
     #[track_caller]
     pub(crate) fn moved(&mut self, k: usize, call: Call, to: Mode, usable: bool, status: c_int) {
         let legal = self.slots[k].instance.mode.is_in(LEGAL[call as usize].1);
@@ -80,7 +82,7 @@ impl Machine {
         }
     }
 
-    /// From wherever slot `k` is to step mode, if its parameters allow.
+    /// Goes from wherever slot `k` is to step mode, if its parameters allow.
     pub(crate) fn initialize(&mut self, k: usize, start: f64) {
         let c = self.slots[k].instance.component;
         let status = (API.setup_experiment)(c, 0, 0.0, start, 0, 0.0);
@@ -106,7 +108,7 @@ impl Machine {
         assert_eq!(done, legal, "inputs take any number");
     }
 
-    /// A step; afterwards time has moved, or stands and the refusal shows.
+    /// Makes a step; afterwards time has moved, or stands and the refusal shows.
     pub(crate) fn step(&mut self, k: usize, t: f64, h: f64) {
         let slot = &self.slots[k];
         let h = match slot.instance.reals(Causality::Parameter, "inner_step")[..] {
@@ -229,7 +231,7 @@ impl Machine {
 
     /// Reads a state from `bytes`; `intact` if they are those of a state of this FMU.
     pub(crate) fn read(&mut self, k: usize, bytes: &[u8], intact: bool) -> bool {
-        /// Where the mode stands: after magic number, version, GUID and length.
+        /// Position of the mode: after magic number, version, GUID and length.
         const MODE: usize = 8 + 4 + 38 + 8;
         let (c, mut pointer) = (self.slots[k].instance.component, null_mut());
         let status = (API.deserialize)(c, bytes.as_ptr().cast(), bytes.len(), &raw mut pointer);

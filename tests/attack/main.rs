@@ -6,9 +6,9 @@
 //!
 //! | module | attacks |
 //! |---|---|
-//! | `campaign`, `bytes` | nothing: cases, what they are read as, the corpus |
+//! | `campaign`, `bytes` | nothing: cases, their readings, the corpus |
 //! | `instance` | nothing: an instance that watches its log |
-//! | `fleet`, `machine` | nothing: FMUs of every kind, and what must hold after each call |
+//! | `fleet`, `machine` | nothing: FMUs of every kind, and the conditions after each call |
 //! | `calls` | the 34 functions in any order with any arguments |
 //! | `states` | serialised states with bytes changed, checksums right or wrong |
 //! | `configurations` | configurations and system files |

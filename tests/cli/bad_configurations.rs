@@ -1,6 +1,6 @@
-//! `punctual build` on configurations that cannot be used: the message names file, field, value and
-//! what is allowed; the code is 2; nothing is written. (Every defect of every field is tested
-//! where configurations are read; here each way into the command line.)
+//! `punctual build` on configurations that cannot be used. The message names file, field, value and the values
+//! allowed; the code is 2; nothing is written. (Every defect of every field is tested where configurations are
+//! read; here each way into the command line.)
 
 use std::fs;
 

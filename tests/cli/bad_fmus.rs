@@ -1,5 +1,4 @@
-//! FMUs that cannot be used: the message names the file and what is wrong with it; the code is 1,
-//! since the usage was right.
+//! FMUs that cannot be used: the message names the file and its defect; the code is 1, since the usage was right.
 
 use punctual::host::PLATFORM;
 

@@ -1,5 +1,5 @@
-//! `punctual run` on system files that cannot be used: the message names file, field, value and what
-//! is allowed; the code is 2.
+//! `punctual run` on system files that cannot be used: the message names file, field, value and the values
+//! allowed; the code is 2.
 
 use crate::running::system;
 use crate::workshop::{Done, Workshop};
@@ -110,7 +110,7 @@ fn a_file_that_is_missing() {
     Workshop::new().punctual(["run", "my.toml"]).fails_like(2, "cannot read my.toml: ", &[]);
 }
 
-/// The input of the plant overflows at once; the FMU says where.
+/// The input of the plant overflows at once; the FMU names the place.
 const OVERFLOW: (&str, &str) = (
     "factor = -1.0",
     "factor = -1.0\n[[connection]]\nfrom = \"filter.u.a\"\nto = \"plant.u.a\"\nfactor = 1e308",
@@ -125,14 +125,14 @@ fn a_run_that_fails_on_the_way() {
         "fmi2DoStep of plant (plant.fmu) at t = 0 s returned fmi2Error\n  [fmi2Error, logStatusError] fmi2DoStep: \
          u.a is inf, must be finite for a step from t = 0",
     );
-    // What was recorded is not lost: the head and the row of t = 0.
+    // The recorded rows are not lost: the head and the row of t = 0.
     let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
     assert_eq!(done.code, 1);
     assert!(done.stderr.contains("note: what was recorded until then is in out/system.csv"), "{done:?}");
     assert_eq!(workshop.text("out/system.csv").lines().count(), 2);
 }
 
-/// It is told before the run, which may be long.
+/// The failure is told before the run, which may be long.
 #[test]
 fn an_output_folder_that_is_a_file() {
     let workshop = Workshop::with_fmus();

@@ -1,4 +1,4 @@
-//! `punctual build`: what it says, what it writes, and that it writes the same again.
+//! `punctual build`: its output, its files, and that it writes the same again.
 
 use std::fs;
 

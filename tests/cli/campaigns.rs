@@ -19,8 +19,8 @@ fn system() -> String {
     crate::running::system(&[("step = 0.001", STEP), ("stop_time = 20.0", "stop_time = 12.0")])
 }
 
-/// A campaign of `runs` runs over starts and bounds: 0.1 m/s2 both ways is too little, 20 either way is
-/// enough, and a lower bound above the upper one is refused.
+/// A campaign of `runs` runs over starts and bounds. 0.1 m/s2 both ways is too little, 20 either way is enough,
+/// and a lower bound above the upper one is refused.
 fn file(runs: u64, sampling: &str) -> String {
     format!(
         "system = \"system.toml\"\n[campaign]\nruns = {runs}\nseed = 7\nsampling = \"{sampling}\"\n\
@@ -32,7 +32,7 @@ fn file(runs: u64, sampling: &str) -> String {
     )
 }
 
-/// With the FMUs of the example.
+/// A workshop with the FMUs of the example.
 fn with_fmus(runs: u64, sampling: &str) -> Workshop {
     let workshop = Workshop::with_fmus();
     workshop.write("system.toml", system());
@@ -40,7 +40,7 @@ fn with_fmus(runs: u64, sampling: &str) -> Workshop {
     workshop
 }
 
-/// With the configurations that the FMUs are made from, in their place: nothing is unpacked.
+/// A workshop with the configurations in place of the FMUs made from them, so that nothing is unpacked.
 fn workshop(runs: u64, sampling: &str) -> Workshop {
     let workshop = Workshop::new();
     for name in ["filter", "plant"] {
@@ -69,8 +69,8 @@ fn number(cell: &Cell) -> Option<f64> {
     }
 }
 
-/// What is in a row, against what `punctual run` finds with the library of an FMU from what `--list` says:
-/// every bit of every recorded signal, and each measure by its definition.
+/// Compares a row with the findings of `punctual run` with the library of an FMU, from the start that `--list`
+/// tells. They agree in every bit of every recorded signal, and in each measure by its definition.
 #[test]
 fn a_row_is_what_a_run_of_the_fmus_finds() {
     let workshop = with_fmus(8, "latin_hypercube");
@@ -186,7 +186,7 @@ fn wait(workshop: &Workshop, child: &mut Child, kept_before: u64, more: Duration
     std::thread::sleep(more);
 }
 
-/// Enough to be ended three times, and not many more: what is not optimised takes long.
+/// Enough runs to be ended three times, and not many more, since a debug build is slow.
 const MANY: u64 = if cfg!(debug_assertions) { 120 } else { 40_000 };
 
 /// Killed, interrupted, killed again, on one and on two threads: the same file.
@@ -195,7 +195,7 @@ fn a_campaign_can_be_ended_at_any_point() {
     let workshop = workshop(MANY, "random");
     workshop.write("system.toml", workshop.text("system.toml").replace(STEP, "step = 0.25"));
     let mut before = 0;
-    // Anything from the middle of a segment to that of its file.
+    // Any instant from the middle of a segment to that of its file.
     let moment = || {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970");
         Duration::from_micros(u64::from(now.subsec_nanos()) % 20_000)
@@ -228,7 +228,7 @@ fn a_campaign_can_be_ended_at_any_point() {
     workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet", "--threads", "1"]).success();
     assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
 
-    // What is complete is not made again, and stays.
+    // A complete campaign is not made again, and stays.
     let again: Value = serde_json::from_str(
         &workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet", "--json"]).success(),
     )
@@ -249,15 +249,15 @@ fn a_campaign_can_be_ended_at_any_point() {
         (report["success"]["count"].as_u64(), report["runs"].as_u64()),
         (Some(count as u64), Some(MANY))
     );
-    // A third of the bounds is too little, a quarter contradicts: half succeed at most, to
-    // 1/√(4·120) = 0.046 for 120 runs; five of these.
+    // A third of the bounds is too little, a quarter contradicts: half succeed at most, to 1/√(4·120) = 0.046 for
+    // 120 runs; the tolerance is five of these.
     let rate = count as f64 / MANY as f64;
     assert!(rate > 0.0 && rate < 0.5 + 5.0 * 0.046, "{rate}");
     let worst = report["worst"].as_array().expect("a list");
     assert_eq!((worst.len(), &worst[0]["success"]), (10, &false.into()));
 }
 
-/// A row that is not what the run gives is told, with the column.
+/// A row that differs from its run is told, with the column.
 #[test]
 fn a_row_that_was_changed_is_told() {
     let workshop = workshop(20, "sobol");
@@ -302,7 +302,7 @@ fn a_row_that_was_changed_is_told() {
     workshop.punctual(["replay", "c.toml", "--run", "0"]).fails_like(2, "cannot read c.toml: ", &[]);
 }
 
-/// What is drawn depends on the file and the number alone.
+/// The draws depend on the file and the number alone.
 #[test]
 fn runs_are_listed_as_they_are_drawn() {
     for sampling in ["random", "latin_hypercube", "sobol"] {
@@ -394,7 +394,7 @@ fn a_campaign_needs_no_fmus() {
 /// An entry of an archive, by name, to what it becomes.
 type Edit = fn(&str, Vec<u8>) -> Option<Vec<u8>>;
 
-/// Of an FMU that is not ours, and of one by another version, it is said that they cannot run in process.
+/// An FMU that is not ours, and one by another version, cannot run in process, and the message says so.
 #[test]
 fn fmus_of_others_are_refused() {
     let refused = |message: &str, edit: Edit| {

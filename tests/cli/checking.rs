@@ -1,4 +1,4 @@
-//! `punctual check`: what it says of filters and plants, its warnings and its codes.
+//! `punctual check`: its findings on filters and plants, its warnings and its codes.
 
 use std::fs;
 
@@ -128,7 +128,7 @@ fn warnings_name_what_does_not_fit_the_step() {
     assert_eq!(warnings(&short, &[]), ["goal: the experiment stops before the deadline"]);
 }
 
-/// Bounds that the start asks too much of: the promise cannot be given, and the code says so.
+/// Bounds that the start asks too much of: the promise cannot be given, and the code shows it.
 #[test]
 fn a_start_without_a_guarantee_is_code_one() {
     let workshop = workshop(&[("[experiment]", "[bounds]\na = [-0.01, 0.01]\n[experiment]"), COARSE]);

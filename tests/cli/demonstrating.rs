@@ -1,4 +1,4 @@
-//! `punctual demo`: what it promises in numbers and leaves in files. (What it prints is in the README.)
+//! `punctual demo`: the numbers that it promises and the files that it leaves. (The README has its output.)
 
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ fn the_demonstration_keeps_its_promise_and_leaves_everything_behind() {
         files.filter(|e| e.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "svg")));
     assert!(pictures.count() >= 3, "a picture for each model");
 
-    // What it leaves can be run again by hand, and gives the same.
+    // Its files can be run again by hand, and give the same.
     workshop.punctual(["run", "demo/unicycle-reference_profile.toml", "--out", "again"]).success();
     let file = "unicycle-reference_profile.csv";
     assert!(workshop.bytes(&format!("again/{file}")) == workshop.bytes(&format!("demo/{file}")));

@@ -12,7 +12,7 @@ use crate::misbehaving::{self, description};
 use crate::validating::findings;
 use crate::workshop::{Done, Workshop};
 
-/// What a refusal may take, on a loaded machine.
+/// Longest time of a refusal, on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Address space that the commands may take, in KiB.
 const MEMORY: u32 = 2 << 20;
@@ -277,7 +277,7 @@ fn entities_that_expand() {
 
 #[test]
 fn a_description_without_end() {
-    // Not compressible enough to count as a bomb: names that differ.
+    // Names that differ do not compress enough to count as a bomb.
     let mut xml = "<fmiModelDescription>".to_owned();
     let mut state = 1_u64;
     while xml.len() <= 64 << 20 {
@@ -290,7 +290,7 @@ fn a_description_without_end() {
     refused(&fmu, "archive.limit", "bytes; allowed are at most 67108864");
 }
 
-/// Many are no defect: they are read, in bounded time, and findings are cut short.
+/// Many variables are no defect: they are read, in bounded time, and findings are cut short.
 #[test]
 fn variables_without_number() {
     let variables: String = (10..100_010)

@@ -1,11 +1,10 @@
 //! `punctual run` equals the core in process, bit for bit: going through files, FMI and a shared
 //! library changes nothing.
 //!
-//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a
-//! sample. `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on
-//! from the end of its last step, (k−1)·h + h, as long as the two differ by round-off only, so that
-//! its time never runs backwards under a master that counts otherwise. The filter's profile is a
-//! function of that time, so the last bits depend on it.
+//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a sample.
+//! `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on from the end of its
+//! last step, (k−1)·h + h, as long as the two differ by round-off only. So its time never runs backwards under a
+//! master that counts otherwise. The filter's profile is a function of that time, so the last bits depend on it.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;
@@ -20,7 +19,7 @@ use crate::table::{Table, assert_same_bits};
 const STEP: f64 = 0.001;
 const STEPS: usize = 3000;
 
-/// When the filter's input acts.
+/// The instants from which the filter's input acts.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
     /// From the sample on.
@@ -38,7 +37,7 @@ fn filter() -> SafetyFilter {
     builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.build()).expect("a filter")
 }
 
-/// What is compared, row by row: state, input of the plant, h.
+/// The values compared, row by row: state, input of the plant, h.
 #[derive(Default)]
 struct Rows {
     x: [Vec<f64>; 4],
@@ -58,8 +57,8 @@ fn in_process(order: Order) -> Rows {
     let mut filter = filter();
     let mut rows = Rows::default();
     let mut x = SVector::<f64, 4>::zeros();
-    // What the filter returned last, and h of that sample: in Jacobi order these are still read when
-    // the plant is at the next point. Before the first step both are a look at the start.
+    // The last result of the filter, and h of that sample. In Jacobi order these are still read when the plant is
+    // at the next point. Before the first step both are a look at the start.
     let mut last = Vector2::zeros();
     let mut sample = |time: f64, x: &SVector<f64, 4>| {
         // The nominal controller: damping, a = −v.

@@ -9,7 +9,7 @@ fn the_text_of_filter_and_plant() {
     let workshop = Workshop::with_fmus();
     for name in ["filter", "plant"] {
         let text = workshop.punctual(["inspect", &format!("{name}.fmu")]).success();
-        // The version and the platform are not what this is about.
+        // The test does not depend on the version and the platform.
         let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
         let text = text.replace(punctual::host::PLATFORM, "PLATFORM");
         assert_golden(&format!("inspect-{name}.txt"), &without_guids(&text));

@@ -1,5 +1,5 @@
-//! What `run` and `check` say of a promise, against h itself: late between two samples, left, kept with steps that
-//! were not met, nothing promised, a start that only looks good.
+//! Verdicts of `run` and `check` on a promise, against h itself: late between two samples, left, kept with steps
+//! that were not met, nothing promised, a start that only looks good.
 
 use serde_json::Value;
 
@@ -36,7 +36,7 @@ impl Case<'_> {
         workshop
     }
 
-    /// The same with the FMUs.
+    /// A folder with the FMUs too.
     fn built(&self) -> Workshop {
         let workshop = self.workshop();
         for name in ["filter", "plant"] {
@@ -47,7 +47,7 @@ impl Case<'_> {
     }
 }
 
-/// Code and report of `run --json` with what is required.
+/// Code and report of `run --json` with a requirement.
 fn run(workshop: &Workshop, require: &str) -> (i32, Value) {
     let words = ["run", "system.toml", "--out", "out", "--json", "--require", require];
     let done = workshop.punctual(words);
@@ -66,7 +66,7 @@ const INTEGRATOR: &str = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }]\n\
 const CART: &str = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }]\n\
                     inputs = [{ name = \"a\", unit = \"m/s2\" }]\nderivatives = { p = \"v\", v = \"a\" }";
 
-/// An integrator under held inputs goes along straight lines, so that h at the deadline is known from its rows.
+/// An integrator under held inputs goes along straight lines, so that its rows give h at the deadline.
 #[test]
 fn a_deadline_between_two_samples_is_judged_by_h_there() {
     for (distance, deadline, step) in
@@ -98,7 +98,7 @@ fn a_deadline_between_two_samples_is_judged_by_h_there() {
     }
 }
 
-/// The example's car follows at 80 m without a headway: no deadline says how late it brakes.
+/// The example's car follows at 80 m without a headway: no deadline limits the time at which it brakes.
 #[test]
 fn an_obstacle_is_kept_without_a_deadline() {
     let plant = "[plant]\nstates = [{ name = \"gap\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }]\n\
@@ -230,7 +230,7 @@ fn a_margin_that_h_never_has_is_refused() {
     }
 }
 
-/// What `check` says of a start is what `run` does with the same u_ref: code 0 only where that keeps the promise.
+/// The verdict of `check` on a start is that of `run` with the same u_ref: code 0 only where the promise is kept.
 #[test]
 fn check_says_what_a_run_does() {
     let goal = |centre: [f64; 2], more: &str| {
@@ -293,7 +293,7 @@ fn what_runs_away_is_not_guaranteed() {
     assert!(text.contains("NOT every promise is kept"), "{text}");
 }
 
-/// Without bounds it says what was needed; constants are a u_ref too; what is no u_ref is refused.
+/// Without bounds `check` tells the input needed. Constants are a u_ref too; other texts are refused.
 #[test]
 fn the_wanted_input_of_a_check() {
     let barriers = "[[barrier]]\nname = \"goal\"\nexpression = \"p - 20\"\nunit = \"m\"\ndeadline = 5.0";

@@ -1,4 +1,4 @@
-//! `punctual merge`: what is joined, and everything that is refused. The second platform is made here: the FMU with
+//! `punctual merge`: the product, and everything that is refused. The second platform is made here: the FMU with
 //! its library in another folder, as one built there would be.
 
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ pub(crate) fn write(workshop: &Workshop, name: &str, entries: &Entries) {
     workshop.write(name, archive.to_bytes().expect("an archive"));
 }
 
-/// The entries with the folders of this platform made those of `platform`, and its files edited.
+/// The entries with the folders of this platform renamed to those of `platform`, and its files edited.
 pub(crate) fn elsewhere(entries: &Entries, platform: &str, edit: impl Fn(&mut Vec<u8>)) -> Entries {
     let (here, there) = (format!("/{PLATFORM}/"), format!("/{platform}/"));
     let moved = entries.iter().map(|(entry, bytes)| {
@@ -55,7 +55,7 @@ pub(crate) fn for_other_processor(library: &mut [u8]) {
     library[18..20].copy_from_slice(&[183, 0]);
 }
 
-/// With `here.fmu`, the filter of the example, and `there.fmu`, the same for [`OTHER`].
+/// A workshop with `here.fmu`, the filter of the example, and `there.fmu`, the same for [`OTHER`].
 fn two_systems() -> Workshop {
     let workshop = Workshop::with_fmus();
     let here = entries(&workshop, "filter.fmu");
@@ -78,7 +78,7 @@ fn two_systems_become_one() {
     union.extend(there);
     assert_eq!(union.len(), 6);
     assert!(entries(&workshop, "both.fmu") == union, "not the entries of both");
-    // Sound for others, and no temporary file is left.
+    // The product is sound for other commands, and no temporary file is left.
     assert_eq!(workshop.punctual(["validate", "both.fmu"]).success(), "both.fmu: no errors, no warnings\n");
     assert_eq!(workshop.files(), ["both.fmu", "filter.fmu", "here.fmu", "plant.fmu", "there.fmu"]);
 }
@@ -109,7 +109,7 @@ fn what_is_told_as_json() {
     let mut windows: Entries = windows.collect();
     windows.insert("extra/notes.txt".to_owned(), b"for all".to_vec());
     write(&workshop, "windows.fmu", &windows);
-    // With a folder that has no file.
+    // One FMU has a folder without a file.
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (entry, bytes) in entries(&workshop, "there.fmu") {
         zip.start_file(entry, SimpleFileOptions::default()).expect("an entry");
@@ -149,13 +149,13 @@ fn fmus_of_others_may_say_when_they_were_written() {
     }
 }
 
-/// One difference at a time: what is said of it, and that the product's place is as before.
+/// One difference at a time is refused with its message, and the product's place is as before.
 #[test]
 fn what_differs_is_refused() {
     let workshop = Workshop::with_fmus();
     let own_library = format!("binaries/{PLATFORM}/unicycle_filter{}", std::env::consts::DLL_SUFFIX);
     let mut here = entries(&workshop, "filter.fmu");
-    // Nothing is run, so less will do.
+    // Nothing is run, so less will do for a library.
     here.insert(own_library.clone(), b"a library".to_vec());
     write(&workshop, "here.fmu", &here);
     let there = elsewhere(&here, OTHER, |bytes| bytes.push(b'!'));
@@ -228,7 +228,7 @@ fn a_product_that_does_not_work_takes_no_place() {
          FMU crashed with signal 11 (invalid memory access)",
     );
     assert_eq!((workshop.text("both.fmu").as_str(), workshop.files().len()), ("as before", 3));
-    // A library that is none, by the name of the product.
+    // A library that cannot be loaded is told by the name of the product.
     misbehaving::write(&workshop, "a.fmu", description("crash-in-enter", &[]), &library[..4096]);
     let done = workshop.punctual(merge);
     assert_eq!(done.code, 0, "symbols are missing, so nothing is run: {done:?}");
@@ -263,7 +263,7 @@ fn wrong_usage() {
     done.fails_like(1, "here.fmu: not a readable FMU archive: ", &[]);
 }
 
-/// What one system takes for two files, another takes for one.
+/// Two names that are two files on one system are one file on another.
 #[test]
 fn names_that_differ_in_case_do_not_come_together() {
     let workshop = two_systems();

@@ -1,4 +1,4 @@
-//! Models by expressions, as a user meets them: what `docs/own-model.md` and `docs/models.md` say is run.
+//! Models by expressions, as a user meets them: the commands of `docs/own-model.md` and `docs/models.md` are run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ fn the_page_on_own_models_is_what_happens() {
     assert!(workshop.files().contains(&"out".to_owned()));
 }
 
-/// The rows of the table: what stands in the file in place of the right expression, and the whole message.
+/// The rows of the table: the wrong expression in the file, and the whole message.
 #[test]
 fn expressions_that_are_refused() {
     let workshop = own_model();
@@ -78,13 +78,14 @@ fn expressions_that_are_refused() {
                  [[barrier]]\nname = \"goal\"\nexpression = \"x + y - 3\"\ndeadline = 2.0\n";
     workshop.write("my.toml", mixed);
     let done = workshop.punctual(["build", "my.toml", "-o", "my.fmu"]);
-    let message = text.split("h = x + y − 3 the message is\n`").nth(1).and_then(|rest| rest.split('`').next());
+    let message =
+        text.split("h = x + y − 3 the message is\n`").nth(1).and_then(|rest| rest.split('`').next());
     done.fails(2, &format!("my.toml: {}", message.expect("the message").replace('\n', " ")));
     assert!(!workshop.files().contains(&"my.fmu".to_owned()));
 }
 
-/// The car with a jerk that is off by up to 3 m/s³ and a filter that knows: kept, the same again, and another run
-/// with another seed.
+/// A car whose jerk is off by up to 3 m/s³, with a filter that knows: the promise is kept, the same run repeats,
+/// and another seed gives another run.
 #[test]
 fn a_disturbed_car_keeps_its_promise() {
     let workshop = own_model();
@@ -106,7 +107,7 @@ fn a_disturbed_car_keeps_its_promise() {
     assert!(apart(&first, &still) > 1e-3 && apart(&first, &second) > 1e-3, "the disturbance does nothing");
 }
 
-/// Noise is on what is measured: the car itself goes on at 10 m/s.
+/// Noise is on the measurement: the car itself goes on at 10 m/s.
 #[test]
 fn a_measurement_is_off_by_its_bound_at_most() {
     let workshop = own_model();
@@ -152,7 +153,7 @@ fn the_arm_keeps_its_energy() {
         let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).expect("rows");
         of(f64::max) - of(f64::min)
     };
-    // The error of the Runge-Kutta method with steps of 1 ms.
+    // The tolerance covers the error of the Runge-Kutta method with steps of 1 ms.
     assert!(spread(&energy) < 1e-8, "{} of {}", spread(&energy), energy[0]);
     assert!(spread(&w_1) > 1.0, "nothing is exchanged between the joints");
 }
@@ -165,7 +166,7 @@ fn rows(stem: &str) -> Vec<String> {
         workshop.write(&name, example(&name));
     }
     let (filter, plant) = (format!("{stem}-filter.toml"), format!("{stem}-plant.toml"));
-    // With u_ref = 0, which not all examples have.
+    // `check` runs with u_ref = 0, which not all examples have.
     let told = workshop.punctual(["check", &filter, "--plant", &plant, "--json"]).stdout;
     let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
     for toml in [&filter, &plant] {

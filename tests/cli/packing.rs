@@ -1,5 +1,5 @@
-//! `punctual build SYSTEM.toml -o X.ssp`: what is packed, and what is refused. That other tools read it is
-//! tested in `tests/interop`.
+//! `punctual build SYSTEM.toml -o X.ssp`: the package, and the refusals. `tests/interop` tests that other tools
+//! read it.
 
 use std::fs;
 

@@ -57,7 +57,7 @@ fn example(workshop: &Workshop, source: &str, name: &str) {
 /// Compiles `tests/fixtures/plugin.c` with `macros` to the plug-in `fixture` of `workshop`.
 fn fixture(workshop: &Workshop, macros: &[&str]) {
     let product = workshop.path(&plugin_file_name("fixture"));
-    // What the linker writes over may still be loaded by a child that ends.
+    // A child that ends may still have loaded the file that the linker writes over.
     let _ = fs::remove_file(&product);
     let macros: Vec<String> = macros.iter().map(|name| format!("-D{name}")).collect();
     let arguments: Vec<&str> = STRICT.into_iter().chain(macros.iter().map(String::as_str)).collect();
@@ -112,8 +112,9 @@ fn the_car_in_c_is_the_car_of_expressions() {
     assert!(compared > 20 && plugin.len() > 700);
 }
 
-/// The mass matrix is solved in another order: round-off, which the loop of filter and plant neither damps nor
-/// amplifies much over its 800 steps. A step of the input along the profile is of the size of its rates, 100 1/s²,
+/// The mass matrix is solved in another order, so round-off differs. The loop of filter and plant neither damps
+/// nor amplifies it much over its 800 steps. A step of the input along the profile is of the size of its rates,
+/// 100 1/s², times that of the state.
 /// times that of the state.
 #[test]
 fn the_arm_in_rust_is_the_arm_of_expressions() {
@@ -253,7 +254,7 @@ fn configurations_that_are_refused() {
     }
     let told =
         told.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
-    // Made from the bytes that the compiler wrote.
+    // The digest is made from the bytes that the compiler wrote.
     let digest = told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
     assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"));
 }
@@ -356,7 +357,7 @@ fn an_fmu_of_two_systems_has_the_digests_of_both() {
     }
 }
 
-/// Where the model is not defined: a status of the filter, an error of the plant's step.
+/// A model that is not defined at a state gives a status of the filter, and an error of the plant's step.
 #[test]
 fn outside_the_domain_nothing_crashes() {
     let workshop = Workshop::with_library();

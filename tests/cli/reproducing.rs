@@ -1,4 +1,4 @@
-//! `punctual reproduce`: what it refuses. (What it finds takes an optimised build: tests/interop.)
+//! `punctual reproduce`: its refusals. (Its findings take an optimised build: tests/interop.)
 
 use crate::workshop::Workshop;
 

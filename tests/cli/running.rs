@@ -1,4 +1,4 @@
-//! `punctual run` on the example: what it prints and records, in both orders.
+//! `punctual run` on the example: its output and its recording, in both orders.
 
 use std::fs;
 
@@ -72,8 +72,8 @@ fn fewer_rows_and_chosen_signals() {
     assert_eq!(table.column("time"), [0.0, 0.004, 0.008, 0.01], "the last point is always there");
 }
 
-/// The filter's outputs depend directly on its inputs. In Gauss–Seidel order what it computes at t_k
-/// acts from t_k on; in Jacobi order from t_{k+1} on.
+/// The filter's outputs depend directly on its inputs. In Gauss–Seidel order the sample of t_k acts from t_k on;
+/// in Jacobi order from t_{k+1} on.
 #[test]
 fn jacobi_order_is_one_step_late() {
     let short = ("stop_time = 20.0", "stop_time = 0.05");
@@ -100,7 +100,7 @@ fn the_text_of_a_run() {
     workshop.write("system.toml", system(&[("stop_time = 20.0", "stop_time = 0.5")]) + record);
     let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
     assert_eq!(done.stderr, "");
-    // How long it took is in the middle of the line.
+    // The wall time is in the middle of the line.
     let text = done.success();
     let timed = text.lines().find(|line| line.contains("steps/s")).expect("a line on the steps").to_owned();
     let (before, _) = timed.split_once(" s in ").expect("a wall time");
@@ -144,7 +144,7 @@ fn pictures_are_written_beside_the_table() {
     }
 }
 
-/// What became of the promise is told and, where it is required, the exit code.
+/// The verdict on the promise is told and, where it is required, decides the exit code.
 #[test]
 fn promises_that_are_required() {
     let promise = |bound: &str, require: bool, isolate: bool| {

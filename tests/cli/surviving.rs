@@ -1,5 +1,5 @@
-//! `punctual run` with FMUs that misbehave: the message says which component did what; what was recorded
-//! is kept, with `--isolate` even when an FMU ends its process.
+//! `punctual run` with FMUs that misbehave. The message names the component and its deed. The recorded rows are
+//! kept, with `--isolate` even when an FMU ends its process.
 
 use crate::misbehaving::{self, description};
 use crate::table::Table;
@@ -57,7 +57,7 @@ fn a_missing_function_and_a_wrong_version_name_the_component() {
     run(&["WITHOUT_RESET"]).fails(1, "bad (bad.fmu): its library does not export fmi2Reset");
     run(&["VERSION=\"1.0\""]).fails(1, "bad (bad.fmu): fmi2GetVersion answered \"1.0\", not FMI 2.0");
     run(&["PLATFORM=NULL"]).fails(1, "bad (bad.fmu): fmi2GetTypesPlatform answered \"\", not FMI 2.0");
-    // Not used by a run.
+    // A run does not use these functions.
     run(&["WITHOUT_STATE"]).success();
 }
 
@@ -83,7 +83,7 @@ fn odd_logs_are_shown_harmlessly() {
     assert!(!done.stderr.contains('\u{1b}') && done.stderr.contains("not UTF-8: \u{fffd}"), "{done:#?}");
 }
 
-/// The row of each communication point before the crash is there.
+/// The isolated run keeps the row of each communication point before the crash.
 #[test]
 fn an_isolated_crash_is_told_and_the_rows_are_kept() {
     for (defect, how) in [

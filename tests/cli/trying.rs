@@ -1,5 +1,5 @@
-//! The trial of `punctual validate`: an FMU that misbehaves when it runs is a finding, whatever it does to
-//! its process.
+//! The trial of `punctual validate`: an FMU that misbehaves when it runs is a finding, whatever it does to its
+//! process.
 
 use crate::misbehaving::{self, description};
 use crate::validating::listed;

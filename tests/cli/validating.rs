@@ -1,5 +1,5 @@
-//! `punctual validate` on files: what is sound passes; each defect of archive, description and library
-//! is found by its rule, at its place, with the values allowed. Nothing is run here.
+//! `punctual validate` on files. A sound file passes; each defect of archive, description and library is found by
+//! its rule, at its place, with the values allowed. Nothing is run here.
 
 use serde_json::Value;
 

@@ -34,7 +34,7 @@ fn every_step_is_satisfied(table: &Table) {
     assert!(table.column("f.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
 }
 
-/// Where the disc is follows from the time, not from the filter's word for it.
+/// The place of the disc follows from the time, not from the filter's word for it.
 #[test]
 fn a_point_mass_meets_a_moving_disc_and_rides_along() {
     let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 5.0]\nvelocity = [3.0, 1.0]\nradius = 2.0\n\
@@ -84,8 +84,8 @@ fn bicycles_steered_by_rates_keep_the_deadline() {
     }
 }
 
-/// The example of a car steered by an angle itself, and the same of a small-slip bicycle, exactly measured: where they
-/// are follows from the angle that the plant was given, which stays within its limits and those of its rate.
+/// The example of a car steered by an angle itself, and the same of a small-slip bicycle, exactly measured. Their
+/// places follow from the angle that the plant was given, which stays within its limits and those of its rate.
 #[test]
 fn bicycles_steered_by_angles_keep_the_deadline() {
     let edits: [&[(&str, &str)]; 2] = [
@@ -98,7 +98,7 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
             ("x_p = 0.02", "x_p = 0.0"),
             ("y_p = 0.02", "y_p = 0.0"),
             ("v = 0.05", "v = 0.0"),
-            // Its row vanishes across the line of sight.
+            // The row of a bicycle vanishes across the line of sight.
             ("theta = -0.2", "theta = 0.4"),
         ],
     ];
@@ -118,14 +118,15 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
         let (time, x, y) = (table.column("time"), table.column("plant.x.x_p"), table.column("plant.x.y_p"));
         let error = if edits.is_empty() { 0.02 * 2.0_f64.sqrt() } else { 0.0 };
         for k in 0..time.len() {
-            // The true distance is less than what was measured less its error; the margin is 0.05 m.
+            // The true distance is less than the measured one less its error; the margin is 0.05 m.
             let distance = (x[k] - 20.0).hypot(y[k] - 10.0) - error;
             assert!(time[k] < DEADLINE || distance <= 2.0, "{angle}: {distance} m at {} s", time[k]);
         }
         let held = table.column(&format!("filter.u.{angle}"));
         let kept = table.column(&format!("filter.integrator.{angle}"));
         for k in 1..time.len() {
-            // Half of one step and half of the next, each at a rate within 1 rad/s.
+            // From mean to mean the angle changes over half of one step and half of the next, at rates within 1
+            // rad/s.
             let change = (held[k] - held[k - 1]).abs();
             assert!(held[k].abs() <= 0.7 && change <= 0.01 + 1e-12, "{} rad at {} s", held[k], time[k]);
             assert!((kept[k] - 2.0 * held[k] + kept[k - 1]).abs() <= 1e-12, "the mean of a step");
@@ -134,8 +135,8 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
     }
 }
 
-/// A goal whose place comes from another FMU, past an obstacle: where the leader is follows from its own
-/// column, and it does not keep its velocity as the filter expects between samples.
+/// A goal whose place comes from another FMU, past an obstacle. The leader's place follows from its own column.
+/// It does not keep its velocity, as the filter expects between samples.
 #[test]
 fn a_goal_that_is_another_fmu() {
     let workshop = Workshop::with_library();
@@ -176,7 +177,7 @@ fn a_controller_a_filter_and_a_plant() {
     every_filter_step_is_satisfied(&table);
     let (time, h) = (table.column("time"), table.column("filter.goal.h"));
     assert!((0..time.len()).all(|k| time[k] < 10.0 || h[k] >= 0.0), "late, or left again");
-    // It came by every point, in order, and what it wants is what the filter reads.
+    // The vehicle came by every point, in order, and the filter reads the controller's wish.
     let waypoint = table.column("controller.waypoint");
     assert!(waypoint.windows(2).all(|w| w[0] <= w[1]) && waypoint[0] == 1.0);
     assert_eq!(waypoint.last(), Some(&3.0));

@@ -14,7 +14,7 @@ pub(crate) fn examples() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/vehicles")
 }
 
-/// What a call of the command line came to.
+/// Result of a call of the command line.
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) code: i32,
@@ -58,7 +58,7 @@ impl Workshop {
         Self { folder: tempfile::tempdir().expect("a temporary folder"), environment: Vec::new() }
     }
 
-    /// With the FMUs `filter.fmu` and `plant.fmu` of the example.
+    /// A workshop with the FMUs `filter.fmu` and `plant.fmu` of the example.
     pub(crate) fn with_fmus() -> Self {
         let workshop = Self::new();
         for (name, bytes) in ["filter.fmu", "plant.fmu"].iter().zip(&*FMUS) {
@@ -67,7 +67,7 @@ impl Workshop {
         workshop
     }
 
-    /// With `external.toml`, the example of a filter that is given the derivatives of its barriers.
+    /// A workshop with `external.toml`, the example of a filter that is given the derivatives of its barriers.
     pub(crate) fn with_external() -> Self {
         let workshop = Self::new();
         let example = examples().join("../models/external-filter.toml");
@@ -75,7 +75,7 @@ impl Workshop {
         workshop
     }
 
-    /// The same, with an environment variable for every call.
+    /// The same workshop, with an environment variable for every call.
     pub(crate) fn with_variable(mut self, name: &'static str, value: impl Into<String>) -> Self {
         self.environment.push((name, value.into()));
         self
@@ -106,8 +106,8 @@ impl Workshop {
         names
     }
 
-    /// Runs `punctual` with these arguments; nothing of the caller's environment that it looks at
-    /// is handed on.
+    /// Runs `punctual` with these arguments. No variable of the caller's environment that it looks at is handed
+    /// on.
     pub(crate) fn punctual<S: AsRef<OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Done {
         let mut command = Command::new(env!("CARGO_BIN_EXE_punctual"));
         command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
@@ -140,8 +140,8 @@ impl Workshop {
     }
 }
 
-/// The shared library without debug information where `strip` can be had: debug information makes
-/// it ten times as large, and every FMU built or run is compressed or unpacked.
+/// The shared library without debug information where `strip` can be had. Debug information makes it ten times as
+/// large, and every FMU built or run is compressed or unpacked.
 static LIBRARY: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let library = fs::read(library()).expect("the library beside the tests");
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -165,14 +165,14 @@ static FMUS: LazyLock<[Vec<u8>; 2]> = LazyLock::new(|| {
     })
 });
 
-/// Where cargo puts the library that tests use.
+/// The path where cargo puts the library that tests use.
 pub(crate) fn library() -> PathBuf {
     let name = format!("{}punctual_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     std::env::current_exe().expect("a running test").with_file_name(name)
 }
 
 impl Workshop {
-    /// With a small copy of the shared library, for tests that build FMUs.
+    /// A workshop with a small copy of the shared library, for tests that build FMUs.
     pub(crate) fn with_library() -> Self {
         let workshop = Self::new();
         workshop.write("library", &*LIBRARY);

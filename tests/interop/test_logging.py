@@ -1,4 +1,4 @@
-"""A whole session in FMPy with debug logging on: what arrives, and under which category."""
+"""A whole session in FMPy with debug logging on: the messages that arrive, and their categories."""
 
 import pytest
 from fmpy.fmi1 import FMICallException

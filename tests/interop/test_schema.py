@@ -46,7 +46,7 @@ def validator():
 
 
 def mistakes(text):
-    """What is wrong with a configuration, each with its path."""
+    """The defects of a configuration, each with its path."""
     errors = validator().iter_errors(tomllib.loads(text))
     return [f"{'.'.join(map(str, error.absolute_path))}: {error.message}" for error in errors]
 

@@ -14,7 +14,7 @@ from conftest import ROOT, punctual
 FIXTURES = ROOT / "tests" / "fixtures"
 
 FIRST = '<Unknown index="1" dependencies="2" dependenciesKind="dependent"/>'
-# What is replaced by what; both must object.
+# Texts and their replacements, to which both must object.
 BROKEN = {
     "no model name": (' modelName="misbehaving"', ""),
     "an unknown attribute": ("canHandleVariable", "canHandelVariable"),

@@ -13,7 +13,7 @@ WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 
 
 def tool(name, *arguments):
-    """Runs a tool of this Python environment; what it says is the test's message."""
+    """Runs a tool of this Python environment; its output is the test's message."""
     words = [str(Path(sys.executable).parent / name), *map(str, arguments)]
     done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert done.returncode == 0, done.stdout

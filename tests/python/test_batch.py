@@ -15,7 +15,7 @@ STEPS = 60
 
 
 def drawn(n, steps=STEPS):
-    """States along which n unicycles might go, and what is wanted of them: (steps, n, 4) and (steps, n, 2)."""
+    """States along which n unicycles might go, and their wanted inputs: (steps, n, 4) and (steps, n, 2)."""
     random = np.random.default_rng(7)
     x = random.uniform([-5.0, -5.0, -3.0, 0.0], [25.0, 15.0, 3.0, 8.0], (n, 4)) + np.zeros((steps, 1, 1))
     x[:, :, :2] += 0.05 * np.cumsum(random.uniform(-1.0, 1.0, (steps, n, 2)), axis=0)

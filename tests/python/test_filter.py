@@ -1,4 +1,4 @@
-"""`punctual.Filter` against the FMU of the same configuration, and what it refuses."""
+"""`punctual.Filter` against the FMU of the same configuration, and its refusals."""
 
 import math
 

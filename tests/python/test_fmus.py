@@ -20,7 +20,7 @@ def test_a_dict_and_a_file_of_the_same_content_make_the_same_fmu(tmp_path):
         "name": "unicycle_filter",
         "plant": {"model": "unicycle"},
         "barrier": [
-            # What configurations come from in programs.
+            # Types of numbers that programs have.
             {"name": "goal", "centre": np.array([45, 45.0]), "radius": np.float64(2.0), "deadline": 10, "margin": 0.02}
         ],
         "bounds": {},

@@ -1,11 +1,11 @@
-//! How much of the promise survives where the plant is another bicycle than the filter's.
+//! Survival of the promise where the plant is another bicycle than the filter's.
 
 use punctual::reproduce::bicycles::{Model, Pairing, Remedy, Size};
 
 use super::starts::starts;
 
-/// With the car nothing is lost by the model: the promise of a filter for the simplified bicycle holds on the finer
-/// plants too, with the margin, and so does that of filters that know them and integrate the angle themselves.
+/// With the car the model costs nothing. The promise of a filter for the simplified bicycle holds on the finer
+/// plants too, with the margin. So does that of filters that know them and integrate the angle themselves.
 #[test]
 fn a_car_is_kept_by_whichever_model() {
     let starts = &starts()[..20];

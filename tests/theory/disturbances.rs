@@ -1,4 +1,4 @@
-//! Disturbances that do the worst they can, with and without what the settings allow for them.
+//! Disturbances that do the worst they can, with and without a bound on them in the settings.
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
@@ -45,12 +45,12 @@ impl ControlAffine<3, 1> for JerkCar {
     }
 }
 
-/// How many of the runs were late, and how many outside at some sample from the deadline until 2T.
+/// Numbers of runs that were late, and of runs outside at some sample from the deadline until 2T.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Failures {
     pub(super) late: usize,
     pub(super) outside: usize,
-    /// Steps that were not satisfied.
+    /// Steps that did not meet their constraint.
     pub(super) unmet: usize,
 }
 
@@ -97,8 +97,8 @@ where
     failures
 }
 
-/// Of `count` starts: what is lost with and without the disturbance in the settings, for a point mass that is
-/// pushed with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ) and for a car that loses 10 m/s³ and wants to go back.
+/// Failures from `count` starts with and without the disturbance in the settings: of a point mass that is pushed
+/// with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ), and of a car that loses 10 m/s³ and wants to go back.
 fn table(count: usize) -> [[Failures; 2]; 2] {
     let settings = |disturbance: f64| BarrierSettings {
         rate: Some(5.0),

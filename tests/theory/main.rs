@@ -1,8 +1,8 @@
-//! The figures that the documentation claims, from closed loops in process: a filter, a plant
-//! integrated by RK4 with one step per sampling period, the input held in between.
+//! The figures that the documentation claims, from closed loops in process: a filter, a plant integrated by RK4
+//! with one step per sampling period, the input held in between.
 //!
-//! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`; the
-//! bands are those of the figures, far above what another platform's round-off changes.
+//! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`. The bands are those
+//! of the figures, far above the changes by another platform's round-off.
 
 mod bicycles;
 mod chains;
@@ -53,7 +53,7 @@ fn distance() -> DistanceDisc {
     DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc")
 }
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     /// First sample with h ≥ 0, in s.
@@ -64,7 +64,7 @@ struct Run {
     peak: f64,
     /// Largest |u₁| up to the arrival.
     peak_to_arrival: f64,
-    /// Whether every step satisfied its row.
+    /// Whether every step met its row.
     satisfied: bool,
 }
 
@@ -95,7 +95,7 @@ where
     run_as(Scheme { sampling, ..Scheme::default() }, plant, barrier, settings, nominal, step, x0)
 }
 
-/// What the filter is built with beside its barrier.
+/// The settings of the filter beside its barrier.
 #[derive(Clone, Copy, Debug)]
 struct Scheme {
     sampling: Sampling,

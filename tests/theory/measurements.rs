@@ -1,4 +1,4 @@
-//! Bounded errors of the measured state, with and without what the settings allow for them.
+//! Bounded errors of the measured state, with and without the settings that allow for them.
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
@@ -14,7 +14,7 @@ use super::starts::{DEADLINE, drawn, uniform};
 const STEP: f64 = 0.01;
 const MARGIN: f64 = 0.02;
 
-/// Where the measurement errs.
+/// The kinds of errors of the measurement.
 #[derive(Clone, Copy, Debug)]
 enum Noise {
     /// Anywhere within the bound, anew every so many samples.
@@ -23,8 +23,8 @@ enum Noise {
     Biased,
 }
 
-/// Runs from `starts` of which the filter sees x + error, |error_i| ≤ `errors[i]`; what is lost is lost by the true
-/// state. `seems(x)` has the signs of the bias with which the state looks best.
+/// Failures of the runs from `starts` in which the filter sees x + error, |error_i| ≤ `errors[i]`. The true state
+/// decides them. `seems(x)` has the signs of the bias with which the state looks best.
 fn failures<P, B, const NX: usize, const NU: usize>(
     (plant, barrier): (P, B),
     (errors, allowed): ([f64; NX], bool),
@@ -95,11 +95,12 @@ fn table(count: usize, allowed: bool, noise: Noise) -> [Failures; 2] {
     [point_mass, failures(car, errors, noise, &places, |_| [1.0; 3], |_| vector![-20.0])]
 }
 
-/// Steps that are not met in the thousand runs of the documentation: a defect that is known, not one that is allowed to grow.
+/// Steps that are not met in the thousand runs of the documentation: a known defect, not one that is allowed to
+/// grow.
 const UNMET: usize = 43;
 
-/// A row of the documentation: none late or outside where the settings allow for the errors. Some rows of the point
-/// mass are not met by the search, at kinks of the bound: of a thousand runs 43 steps.
+/// A row of the documentation: none late or outside where the settings allow for the errors. The search does not
+/// meet some rows of the point mass, at kinks of the bound: 43 steps of a thousand runs.
 #[allow(clippy::print_stdout, reason = "the figures of the documentation")]
 fn check(noise: Noise, least_lost: impl Fn(usize) -> usize) {
     let count = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 1000 } else { 20 };
@@ -115,13 +116,13 @@ fn check(noise: Noise, least_lost: impl Fn(usize) -> usize) {
     }
 }
 
-/// They mostly cancel, and cost little in any case.
+/// These errors mostly cancel, and cost little in any case.
 #[test]
 fn errors_drawn_anew_at_every_sample() {
     check(Noise::Uniform(1), |_| 0);
 }
 
-/// For half a second each.
+/// These errors last for half a second each.
 #[test]
 fn errors_that_last() {
     check(Noise::Uniform(50), |count| count / 2);

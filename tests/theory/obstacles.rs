@@ -29,7 +29,7 @@ const OBSTACLES: [([f64; 2], f64); 10] = [
     ([8.0, 24.0], 2.0),
 ];
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     start: [f64; 4],
@@ -107,7 +107,7 @@ where
     run
 }
 
-/// Starts from which an obstacle can be kept clear of: none within reach of the speed they have.
+/// Starts with room to keep clear of the obstacles: none is within reach of their speed.
 fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
     let mut starts: Vec<[f64; 4]> = drawn(4 * count)
         .into_iter()
@@ -180,7 +180,7 @@ fn table(count: usize) {
     }
 }
 
-/// All thousand in `tests/nightly`.
+/// Runs all thousand in `tests/nightly`.
 #[test]
 fn table_of_ways_through_obstacles() {
     table(if std::env::var_os("PUNCTUAL_TABLES").is_some() { 1000 } else { 10 });

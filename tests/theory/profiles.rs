@@ -1,4 +1,4 @@
-//! What the profile of least peak saves: peak inputs of the hundred starts, and the soonest deadline.
+//! Savings by the profile of least peak: peak inputs of the hundred starts, and the soonest deadline.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
@@ -10,7 +10,7 @@ use super::{Nominal, Run, bicycle, damp_speed, damp_velocity, distance, run};
 
 const STEP: f64 = 0.01;
 
-/// At 10 ms with rate 5, margin 0.02 and damping.
+/// Runs at 10 ms with rate 5, margin 0.02 and damping.
 fn runs<P>(profile: ProfileKind, plant: &P, nominal: Nominal) -> Vec<Run>
 where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
@@ -26,8 +26,8 @@ where
     starts().iter().map(|x0| run(plant, disc, settings, nominal, STEP, *x0)).collect()
 }
 
-/// Median and 95th percentile of the peak |u₁|; every start on time and inside with both. The tail of the
-/// bicycle is the one that does not gain: where it turns hard the row decides, and not the profile.
+/// Median and 95th percentile of the peak |u₁|; every start on time and inside with both. The tail of the bicycle
+/// does not gain: where it turns hard the row decides, and not the profile.
 #[test]
 fn low_peaks_on_the_hundred_starts() {
     let starts = starts();

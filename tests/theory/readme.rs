@@ -23,7 +23,7 @@ fn goal(centre: [f64; 2], radius: f64, deadline: f64) -> Set {
     Set { margin: 0.01 * radius, ..Set::within(shape, deadline) }
 }
 
-/// What a run came to.
+/// Findings of a run.
 #[derive(Clone, Debug)]
 struct Found {
     seed: u64,
@@ -157,8 +157,8 @@ fn table_of_the_readme_drawn_at_random() {
     }
 }
 
-/// Peak speed, and the least h at a sample after the deadline, as the crate's own simulation moves the
-/// vehicle: one step of Runge-Kutta per period, which does not follow a turn by several radians.
+/// Peak speed, and the least h at a sample after the deadline, as the crate's own simulation moves the vehicle:
+/// one step of Runge-Kutta per period, which does not follow a turn by several radians.
 fn as_simulated(case: &Case) -> [f64; 2] {
     let (step, deadline, shape) = (case.step, case.sets[0].deadline, case.sets[0].shape);
     let gain = if let Reference::Damping(gain) = case.reference { gain } else { 0.0 };
@@ -181,9 +181,9 @@ fn as_simulated(case: &Case) -> [f64; 2] {
     [speed, least]
 }
 
-/// From rest at the origin as the README's, with one number changed; what was thrown out of the set after its
-/// arrival, at up to 553 m/s. It takes a plant that follows turns by several radians as coarsely as the
-/// filter's prediction does: the judge's own is not thrown, but gets as mad inputs.
+/// Starts from rest at the origin as the README's, with one number changed. They were thrown out of the set after
+/// their arrival, at up to 553 m/s. That takes a plant that follows turns by several radians as coarsely as the
+/// filter's prediction does. The judge's own is not thrown, but gets inputs as mad.
 #[test]
 fn the_readme_with_one_number_changed() {
     let example = || goal([45.0, 45.0], 2.0, 10.0);
@@ -202,7 +202,7 @@ fn the_readme_with_one_number_changed() {
     ];
     for (name, case) in cases {
         for step in [0.001, 0.01] {
-            // A while longer than twice the deadline: some leave late.
+            // The horizon is longer than twice the deadline, since some leave late.
             let horizon = case.horizon + 10.0;
             let found = Found::of(0, Case { horizon, ..case.at(step) });
             let Promise { late, out_after_arrival: out, broken, least, unmet, .. } = found.promise;
@@ -215,7 +215,8 @@ fn the_readme_with_one_number_changed() {
                 found.largest
             );
             assert!(!late && !out && broken.is_none(), "{name}, {step}: {found:?}");
-            // What coasts through the disc at 9 m/s has its radius of 2 m to stop in: 20 m/s², 8 times the profile's.
+            // A vehicle that coasts through the disc at 9 m/s has its radius of 2 m to stop in: 20 m/s², 8 times
+            // the profile's.
             let most = if case.reference == Reference::Zero { 20.0 } else { 4.0 };
             let [speed, input] = found.peaks;
             assert!(speed < 2.0 && input < most, "{name}, {step}: peaks {:?}", found.peaks);

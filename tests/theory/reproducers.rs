@@ -21,7 +21,7 @@ fn line(sign: f64, at: f64) -> Shape {
     Shape::Line { sign, at }
 }
 
-/// How many runs broke a promise under the flag; prints the worst of them.
+/// Number of runs that broke a promise under the flag; prints the worst of them.
 fn broken(name: &str, cases: &[Case]) -> usize {
     let runs = on_every_core(cases.len() as u64, |i| run(&cases[i as usize]));
     let size = |run: &Run| run.promises.iter().filter_map(|p| p.broken).map(|b| b.size).fold(0.0, f64::max);
@@ -55,7 +55,7 @@ fn an_obstacle_straight_ahead() {
     assert_eq!(count, 0);
 }
 
-/// 536 of them collided.
+/// Here 536 starts collided.
 #[test]
 fn two_thousand_starts_outside_a_disc() {
     let mut numbers = Numbers::new(2);
@@ -140,7 +140,7 @@ fn chains(n: usize, count: usize, steps: Steps) -> Vec<Case> {
     (0..count).map(draw).collect()
 }
 
-/// 89, 16 and 6 of 2,000 for n = 1, 2, 3.
+/// Here 89, 16 and 6 of 2,000 were broken for n = 1, 2, 3.
 #[test]
 fn missed_steps() {
     let found =
@@ -148,7 +148,7 @@ fn missed_steps() {
     assert_eq!(found, [0; 3]);
 }
 
-/// 148, 82 and 37.
+/// Here 148, 82 and 37 were broken.
 #[test]
 fn steps_of_every_length() {
     let found =
@@ -215,7 +215,7 @@ fn recovery_does_not_claim_what_was_lost() {
     let mut numbers = Numbers::new(11);
     let (mut claimed, mut recovered) = (0, 0);
     for i in 0..100 {
-        // Steps longer than it was told of carry it out.
+        // Steps longer than the filter was told of carry the state out.
         let (n, at) = (1 + i % 2, numbers.scale(1.0, 20.0));
         let step = numbers.within(0.01, 0.1);
         let (rate, recovery) = (Some(1.0 / step), Some(numbers.within(1.0, 5.0)));
@@ -255,7 +255,7 @@ fn a_wall_faster_than_the_samples() {
     assert_eq!(broken("walls", &cases), 0);
 }
 
-/// What is not satisfied says so.
+/// A sample that does not meet its constraint says so.
 #[test]
 fn unmet_samples_say_so() {
     let case = Case { bounds: [0.1; 2], ..towards([4.27, 0.0], [2.88, 0.0], 2.0) };

@@ -20,7 +20,7 @@ const HEADING: Kinds = [
     |_, x| SVector::from(Heading::towards([45.0, 45.0]).bicycle(&(*x).into(), 10.0)),
 ];
 
-/// Point mass, unicycle, bicycle: all on time and inside; returns the median peaks.
+/// Asserts that point mass, unicycle and bicycle are all on time and inside; returns the median peaks.
 fn all_keep_the_deadline(starts: &[[f64; 4]], nominal: Kinds, scheme: Scheme, step: f64) -> [f64; 3] {
     let settings = BarrierSettings {
         rate: Some(5.0),
@@ -41,7 +41,7 @@ fn all_keep_the_deadline(starts: &[[f64; 4]], nominal: Kinds, scheme: Scheme, st
     ]
 }
 
-/// No bounds, a known period.
+/// A scheme without bounds, with a known period.
 fn over(period: f64) -> Scheme {
     Scheme { sampling: Sampling::Period(period), ..Scheme::default() }
 }

@@ -1,4 +1,4 @@
-//! Who uses whom: crates by their manifests, modules by the paths in their code.
+//! Allowed uses: of crates by their manifests, of modules by the paths in their code.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ fn manifest(path: &str) -> Manifest {
 #[test]
 fn crates_depend_on_crates_below_them_only() {
     let edges = [
-        // Itself with a feature, and the reference plants, for its tests.
+        // The core itself with a feature, and the reference plants, for its tests.
         ("core/Cargo.toml", &["punctual-core", "punctual-reference"][..]),
         ("reference/Cargo.toml", &["punctual-core"]),
         ("modeldescription/Cargo.toml", &[]),
@@ -66,7 +66,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     let owners = [
         ("clarabel", &["core/Cargo.toml"][..]),
         ("quick-xml", &["modeldescription/Cargo.toml"]),
-        // The one writes archives, the other reads those of others.
+        // One writes archives, the other reads those of others.
         ("zip", &["modeldescription/Cargo.toml", "Cargo.toml"]),
         ("toml", &["fmu/Cargo.toml"]),
         ("winnow", &["models/Cargo.toml"]),
@@ -75,7 +75,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         ("object", &["Cargo.toml"]),
         ("pyo3", &["python/Cargo.toml"]),
         ("numpy", &["python/Cargo.toml"]),
-        // The one reads descriptions, the other compares them and checks them against the schema.
+        // One reads descriptions, the other compares them and checks them against the schema.
         ("roxmltree", &["modeldescription/Cargo.toml", "Cargo.toml"]),
     ];
     for path in [
@@ -94,7 +94,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     }
 }
 
-/// Compiled into plug-ins too: the paths in it are theirs.
+/// This file is compiled into plug-ins too: the paths in it are theirs.
 const FOR_PLUGINS: &str = "fmu/src/abi/plugin/punctual_model.rs";
 
 /// A crate's modules: each line uses only the lines above it, and none of its own line but itself.

@@ -1,4 +1,4 @@
-//! Examples parse, and what the documents say is what the program does.
+//! Examples parse, and the documents describe what the program does.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,7 +16,7 @@ fn every_example_is_a_valid_configuration_or_system() {
     let mut seen = 0;
     for text in TEXTS.iter().filter(|t| t.path.starts_with("examples/") && t.path.ends_with(".toml")) {
         seen += 1;
-        // Before the first table: the plots of a system have a kind too.
+        // Only keys before the first table count, since the plots of a system have a kind too.
         let mut top = text.text.lines().take_while(|line| !line.starts_with('['));
         let has_kind = top.any(|line| line.starts_with("kind"));
         // A plug-in has to be compiled first: tests/cli does.
@@ -28,7 +28,7 @@ fn every_example_is_a_valid_configuration_or_system() {
             continue;
         }
         if text.text.contains("\n[campaign]\n") {
-            // It needs the FMUs; its words are checked by tests/cli/campaigns.rs.
+            // The file needs the FMUs; tests/cli/campaigns.rs checks its words.
             let system =
                 text.text.lines().find_map(|line| line.strip_prefix("system = \"")?.strip_suffix('"'));
             let system = Path::new(&text.path).with_file_name(system.expect("a system file"));

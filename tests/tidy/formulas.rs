@@ -4,7 +4,7 @@ use crate::sources::{TEXTS, Text};
 
 const ENVIRONMENTS: &[&str] = &["align", "aligned", "cases"];
 
-/// What the formulas use. KaTeX knows all of them: a new one is to be looked up before it is added here.
+/// Commands that the formulas use. KaTeX knows all of them: a new one is to be looked up before it is added here.
 const COMMANDS: &[&str] = &[
     "begin",
     "end",
@@ -70,7 +70,7 @@ fn blocks(text: &Text) -> Vec<Block<'_>> {
     blocks
 }
 
-/// What is wrong with a formula, if anything is.
+/// The defect of a formula, if it has one.
 fn defect(formula: &str) -> Option<String> {
     if formula.trim().is_empty() {
         return Some("nothing in it".to_owned());
@@ -78,7 +78,7 @@ fn defect(formula: &str) -> Option<String> {
     if let Some(c) = formula.chars().find(|c| !c.is_ascii() || *c == '%') {
         return Some(format!("{c:?}, for which LaTeX has a name"));
     }
-    // What is open: "{", "left", or an environment.
+    // Open groups: "{", "left", or an environment.
     let mut open: Vec<&str> = Vec::new();
     let mut rest = formula;
     while let Some(at) = rest.find(['{', '}', '\\']) {

@@ -1,4 +1,4 @@
-//! Where things stand that must stand in one place only, and what must stand nowhere.
+//! Things that must stand in one place only, and things that must stand nowhere.
 
 use crate::sources::{SOURCES, TEXTS, crates};
 
@@ -39,7 +39,7 @@ fn only_one_module_prints() {
     for source in crates().filter(|s| s.path != "src/output.rs") {
         for tokens in words.iter().chain(&streams) {
             let mut lines = source.lexed.lines_with(tokens);
-            // What a child process may print is a method of its command.
+            // The output that a child process may print is a method of its command.
             let methods = source.lexed.lines_with(&[&["."], *tokens].concat());
             lines.retain(|line| !methods.contains(line));
             assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens[0]);

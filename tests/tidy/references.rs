@@ -47,7 +47,8 @@ fn anchors(markdown: &str) -> Vec<String> {
     lines(markdown).iter().filter_map(of_line).collect()
 }
 
-/// What a document numbers: sections, statements (lemmas, theorems and propositions in one sequence) and equations.
+/// Numbered parts of a document: sections, statements (lemmas, theorems and propositions in one sequence) and
+/// equations.
 #[derive(Debug, Default, PartialEq)]
 struct Numbers {
     sections: Vec<usize>,
@@ -79,7 +80,7 @@ fn formula(line: &str) -> Option<&str> {
 }
 
 impl Numbers {
-    /// As they are given: `## 1. …`, `**Lemma 1…`, and `   (L)` at the end of a formula.
+    /// Reads the numbers as they are given: `## 1. …`, `**Lemma 1…`, and `   (L)` at the end of a formula.
     fn of(markdown: &str) -> Self {
         let mut numbers = Self::default();
         for (_, line) in lines(markdown) {
@@ -99,7 +100,8 @@ impl Numbers {
         numbers
     }
 
-    /// What a text refers to and is not there. `loose` labels count too: those without a word before them.
+    /// References of a text to parts that are not there. `loose` labels count too: those without a word before
+    /// them.
     fn missing(&self, text: &str, loose: bool) -> Vec<String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let mut missing = Vec::new();
@@ -188,7 +190,7 @@ fn references_to_the_theory_exist() {
     assert!(seen >= 2, "{seen} references to docs/theory.md");
 }
 
-/// What the documentation of the sources labels has the same label in docs/theory.md.
+/// Every label in the documentation of the sources has the same label in docs/theory.md.
 #[test]
 fn labels_of_the_sources_are_those_of_the_theory() {
     let theory = theory();

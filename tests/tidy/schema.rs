@@ -28,7 +28,7 @@ fn assert_generated(path: &str, wanted: &str) {
     );
 }
 
-/// The end of a range in words, unless it stands for none.
+/// The end of a range in words, unless it stands for no end.
 fn ends(range: Range) -> Option<&'static str> {
     let bounded = |end: Option<f64>| end.is_some_and(|end| end.abs() < UNBOUNDED);
     match range {
@@ -39,7 +39,7 @@ fn ends(range: Range) -> Option<&'static str> {
     }
 }
 
-/// What a value must be, in front of its meaning.
+/// The kind of a value, in front of its meaning.
 fn kind(value: Value) -> String {
     let number = |unit: Unit, range: Range| {
         let unit = match unit {
@@ -223,7 +223,7 @@ fn schema() -> Json {
     definitions["barrier"]["allOf"] = json!(conditions_of_shapes());
     definitions["filter"]["properties"]["barrier"]["minItems"] = json!(1);
     definitions["filter"]["properties"]["barrier"]["maxItems"] = json!(MAX_ROWS);
-    // Along a vehicle a barrier that says neither is a disc.
+    // A barrier along a vehicle that gives neither is a disc.
     definitions["filter"]["allOf"] = json!([{
         "if": { "properties": { "plant": { "required": ["model"] } } },
         "then": { "properties": { "barrier": { "items": {
@@ -238,7 +238,7 @@ fn schema() -> Json {
             "then": definition(kind),
         })
     };
-    // Editors complete along `anyOf`, whose last branch takes every file; what is wrong is said by `allOf`.
+    // Editors complete along `anyOf`, whose last branch takes every file; `allOf` finds the defects.
     let branches: Vec<_> = kinds.into_iter().map(definition).chain([json!({})]).collect();
     // Systems and campaigns, which have no kind, pass unseen.
     let others = json!([{ "required": ["component"] }, { "required": ["campaign"] }]);

@@ -75,7 +75,7 @@ fn walk(folder: &Path, texts: &mut Vec<Text>) {
     for entry in fs::read_dir(folder).expect("a readable folder") {
         let path: PathBuf = entry.expect("a readable entry").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // What .gitignore names, and the repository's own data.
+        // Skipped: folders that .gitignore names, and the repository's own data.
         let skipped =
             ["target", ".venv", ".venv-release", "_bin", "out", "__pycache__", ".pytest_cache", ".git"];
         if skipped.contains(&&*name) || path.is_symlink() {

@@ -2,13 +2,13 @@
 //! (glibc 2.17), wherever it was built. `build.rs` redirects the calls of the library, its dependencies
 //! and the standard library to the names defined here.
 //!
-//! Functions that got a new version are named with the old one. `stat64` and `fstat64` were macros around
-//! another function until 2.33. The last four came later than 2.17: they are left undefined, weak, and the
-//! standard library asks at run time whether they are there and does without.
+//! Functions that got a new version are named with the old one. `stat64` and `fstat64` were macros around another
+//! function until 2.33. The last four came later than 2.17: they are left undefined, weak, and the standard
+//! library asks at run time whether they are there and does without.
 
 use std::arch::global_asm;
 
-/// `__wrap_<name>` goes to `<name>` of `version`.
+/// Links `__wrap_<name>` to `<name>` of `version`.
 macro_rules! version {
     ($($name:literal $version:literal)*) => {$(global_asm!(
         concat!(".symver punctual_", $name, ",", $name, "@", $version),
@@ -21,7 +21,7 @@ macro_rules! version {
     );)*};
 }
 
-/// `__wrap_<name>(a, b)` goes to `<old>(1, a, b)`, where 1 is the layout of the structure on x86-64.
+/// Links `__wrap_<name>(a, b)` to `<old>(1, a, b)`, where 1 is the layout of the structure on x86-64.
 macro_rules! status {
     ($($name:literal $old:literal)*) => {$(global_asm!(
         concat!(".symver punctual_", $name, ",", $old, "@GLIBC_2.2.5"),
@@ -37,7 +37,7 @@ macro_rules! status {
     );)*};
 }
 
-/// `__wrap_<name>` is not there.
+/// Declares `__wrap_<name>` weak and leaves it undefined.
 macro_rules! absent {
     ($($name:literal)*) => {$(global_asm!(
         concat!(".weak __wrap_", $name),

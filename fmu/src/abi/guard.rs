@@ -10,19 +10,19 @@ use punctual_modeldescription::fmi2::{Component, Status, Text};
 use super::logger::Logger;
 use crate::instance::{Failure, Instance};
 
-/// What a component pointer points to.
+/// An instance behind a component pointer.
 pub(super) struct Handle {
     pub(super) instance: Instance,
     pub(super) logger: Logger,
-    /// A panic came out of this instance: its values cannot be trusted any more.
+    /// Set once a panic came out of this instance: its values cannot be trusted any more.
     pub(super) poisoned: bool,
 }
 
 /// Message and place of the last panic, kept by the hook for the log.
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Keeps panics off the simulator's stderr; the guard logs them. The hook belongs to this library's
-/// own copy of the standard library.
+/// Keeps panics off the simulator's stderr; the guard logs them. The hook belongs to this library's own copy of
+/// the standard library.
 pub(super) fn install_panic_hook() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -12,7 +12,7 @@ const ERRORS: &CStr = c"logStatusError";
 /// The category of everything else.
 const EVENTS: &CStr = c"logEvents";
 
-/// What is needed to log for one instance; copied out of the importer's structure.
+/// The logger of one instance, copied out of the importer's structure.
 pub(super) struct Logger {
     function: Option<fmi2::Logger>,
     environment: Environment,
@@ -40,7 +40,7 @@ impl Logger {
         self.send(Status::ERROR, ERRORS, message);
     }
 
-    /// Logs an event, if they are wanted.
+    /// Logs an event, if events are wanted.
     pub(super) fn event(&self, message: &str) {
         if self.events {
             self.send(Status::OK, EVENTS, message);

@@ -3,13 +3,14 @@
 //!
 //! # Safety
 //!
-//! What every function expects of its caller, besides what it says itself: a component is NULL or came
-//! from `fmi2Instantiate` and was not freed; calls for one component do not overlap; an array is NULL
-//! or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong
-//! counts of zero are met with a status, never with a crash.
+//! Every function expects this of its caller, besides what it says itself: a component is NULL or came from
+//! `fmi2Instantiate` and was not freed; calls for one component do not overlap; an array is NULL or has as many
+//! elements as its count says; a string is NULL or NUL-terminated. NULL and wrong counts of zero are met with a
+//! status, never with a crash.
 //!
-//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned: several importers take a warning for a failure, and
-//! no failure leaves an instance that could not be freed. `fmi2Discard` says that a status asked for does not exist.
+//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned. Several importers take a warning for a
+//! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
+//! for does not exist.
 
 #[cfg(old_glibc)]
 mod glibc;
@@ -40,7 +41,7 @@ use unsupported::fmi2CancelStep;
 
 use crate::instance::{Call, Instance, Mode};
 
-/// The exports have the types of the standard.
+/// Defines exports with the types of the standard.
 macro_rules! exported {
     ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
         $(const _: fmi2::$type = $symbol;)*
@@ -49,19 +50,19 @@ macro_rules! exported {
 
 punctual_modeldescription::fmi2_functions!(exported);
 
-/// `"default"`: the types of `fmi2TypesPlatform.h`.
+/// Returns `"default"`: the types of `fmi2TypesPlatform.h`.
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetTypesPlatform() -> Text {
     c"default".as_ptr()
 }
 
-/// `"2.0"`.
+/// Returns `"2.0"`.
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetVersion() -> Text {
     c"2.0".as_ptr()
 }
 
-/// A new instance, or NULL with a log message.
+/// Makes a new instance, or returns NULL with a log message.
 ///
 /// # Safety
 ///
@@ -117,7 +118,7 @@ unsafe extern "C" fn fmi2FreeInstance(component: Component) {
     if !component.is_null() {
         // SAFETY: not NULL, so it came from `Box::into_raw` in `fmi2Instantiate`, and is freed once.
         let handle = unsafe { Box::from_raw(component.cast::<Handle>()) };
-        // A panic while dropping must not reach the importer; what it would leave behind is leaked.
+        // A panic while dropping must not reach the importer; memory that it leaves behind is leaked.
         let _ = catch(|| {
             states::free_all(&handle);
             drop(handle);
@@ -174,7 +175,7 @@ unsafe extern "C" fn fmi2SetupExperiment(
     unsafe { guarded(component, "fmi2SetupExperiment", body) }
 }
 
-/// Exports that take nothing but the component.
+/// Defines exports that take nothing but the component.
 macro_rules! plain {
     ($($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
         $(#[$doc])*
@@ -202,7 +203,7 @@ plain! {
     };
     /// Ends the run.
     fmi2Terminate => |handle| handle.instance.terminate();
-    /// Back to the instantiated state.
+    /// Goes back to the instantiated state.
     fmi2Reset => |handle| {
         handle.instance.reset();
         handle.logger.event("reset");
@@ -210,7 +211,7 @@ plain! {
     };
 }
 
-/// Exports that read or write an array of values of one type.
+/// Defines exports that read or write an array of values of one type.
 macro_rules! values {
     ($($(#[$doc:meta])* $name:ident($pointer:ty, $slice:ident) => $method:ident;)*) => {$(
         $(#[$doc])*
@@ -295,7 +296,7 @@ unsafe extern "C" fn fmi2SetString(
     unsafe { guarded(component, "fmi2SetString", body) }
 }
 
-/// The derivative of outputs along a direction of inputs.
+/// Computes the derivative of outputs along a direction of inputs.
 ///
 /// # Safety
 ///
@@ -345,7 +346,7 @@ unsafe extern "C" fn fmi2DoStep(
     unsafe { guarded(component, "fmi2DoStep", body) }
 }
 
-/// The end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
+/// Gives the end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
 ///
 /// # Safety
 ///
@@ -365,7 +366,7 @@ unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: StatusKind, v
     unsafe { guarded(component, "fmi2GetRealStatus", body) }
 }
 
-/// Whether the run has ended (`fmi2Terminated`); other kinds are discarded.
+/// Tells whether the run has ended (`fmi2Terminated`); other kinds are discarded.
 ///
 /// # Safety
 ///
@@ -389,7 +390,7 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
     unsafe { guarded(component, "fmi2GetBooleanStatus", body) }
 }
 
-/// Nothing is asynchronous here, so there is no such status: discarded.
+/// Defines exports for statuses that do not exist, since nothing is asynchronous here: discarded.
 macro_rules! no_status {
     ($($name:ident($pointer:ty);)*) => {$(
         /// A status of asynchronous steps, of which there are none: discarded.
@@ -412,7 +413,7 @@ no_status! {
     fmi2GetStringStatus(*mut Text);
 }
 
-/// Time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
+/// Reads time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
 ///
 /// # Safety
 ///
@@ -433,7 +434,7 @@ unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     }
 }
 
-/// Time derivatives of inputs: `canInterpolateInputs` is false, so only zero of them can be set.
+/// Sets time derivatives of inputs: `canInterpolateInputs` is false, so only zero of them can be set.
 ///
 /// # Safety
 ///

@@ -1,5 +1,5 @@
-//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them. The same in Rust stands in
-//! `punctual_model.rs`, the file that plug-ins copy, and is used from there.
+//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them. Its types in Rust stand
+//! in `punctual_model.rs`, the file that plug-ins copy, and are used from there.
 
 #[allow(
     clippy::all,
@@ -34,7 +34,7 @@ const MAX_PARAMETERS: u32 = 256;
 /// Longest text that is read.
 const MAX_TEXT: usize = 4096;
 
-/// The first two fields of every version.
+/// The first two fields of every version of the description.
 #[repr(C)]
 #[derive(Clone, Copy)]
 struct Head {
@@ -59,14 +59,14 @@ impl PluginFolder {
         Self { folder: folder.into(), watch: |_, _| {} }
     }
 
-    /// `watch` is told the file and what is done with it, before it is done: whoever watches this process knows
-    /// then where it ended.
+    /// Has `watch` told the file and the next action before it is done. So a process that watches this one knows
+    /// where it ended.
     #[must_use]
     pub fn watched(self, watch: fn(&Path, &str)) -> Self {
         Self { watch, ..self }
     }
 
-    /// Where the plug-in `name` is.
+    /// The path of the plug-in `name`.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.join(file_name(name))
     }
@@ -110,8 +110,9 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
 }
 
 fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, String> {
+    // Load the library, and call its one export.
     watch(path, "its loading");
-    // The words of the system name a path of this machine and say why.
+    // The error text of the system names a path of this machine and gives the reason.
     let library = open(path).map_err(|e| format!("cannot be loaded: {}", chain(&e)))?;
     // SAFETY: the header gives the function of this name this type.
     let symbol = unsafe { library.get::<GetModel>(SYMBOL) };
@@ -128,6 +129,7 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
             align_of::<RawModel>()
         ));
     }
+    // Check that the description is of this version.
     // SAFETY: not NULL, aligned, and every version begins with these fields.
     let Head { abi, size } = unsafe { *model.cast::<Head>() };
     if abi != ABI {
@@ -144,6 +146,7 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
     }
     // SAFETY: not NULL, aligned, version and size are those of this type, and the library stays loaded.
     let raw = unsafe { &*model };
+    // Check dimensions and functions, and read the lists of variables.
     let dimensions = Dimensions {
         states: raw.states as usize,
         inputs: raw.inputs as usize,
@@ -161,6 +164,7 @@ fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, Str
     let inputs = variables("input", "inputs", raw.input, raw.inputs)?;
     let parameters = variables("parameter", "parameters", raw.parameter, raw.parameters)?;
     let barriers = variables("barrier", "barriers", raw.barrier, raw.barriers)?;
+    // Let the model prepare itself.
     if let Some(initialize) = raw.initialize {
         watch(path, "initialize");
         // SAFETY: the header allows a call at any time after loading.
@@ -250,7 +254,7 @@ fn text(field: &str, pointer: *const c_char) -> Result<Option<String>, String> {
     }
 }
 
-/// The functions of a plug-in, which is unloaded when nobody has them any more.
+/// The functions of a plug-in, which is unloaded with its last user.
 struct LoadedCode {
     plant: PlantFunction,
     barrier: Option<BarrierFunction>,
@@ -259,7 +263,7 @@ struct LoadedCode {
     _library: Library,
 }
 
-/// A number that nobody was given, and that is not `LITERAL`: whoever uses it is found out.
+/// A number that no code was given and that is not `LITERAL`: code that uses it is found out.
 const UNKNOWN: Number = Number::MAX - 1;
 
 /// The operation for the code behind `host`.
@@ -282,7 +286,7 @@ extern "C" fn value(host: *mut c_void, a: Number) -> f64 {
     result.unwrap_or(f64::NAN)
 }
 
-/// Hands `calculator` to `body` as the code knows it.
+/// Hands `calculator` to `body` in the form that the code takes.
 fn called<R>(mut calculator: &mut dyn Calculator, body: impl FnOnce(*const RawCalculator) -> R) -> R {
     let raw = RawCalculator { host: (&raw mut calculator).cast(), apply, value };
     body(&raw const raw)

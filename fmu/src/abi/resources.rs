@@ -32,14 +32,14 @@ fn folder(location: &str) -> Result<PathBuf, String> {
         }
         return Ok(PathBuf::from(location));
     };
-    // file:/p, file:///p and file:////p mean the same; file://localhost/p too.
+    // file:/p, file:///p and file:////p mean the same, and so does file://localhost/p.
     let rest = rest.strip_prefix("//localhost/").map_or(rest, |path| path);
     let path = rest.trim_start_matches('/');
     // A drive letter needs no leading slash.
     let drive = path.as_bytes().get(1) == Some(&b':');
     let path = if drive { path.to_owned() } else { format!("/{path}") };
-    // A blank path, or a raw path that happens to contain a percent sign, is taken as it stands
-    // where the decoded one does not exist.
+    // A raw path may contain blanks or a percent sign. So it is taken as it stands where the decoded one does not
+    // exist.
     let decoded = PathBuf::from(decode(&path)?);
     if !decoded.exists() && std::path::Path::new(&path).exists() {
         Ok(PathBuf::from(path))

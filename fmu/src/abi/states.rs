@@ -1,8 +1,8 @@
 //! States: snapshots in memory, and as bytes.
 //!
-//! What the importer holds is a number, not an address: nothing is ever read through it, a number is given
-//! once, and one that is not of a live state is refused. A state can be used by every instance of its FMU
-//! in the process; it ends with `fmi2FreeFMUstate`, or with the instance that made it.
+//! The importer holds a number, not an address. Nothing is ever read through it, a number is given once, and one
+//! that is not of a live state is refused. A state can be used by every instance of its FMU in the process. It
+//! ends with `fmi2FreeFMUstate`, or with the instance that made it.
 
 use std::collections::BTreeMap;
 use std::ffi::c_char;
@@ -41,7 +41,7 @@ impl States {
         ptr::without_provenance_mut(self.last)
     }
 
-    /// A live state of the FMU of `handle`.
+    /// Finds a live state of the FMU of `handle`.
     fn find(&mut self, handle: &Handle, pointer: fmi2::State) -> Result<&mut State, Failure> {
         if pointer.is_null() {
             return Err("FMUstate is NULL".to_owned());
@@ -64,7 +64,7 @@ pub(super) fn free_all(owner: &Handle) {
     let address = ptr::from_ref(owner).addr();
     states.live.retain(|_, entry| entry.owner != address);
     if states.live.is_empty() {
-        // Nothing stays allocated when the library is unloaded.
+        // Replacing the empty map frees its memory, so that nothing stays allocated when the library is unloaded.
         states.live = BTreeMap::new();
     }
 }
@@ -91,7 +91,7 @@ pub(super) unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mu
     unsafe { guarded(component, "fmi2GetFMUstate", body) }
 }
 
-/// Goes back, or on, to a snapshot, from any mode.
+/// Restores a snapshot, an earlier or a later one, from any mode.
 ///
 /// # Safety
 ///
@@ -132,7 +132,7 @@ pub(super) unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *m
     unsafe { guarded(component, "fmi2FreeFMUstate", body) }
 }
 
-/// The number of bytes of a state: the same for all states of an FMU.
+/// Tells the number of bytes of a state: the same for all states of an FMU.
 ///
 /// # Safety
 ///
@@ -154,7 +154,7 @@ pub(super) unsafe extern "C" fn fmi2SerializedFMUstateSize(
     unsafe { guarded(component, "fmi2SerializedFMUstateSize", body) }
 }
 
-/// Writes a state to `size` bytes; those that are more than needed become 0.
+/// Writes a state to `size` bytes; bytes beyond those needed become 0.
 ///
 /// # Safety
 ///
@@ -177,7 +177,7 @@ pub(super) unsafe extern "C" fn fmi2SerializeFMUstate(
     unsafe { guarded(component, "fmi2SerializeFMUstate", body) }
 }
 
-/// Makes a new state from bytes. What `*state` was is not looked at: the standard does not say.
+/// Makes a new state from bytes. The old value of `*state` is not looked at: the standard does not define it.
 ///
 /// # Safety
 ///

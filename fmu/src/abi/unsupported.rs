@@ -5,12 +5,12 @@ use punctual_modeldescription::fmi2::{Component, Status};
 
 use super::guard::{Handle, guarded};
 
-/// OK where nothing is asked for, else an error that says why.
+/// Returns OK where nothing is asked for, else an error with the reason.
 pub(super) fn none(why: &str, count: usize) -> Result<Status, String> {
     if count == 0 { Ok(Status::OK) } else { Err(format!("{why}: {count} values were asked for, must be 0")) }
 }
 
-/// Nothing runs asynchronously, so there is nothing to cancel: not supported.
+/// Refuses to cancel a step: nothing runs asynchronously, so there is nothing to cancel.
 ///
 /// # Safety
 ///

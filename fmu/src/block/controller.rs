@@ -1,5 +1,4 @@
-//! A nominal controller: from the state to what is wanted. Only waypoints remember anything, which is
-//! the present one.
+//! A nominal controller: from the state to the wanted input. Only waypoints remember anything: the present one.
 
 use punctual_core::jet::Tangent;
 use punctual_core::scalar::Scalar;
@@ -11,14 +10,14 @@ use crate::configuration::{
 };
 use crate::product::Layout;
 
-/// The inputs of every model.
+/// Number of inputs of every model.
 const INPUTS: usize = 2;
 
 pub(super) struct ControllerBlock {
     configuration: ControllerConfiguration,
     parameters: Vec<Parameter<ControllerConfiguration>>,
     layout: Layout,
-    /// The present point of `waypoints`, from 0: the whole state.
+    /// The present point of `waypoints`, counted from 0. It is all that the block remembers.
     waypoint: usize,
 }
 
@@ -27,7 +26,7 @@ impl ControllerBlock {
         Self { parameters: configuration.parameters(), configuration, layout, waypoint: 0 }
     }
 
-    /// The present point at the position of `x`: those reached are passed, but for the last.
+    /// The present point at the position of `x`: points that are reached are passed, except the last.
     fn present(&self, x: &[f64]) -> usize {
         let (points, radius) = (&self.configuration.points, self.configuration.acceptance());
         let mut present = self.waypoint;
@@ -39,9 +38,9 @@ impl ControllerBlock {
         present
     }
 
-    /// What is wanted at the inputs `x`: the state, and the goal behind it where that is an input. An
-    /// input that is not finite gives what is not a number, which a filter or plant refuses by name;
-    /// limits would make a number of it.
+    /// The wanted input at the inputs `x`: the state, and the goal behind it where that is an input. An input
+    /// that is not finite gives one that is not a number, which a filter or plant refuses by name. The limits
+    /// alone would make a number of it.
     fn wanted<S: Scalar>(&self, x: impl Fn(usize) -> S, waypoint: usize) -> [S; INPUTS] {
         let c = &self.configuration;
         if (0..self.layout.states).any(|i| !x(i).value().is_finite()) {
@@ -60,7 +59,7 @@ impl ControllerBlock {
             ControllerName::Heading => c.goal.unwrap_or_default().map(S::from),
             ControllerName::Waypoints => c.points[waypoint].map(S::from),
         };
-        // Seen from the goal.
+        // The state as seen from the goal.
         let heading = c.heading([0.0; 2]);
         let x = &[x(0) - goal[0], x(1) - goal[1], x(2), x(3)];
         match (c.plant.model, c.plant.l_r) {
@@ -78,7 +77,7 @@ impl ControllerBlock {
         }
     }
 
-    /// One sample; returns the point that it is for.
+    /// Computes one sample; returns the index of its point.
     fn sample(&self, values: &mut Values) -> usize {
         let x = &values.reals[..self.layout.states];
         let waypoint = self.present(x);
@@ -111,7 +110,7 @@ impl Block for ControllerBlock {
         let along = |i: usize| Tangent { value: x[i], along: direction[i] };
         let u = self.wanted(along, self.present(x));
         for (slot, u) in derivative[self.layout.outputs..].iter_mut().zip(u) {
-            // Where there is no value there is no derivative.
+            // An input without a value has no derivative either.
             *slot = if u.value.is_finite() { u.along } else { u.value };
         }
         Ok(())
@@ -123,7 +122,7 @@ impl Block for ControllerBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
         let Self { waypoint, configuration: _, parameters: _, layout: _ } = self;
         *state = BlockState::Controller { waypoint: u32::try_from(*waypoint).unwrap_or(u32::MAX) };
     }

@@ -6,7 +6,7 @@ use crate::configuration::PlantConfiguration;
 /// Part of a period by which the time may fall short of its start: round-off in the importer's time.
 const ROUND_OFF: f64 = 1e-6;
 
-/// What is added to the inputs and measurements of a plant.
+/// Noise on the inputs and measurements of a plant.
 #[derive(Default)]
 pub(super) struct Disturbance {
     seed: f64,
@@ -40,12 +40,12 @@ impl Disturbance {
         }
     }
 
-    /// Adds to the inputs `u` what is in force at time `t` (s).
+    /// Adds to the inputs `u` the disturbance in force at time `t` (s).
     pub(super) fn push(&self, t: f64, u: &mut [f64]) {
         self.add(Kind::Input, &self.inputs, t, u);
     }
 
-    /// Adds to the measurements `x` what is in force at time `t` (s).
+    /// Adds to the measurements `x` the disturbance in force at time `t` (s).
     pub(super) fn blur(&self, t: f64, x: &mut [f64]) {
         self.add(Kind::Measurement, &self.measurements, t, x);
     }
@@ -60,7 +60,7 @@ impl Disturbance {
     }
 }
 
-/// A number in [−1, 1) that `key` alone decides.
+/// A number in [−1, 1) that depends on `key` alone.
 fn uniform(key: [u64; 4]) -> f64 {
     let bits = key.into_iter().fold(0, |state, word| mixed(state ^ word));
     // 53 bits, as many as a double has.
@@ -96,12 +96,12 @@ mod tests {
         assert!(all.iter().all(|w| w.abs() <= 2.0));
         let mean = all.iter().sum::<f64>() / 1e4;
         let square = all.iter().map(|w| w * w).sum::<f64>() / 1e4;
-        // Of a uniform number up to 2 the mean is 0 and the mean square 4/3; the mean of 10,000 has a deviation of
-        // 0.012 about them. Five of these.
+        // A uniform number up to 2 has the mean 0 and the mean square 4/3. The mean of 10,000 of them has a
+        // deviation of 0.012. The tolerance is five of these.
         assert!(mean.abs() < 0.06 && (square - 4.0 / 3.0).abs() < 0.06, "{mean}, {square}");
         let follow = all.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / 1e4;
         assert!(follow.abs() < 0.07, "one tells of the next: {follow}");
-        // An input without a bound stays what it is, and a value lasts for its period.
+        // An input without a bound keeps its value, and a disturbance lasts for its period.
         assert_eq!((at(0.35)[1], at(0.35)), (1.0, at(0.3)));
         assert_ne!(at(0.3), at(0.4));
         assert_eq!(at(-0.05), at(-0.1));

@@ -1,4 +1,4 @@
-//! A filter: samples its inputs, remembers its promises.
+//! A filter: it samples its inputs and remembers its promises.
 
 use punctual_core::filter::{FilterState, NoDerivative, SampleDerivative, Status};
 
@@ -14,7 +14,7 @@ pub(super) struct FilterBlock {
     filter: FilterLoop,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
-    /// Scratch: what to go back to after looking ahead over a re-arming.
+    /// Scratch: the state to go back to after looking ahead over a re-arming.
     kept: FilterState,
     /// Scratch: the safe input.
     u: Vec<f64>,
@@ -43,7 +43,7 @@ impl FilterBlock {
         [x, &rest[..self.layout.inputs]]
     }
 
-    /// Re-arms where `values` has a rising edge; returns whether it did. What was is in `kept`.
+    /// Re-arms where `values` has a rising edge; returns whether it did. The state before is in `kept`.
     fn rearm(&mut self, values: &Values) -> bool {
         let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
@@ -53,12 +53,12 @@ impl FilterBlock {
         rising
     }
 
-    /// For how long the input is going to be held, in s, where no step says so.
+    /// Expected time in s for which the input is held, where no step gives it.
     fn hold(&self) -> f64 {
         self.filter.filter().state().period.unwrap_or(self.configuration.experiment.step_size)
     }
 
-    /// One sample at `t`: with the length of a step it is remembered, else only looked at.
+    /// Computes one sample at `t`. With the length of a step it is remembered, else only looked at.
     fn sample(&mut self, t: f64, step: Option<f64>, values: &mut Values) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
@@ -85,7 +85,7 @@ impl FilterBlock {
         Ok(())
     }
 
-    /// Why there is no derivative, the barrier by its name.
+    /// The reason why there is no derivative, with the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
             NoDerivative::Source(i)
@@ -137,7 +137,7 @@ impl Block for FilterBlock {
     }
 
     fn output(&mut self, t: f64, values: &mut Values) {
-        // The lengths are those of the filter by construction: the table was built from it.
+        // The lengths are those of the filter by construction, since the table was built from it.
         let sampled = self.sample(t, None, values);
         debug_assert!(sampled.is_ok(), "{sampled:?}");
     }
@@ -163,7 +163,7 @@ impl Block for FilterBlock {
         let mut at = self.layout.outputs;
         let inputs = self.layout.inputs;
         derivative[at..][..inputs].copy_from_slice(&self.change.u[..inputs]);
-        // `status` is in between.
+        // The output `status` stands in between.
         at += inputs + 1;
         for b in &self.change.barriers {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
@@ -184,7 +184,7 @@ impl Block for FilterBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: whoever adds a field decides here whether it belongs to the state.
+        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
         let Self {
             rearm_seen: now,
             filter: memory,

@@ -1,4 +1,4 @@
-//! What an FMU computes, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
+//! The computation of an FMU, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
 mod controller;
 mod disturbance;
@@ -51,21 +51,21 @@ impl Values {
 /// All that a block remembers besides its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BlockState {
-    /// Of a filter.
+    /// State of a filter.
     Filter {
         /// `rearm` at the last step.
         rearm_seen: bool,
-        /// The promises.
+        /// The states of the promises.
         filter: FilterState,
-        /// What it has integrated; 0 without an integrator.
+        /// The integrated state; 0 without an integrator.
         integrated: f64,
     },
-    /// Of a plant.
+    /// State of a plant.
     Plant {
         /// The state, in the order and units of the model.
         x: Vec<f64>,
     },
-    /// Of a controller.
+    /// State of a controller.
     Controller {
         /// The present waypoint, counted from 0.
         waypoint: u32,
@@ -73,7 +73,7 @@ pub enum BlockState {
 }
 
 impl BlockState {
-    /// What is wrong with it where one of another kind is wanted.
+    /// The message where a state of another kind is wanted.
     fn mismatch(&self, wanted: &str) -> String {
         let found = match self {
             Self::Filter { .. } => "filter",
@@ -94,16 +94,16 @@ pub trait Block: Send {
     /// A parameter outside its range or parameters that contradict each other; nothing has changed.
     fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError>;
 
-    /// Writes the outputs that belong to the inputs at time `t` (s), remembering nothing.
+    /// Writes the outputs that belong to the inputs at time `t` (s), and remembers nothing.
     fn output(&mut self, t: f64, values: &mut Values);
 
-    /// Writes to `derivative` how the real outputs that [`Self::output`] would write change along `direction`,
-    /// which has a number for every real input; both at the indices of the variables. `derivative` comes as
-    /// zeros; nothing is remembered.
+    /// Writes to `derivative` the change along `direction` of the real outputs that [`Self::output`] would write.
+    /// `direction` has a number for every real input; both are indexed by variables. `derivative` comes as zeros.
+    /// Nothing is remembered.
     ///
     /// # Errors
     ///
-    /// Why the derivative is not known.
+    /// The reason why the derivative is not known.
     fn differentiate(
         &mut self,
         t: f64,
@@ -119,10 +119,11 @@ pub trait Block: Send {
     /// A step that cannot be made; nothing has changed.
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String>;
 
-    /// Writes what is remembered to `state`; allocates only where that was of another kind or size.
+    /// Writes all that is remembered to `state`; allocates only where that was of another kind or size.
     fn save(&self, state: &mut BlockState);
 
-    /// Goes back to what [`Self::save`] wrote under the same parameters: every bit that follows is the same.
+    /// Goes back to the state that [`Self::save`] wrote under the same parameters: every bit that follows is the
+    /// same.
     ///
     /// # Errors
     ///
@@ -135,7 +136,7 @@ pub trait Block: Send {
     /// Whether a step may start later than the last one ended.
     fn accepts_gaps(&self) -> bool;
 
-    /// Shows in the outputs, where they can, that a step was refused.
+    /// Shows in the outputs that a step was refused, where they can show it.
     fn show_refusal(&self, values: &mut Values);
 }
 

@@ -7,7 +7,7 @@ use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, updated};
 use crate::product::Layout;
 
-/// Most Runge-Kutta steps in one communication step: more is a mistake in the step sizes, and would
+/// Most Runge-Kutta steps in one communication step. A number beyond it is a mistake in the step sizes, and would
 /// look like a hang.
 const MOST_SUBSTEPS: f64 = 1e8;
 
@@ -94,8 +94,8 @@ impl Block for PlantBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: whoever adds a field decides here whether it belongs to the state.
-        // A disturbance is a function of time.
+        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state. A
+        // disturbance does not: it is a function of time.
         let Self {
             x: now,
             configuration: _,
@@ -132,6 +132,7 @@ impl Block for PlantBlock {
     }
 
     fn show_refusal(&self, _values: &mut Values) {
-        // A state has no value that says so; the next step is refused too, because time stands still.
+        // The state of a plant has no value that shows a refusal. The next step is refused too, because time
+        // stands still.
     }
 }

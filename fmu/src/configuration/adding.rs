@@ -13,9 +13,9 @@ use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName};
 pub(super) struct Adding<'a> {
     pub(super) configuration: &'a FilterConfiguration,
     pub(super) builder: FilterBuilder,
-    /// Which barrier.
+    /// The index of the barrier.
     pub(super) index: usize,
-    /// The first of the filter's states that are inputs of this barrier.
+    /// The index of the first state of the filter that is an input of this barrier.
     pub(super) first: usize,
 }
 
@@ -24,17 +24,17 @@ impl Adding<'_> {
         &self.configuration.barrier[self.index]
     }
 
-    /// The core's refusal, in the words of the configuration.
+    /// The core's refusal, in the terms of the configuration.
     fn refused(&self, error: &Error) -> ConfigurationError {
         self.configuration.refused(self.index, error)
     }
 
-    /// The same of an error that does not say whose it is.
+    /// The same refusal for an error that does not name its barrier.
     fn named(&self, error: Error) -> ConfigurationError {
         self.refused(&error.within(&self.section().name))
     }
 
-    /// A region, which `barrier` makes for a plant with these states, along a reference plant.
+    /// Adds a region, which `barrier` makes for a plant with these states, along a reference plant.
     pub(super) fn along<B>(
         self,
         barrier: impl FnOnce(&'static [Signal]) -> Result<B, Error>,
@@ -62,7 +62,7 @@ impl Adding<'_> {
         }
     }
 
-    /// `EXTENDED` = `NX` + 4 states where the barrier follows a point.
+    /// Adds it along a plant. `EXTENDED` = `NX` + 4 states where the barrier follows a point.
     fn along_plant<P, B, const NX: usize, const EXTENDED: usize>(
         self,
         plant: P,
@@ -89,7 +89,7 @@ impl Adding<'_> {
         self.source(source)
     }
 
-    /// An expression, along any plant.
+    /// Adds an expression, along any plant.
     pub(super) fn expression(self, text: &str) -> Result<FilterBuilder, ConfigurationError> {
         let plant = &self.configuration.plant;
         let barrier = plant.expressions()?.barrier(text).map_err(|e| self.of_model(&e))?;
@@ -97,7 +97,7 @@ impl Adding<'_> {
         self.model(found, |n| barrier.source(n))
     }
 
-    /// The barrier of the plant's plug-in that is called `output`.
+    /// Adds the barrier of the plant's plug-in that is called `output`.
     pub(super) fn plugin(self, output: &str) -> Result<FilterBuilder, ConfigurationError> {
         let plant = &self.configuration.plant;
         let position = plant.plugin_barriers().iter().position(|b| b.name == output);
@@ -106,7 +106,7 @@ impl Adding<'_> {
         self.model(found, |n| barrier.source(n))
     }
 
-    /// A barrier whose derivatives are the filter's states from [`Self::first`] on.
+    /// Adds a barrier whose derivatives are the filter's states from [`Self::first`] on.
     pub(super) fn external(self, degree: usize) -> Result<FilterBuilder, ConfigurationError> {
         let c = self.configuration;
         let dim = c.plant.states().len() + c.barrier_inputs().len();
@@ -115,7 +115,7 @@ impl Adding<'_> {
         self.source(source.and_then(|source| lie::embedded(source, dim, &own)))
     }
 
-    /// A barrier of the relative degree `found`; `source` makes its derivatives.
+    /// Adds a barrier of the relative degree `found`; `source` makes its derivatives.
     fn model(
         self,
         found: RelativeDegree,
@@ -146,7 +146,7 @@ impl Adding<'_> {
 }
 
 impl FilterConfiguration {
-    /// The core's refusal of barrier `index` in the words of the configuration.
+    /// The core's refusal of barrier `index`, in the terms of the configuration.
     pub(super) fn refused(&self, index: usize, error: &Error) -> ConfigurationError {
         if let Some(found) = error.relative_degree() {
             let inputs = self.plant.inputs();
@@ -169,7 +169,7 @@ impl FilterConfiguration {
     }
 }
 
-/// Why a filter cannot have `model`, which is not affine in its inputs.
+/// The error that a filter cannot have `model`, which is not affine in its inputs.
 pub(super) fn not_affine(model: ModelName) -> ConfigurationError {
     let (angle, advice) = match model {
         ModelName::BicycleKinematicAngle => {

@@ -1,4 +1,4 @@
-//! `kind = "controller"`: a nominal controller, which says what is wanted of a plant without any promise.
+//! `kind = "controller"`: a nominal controller, which gives the wanted input of a plant without any promise.
 
 use punctual_reference::nominal::Heading;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use super::{
     reference,
 };
 
-/// Which nominal controller.
+/// The nominal controllers by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControllerName {
@@ -40,7 +40,7 @@ impl ControllerName {
 /// The numbers of the controllers, each with the controllers and models that have it.
 struct Gain {
     key: Key,
-    /// Meaning, as the FMU says it.
+    /// Meaning, as the FMU tells it.
     description: &'static str,
     has: fn(ControllerName, ModelName) -> bool,
     default: fn(&Heading) -> f64,
@@ -227,7 +227,7 @@ pub struct ControllerConfiguration {
     /// The FMU's name, a C identifier. Default `controller`.
     #[serde(default)]
     pub name: String,
-    /// Which controller.
+    /// The kind of controller.
     pub controller: ControllerName,
     /// Whether outputs follow inputs without a step between them. Default true; with false, outputs
     /// are computed in steps only.
@@ -249,7 +249,7 @@ pub struct ControllerConfiguration {
     /// `waypoints`: a point counts as reached within this distance in m, > 0. Default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acceptance_radius: Option<f64>,
-    /// `heading`, `waypoints`: as [`Heading::speed_gain`], which has the defaults of this and the following.
+    /// `heading`, `waypoints`: as [`Heading::speed_gain`], whose type has the defaults of this and the following.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_gain: Option<f64>,
     /// As [`Heading::speed_limit`].
@@ -272,7 +272,7 @@ pub struct ControllerConfiguration {
     pub slip_limit: Option<f64>,
     /// The plant that it controls.
     pub plant: ReferenceSection,
-    /// The run it is meant for.
+    /// The run that it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
 }
@@ -288,6 +288,7 @@ impl ControllerConfiguration {
         }
         check_identifier("name", &self.name)?;
         self.plant.complete()?;
+        // The controller must suit the plant.
         let (controller, model) = (self.controller, self.plant.model);
         let refuse = |field: &str, message: String| Err(ConfigurationError::new(field, message));
         let name = controller.name();
@@ -302,6 +303,7 @@ impl ControllerConfiguration {
             let message = format!("is {name:?}, which {} has none of; must be \"damping\"", model.name());
             return refuse("controller", message);
         }
+        // The target, a goal or points, must be that of the controller.
         let (heading, waypoints) =
             (controller == ControllerName::Heading, controller == ControllerName::Waypoints);
         for (field, given, has) in
@@ -316,6 +318,7 @@ impl ControllerConfiguration {
         if self.goal_input && !heading {
             return refuse("goal_input", format!("{name} has none"));
         }
+        // Complete the gains.
         let defaults = Heading::towards([0.0; 2]);
         for gain in &GAINS {
             let value = (gain.access)(&mut self);
@@ -325,6 +328,7 @@ impl ControllerConfiguration {
                 return refuse(gain.key.name, format!("{name} of {} has none", model.name()));
             }
         }
+        // Check every number against its range.
         self.experiment.check()?;
         // The start values of inputs are not parameters.
         if let Some([x, y]) = self.goal {
@@ -387,7 +391,7 @@ impl ControllerConfiguration {
         vec![("goal[1]", "m", x, "the goal along x"), ("goal[2]", "m", y, "the goal along y")]
     }
 
-    /// What is damped: pairs of a state and the input that acts against it, by their positions.
+    /// The damped states, each with the input that acts against it, by their positions.
     pub fn damped(&self) -> &'static [(usize, usize)] {
         match self.plant.model {
             ModelName::PointMass => &[(2, 0), (3, 1)],
@@ -400,8 +404,7 @@ impl ControllerConfiguration {
         }
     }
 
-    /// The controller of `heading` and `waypoints` towards `goal` (m); a gain that is not stated has the
-    /// default.
+    /// The controller of `heading` and `waypoints` towards `goal` (m). A gain that is not given has the default.
     pub fn heading(&self, goal: [f64; 2]) -> Heading {
         let or = |value: Option<f64>, default: f64| value.unwrap_or(default);
         let defaults = Heading::towards(goal);

@@ -1,4 +1,4 @@
-//! `shape = "external"`: a barrier whose derivatives are inputs of the filter, computed by whoever simulates.
+//! `shape = "external"`: a barrier whose derivatives are inputs of the filter, computed by its simulator.
 
 use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
@@ -72,7 +72,7 @@ impl FilterConfiguration {
         self.barrier.iter().find(|b| matches!(b.shape, Shape::External { .. }))
     }
 
-    /// Refuses what needs a prediction nobody can make.
+    /// Refuses settings that need a prediction, which nobody can make here.
     pub(super) fn check_sampling(&self) -> Result<(), ConfigurationError> {
         let Some(barrier) = self.external() else { return Ok(()) };
         let why = format!("barrier {} is external, and what it is given cannot be predicted", barrier.name);

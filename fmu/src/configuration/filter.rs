@@ -19,14 +19,14 @@ use super::{
     Parameter, PlantSection, PluginLoader, Range, VariableSection, barrier, integrator, model,
 };
 
-/// Input bounds of this size or more mean "no bound": a finite number that every importer can read.
+/// Size from which an input bound means "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
 
-/// What is done about inputs that are held between samples.
+/// The treatment of inputs that are held between samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SamplingName {
-    /// [`Sampling::Pointwise`]: the margin has to cover it.
+    /// [`Sampling::Pointwise`]: the margin has to cover the hold.
     Pointwise,
     /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
     /// `[experiment]`.
@@ -77,13 +77,13 @@ pub struct FilterConfiguration {
     /// Whether outputs follow inputs without a step between them; with false, outputs are computed in steps only,
     /// for the same result in every master.
     pub direct_feedthrough: bool,
-    /// What is done about inputs held between samples.
+    /// The treatment of inputs that are held between samples.
     pub sampling: SamplingName,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
     /// Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
-    /// The longest time in s between two steps, ≥ 0: the promises then hold for steps of any length up to it; 0:
-    /// as long as the ones before were.
+    /// The longest time in s between two steps, ≥ 0. The promises then hold for steps of any length up to it. 0:
+    /// as long as the steps before were.
     #[serde(skip_serializing_if = "is_zero")]
     pub period_max: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
@@ -91,7 +91,7 @@ pub struct FilterConfiguration {
     pub correction_limit: f64,
     /// The plant that the filter is for.
     pub plant: PlantSection,
-    /// Which state of it the filter commands and integrates itself.
+    /// The state of the plant that the filter commands and integrates itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrator: Option<IntegratorSection>,
     /// The safe sets, at least one.
@@ -102,7 +102,7 @@ pub struct FilterConfiguration {
     /// state, to first order in them.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub measurement_errors: BTreeMap<String, f64>,
-    /// The run it is meant for.
+    /// The run that it is meant for.
     pub experiment: ExperimentSection,
 }
 
@@ -194,7 +194,7 @@ fn barriers(raw: Vec<RawBarrier>, plant: &PlantSection) -> Result<Vec<BarrierSec
     if raw.is_empty() {
         return refuse("is empty, must have at least 1".to_owned());
     }
-    // Here already, before time is spent on each.
+    // Refuses too many before time is spent on each.
     if raw.len() > MAX_ROWS {
         return refuse(format!("has {} entries, must have at most {MAX_ROWS}", raw.len()));
     }
@@ -213,8 +213,9 @@ fn barriers(raw: Vec<RawBarrier>, plant: &PlantSection) -> Result<Vec<BarrierSec
 }
 
 impl FilterConfiguration {
-    /// What `raw` says, with every value stated, and checked.
+    /// Completes and checks `raw`.
     pub(super) fn parse(raw: RawFilter, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
+        // Name and plant.
         let name = if raw.name.is_empty() { "filter".to_owned() } else { raw.name };
         check_identifier("name", &name)?;
         let mut plant = raw.plant;
@@ -225,6 +226,7 @@ impl FilterConfiguration {
         if let Some(integrator) = &raw.integrator {
             integrator.place(&plant)?;
         }
+        // The filter with its barriers, and the defaults that depend on the plant.
         let mut configuration = Self {
             kind: raw.kind,
             name,
@@ -252,11 +254,12 @@ impl FilterConfiguration {
             let message = format!("unknown measured state, must be one of {}", names.join(", "));
             return Err(ConfigurationError::new(format!("measurement_errors.{unknown}"), message));
         }
+        // Check every number by itself.
         configuration.experiment.check()?;
         for parameter in configuration.parameters() {
             parameter.check(&mut configuration)?;
         }
-        // Whatever the ranges of single numbers cannot say.
+        // The filter itself refuses what the ranges of single numbers cannot.
         configuration.build_loop()?;
         configuration.check_margins(&mut configuration.build()?)?;
         Ok(configuration)
@@ -273,7 +276,7 @@ impl FilterConfiguration {
         for input in inputs {
             let own = [input.min.unwrap_or(-UNBOUNDED), input.max.unwrap_or(UNBOUNDED)];
             let [min, max] = self.bounds.entry(input.name).or_insert(own);
-            // Not `f64::max`: not-a-number has to reach the check below.
+            // Not `f64::max`, since a value that is not a number has to reach the check below.
             if *min < -UNBOUNDED {
                 *min = -UNBOUNDED;
             }
@@ -284,7 +287,7 @@ impl FilterConfiguration {
         Ok(())
     }
 
-    /// Refuses a margin that h never has: of shapes whose largest h is known, at their centre or at rest.
+    /// Refuses a margin that h never has. It checks shapes whose largest h is known, at their centre or at rest.
     fn check_margins(&self, filter: &mut SafetyFilter) -> Result<(), ConfigurationError> {
         let states = self.plant.states().len();
         let mut x = vec![0.0; states];
@@ -334,7 +337,7 @@ impl FilterConfiguration {
             ));
         }
         rows.extend(self.integrator.iter().flat_map(|i| i.parameters(&self.plant)));
-        // Only a disturbance has a unit that depends on them.
+        // Only a disturbance has a unit that depends on the degrees.
         let disturbed = self.barrier.iter().any(|b| b.disturbance.is_some());
         let degrees = if disturbed { self.relative_degrees() } else { Vec::new() };
         for (i, barrier) in self.barrier.iter().enumerate() {
@@ -362,6 +365,7 @@ impl FilterConfiguration {
         let states = self.plant.states().len();
         let mut next_point = states;
         let mut builder = SafetyFilter::builder(states + self.barrier_inputs().len(), inputs.len());
+        // The barriers, each with its window and its strictness.
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;
             next_point += section.inputs(&self.plant).len();
@@ -381,6 +385,7 @@ impl FilterConfiguration {
                 .and_then(|b| b.strictness(strictness))
                 .map_err(|e| self.refused(i, &e))?;
         }
+        // The bounds of the inputs, and the errors of the measurements.
         let (mut min, mut max) = (Vec::new(), Vec::new());
         for input in inputs {
             let [low, high] = self.bounds.get(&input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
@@ -398,6 +403,7 @@ impl FilterConfiguration {
         for (error, state) in errors.iter_mut().zip(self.plant.states()) {
             *error = self.measurement_errors.get(&state.name).copied().unwrap_or(0.0);
         }
+        // The settings of the whole filter.
         builder
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
@@ -424,7 +430,7 @@ impl FilterConfiguration {
         self.barrier.iter().flat_map(|b| b.inputs(&self.plant)).collect()
     }
 
-    /// When barrier `index` begins and ceases to be enforced.
+    /// The conditions under which barrier `index` begins and ceases to be enforced.
     fn window(&self, index: usize) -> Result<(Begin, End), ConfigurationError> {
         let section = &self.barrier[index];
         let refuse = |field: &str, message: String| {

@@ -19,10 +19,10 @@ use crate::FilterLoop;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntegratorSection {
-    /// Which state: one whose derivative is an input alone, such as `beta` of `bicycle_small_slip_rate`. Bounds of that
-    /// input bound the rate.
+    /// The integrated state: one whose derivative is an input alone, such as `beta` of `bicycle_small_slip_rate`.
+    /// Bounds of that input bound the rate.
     pub state: String,
-    /// How fast it follows `u_ref.<state>` in 1/s, > 0, where nothing is in the way. Default 2.
+    /// Rate in 1/s, > 0, at which it follows `u_ref.<state>` where no constraint is in the way. Default 2.
     #[serde(default = "gain")]
     pub gain: f64,
     /// Its smallest value, in its unit. Default: none (-1e30).
@@ -68,7 +68,7 @@ pub(super) static SECTION: Section = Section {
 };
 
 impl IntegratorSection {
-    /// The number of the state and of the input that is its rate.
+    /// The number of the state, and that of the input that is its rate.
     pub(super) fn place(&self, plant: &PlantSection) -> Result<(usize, usize), ConfigurationError> {
         let (states, inputs, derivatives) = (plant.states(), plant.inputs(), plant.derivatives());
         let rate = |i: usize| {
@@ -112,13 +112,14 @@ impl IntegratorSection {
 }
 
 impl FilterConfiguration {
-    /// The states that are measured: those of the plant but the integrated one.
+    /// The measured states: those of the plant but the integrated one.
     pub fn measured_states(&self) -> Vec<VariableSection> {
         let integrated = |s: &VariableSection| self.integrator.as_ref().is_some_and(|i| i.state == s.name);
         self.plant.states().into_iter().filter(|s| !integrated(s)).collect()
     }
 
-    /// What the filter hands out and is asked for: the inputs of the plant, the integrated state in place of its rate.
+    /// The signals that the filter hands out and is asked for: the inputs of the plant, the integrated state in
+    /// place of its rate.
     pub fn commanded(&self) -> Vec<VariableSection> {
         let mut inputs = self.plant.inputs();
         if let Some((state, input)) = self.integrator.as_ref().and_then(|i| i.place(&self.plant).ok()) {

@@ -1,25 +1,25 @@
 //! The keys that a file may have: name, kind of value, unit, range, default and meaning, a row each.
 //!
-//! The checks read their ranges here, the tables of docs/configuration.md and the schema for editors
-//! (docs/punctual.schema.json) are made of it, and `tests/tidy` compares it with what is read.
+//! The checks read their ranges here. The tables of docs/configuration.md and the schema for editors
+//! (docs/punctual.schema.json) are made of these rows, and `tests/tidy` compares.
 
 use super::{Range, over_seconds};
 
 /// The unit of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// This one; `1` where it has none.
+    /// This unit; `1` where there is none.
     Is(&'static str),
-    /// That of the barrier's h.
+    /// The unit of the barrier's h.
     OfH,
-    /// That of the derivative of h which the inputs enter.
+    /// The unit of the derivative of h that the inputs enter.
     OfHighestDerivative,
-    /// That of something else, in words.
+    /// The unit of something else, in words.
     Of(&'static str),
 }
 
 impl Unit {
-    /// Its name at a barrier with h in the unit `h` and of relative degree `degree`.
+    /// The unit's name at a barrier with h in the unit `h` and of relative degree `degree`.
     pub fn of_barrier(self, h: &str, degree: usize) -> String {
         match self {
             Self::Is(unit) | Self::Of(unit) => unit.to_owned(),
@@ -29,7 +29,7 @@ impl Unit {
     }
 }
 
-/// What stands behind a key.
+/// The kind of value of a key.
 #[derive(Clone, Copy, Debug)]
 pub enum Value {
     /// A number.
@@ -69,9 +69,9 @@ pub enum Value {
 pub struct Key {
     /// The key.
     pub name: &'static str,
-    /// What stands behind it.
+    /// The kind of its value.
     pub value: Value,
-    /// What holds without it, in words; empty where that depends on other keys. `None`: it must be given.
+    /// The default in words; empty where it depends on other keys. `None`: the key must be given.
     pub default: Option<&'static str>,
     /// Meaning, in Markdown of docs/configuration.md.
     pub meaning: &'static str,

@@ -1,4 +1,4 @@
-//! Configurations: what a filter, plant or controller FMU is made from. The only module that knows TOML.
+//! Configurations: the sources of filter, plant and controller FMUs. The only module that knows TOML.
 //!
 //! A configuration is read, completed with its defaults ("canonical": every value stated) and then
 //! travels inside the FMU as `resources/configuration.toml`. Numbers in it are also the FMU's
@@ -44,7 +44,7 @@ use unit::{check_unit, unit_per};
 /// The name of the canonical configuration inside an FMU's `resources/`.
 pub const RESOURCE: &str = "configuration.toml";
 
-/// What one FMU is.
+/// The configuration of one FMU.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Configuration {
     /// A safety filter.
@@ -55,7 +55,7 @@ pub enum Configuration {
     Controller(ControllerConfiguration),
 }
 
-/// Which of them a file describes.
+/// The kinds of configurations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Kind {
@@ -120,7 +120,7 @@ impl Configuration {
         }
     }
 
-    /// Which kind it is, in the words of the file.
+    /// The kind, as the file spells it.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Filter(_) => "filter",
@@ -138,7 +138,7 @@ impl Configuration {
         }
     }
 
-    /// The plug-in that its plant is, if it is one.
+    /// The plug-in of its plant, if the plant is one.
     pub fn plugin(&self) -> Option<&Plugin> {
         match self {
             Self::Filter(c) => c.plant.loaded(),
@@ -147,7 +147,7 @@ impl Configuration {
         }
     }
 
-    /// What is meant to be run by default.
+    /// The run that it is meant for.
     pub fn experiment(&self) -> &ExperimentSection {
         match self {
             Self::Filter(c) => &c.experiment,
@@ -157,7 +157,7 @@ impl Configuration {
     }
 }
 
-/// The files and their tables, each after those that have it.
+/// The files and their tables, each after the tables that contain it.
 pub static SECTIONS: [&Section; 12] = [
     &filter::SECTION,
     &barrier::SECTION,

@@ -30,11 +30,11 @@ pub struct VariableSection {
     /// Meaning, for a human. Default: none.
     #[serde(default)]
     pub description: String,
-    /// Smallest value for which the model is meant; of an input the smallest one allowed, where `[bounds]` says
-    /// nothing. Default: none.
+    /// Smallest value for which the model is meant. For an input it is the smallest value allowed, where
+    /// `[bounds]` says nothing. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// The largest one.
+    /// Largest value, likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
 }
@@ -85,18 +85,19 @@ impl From<&Signal> for VariableSection {
 }
 
 /// `[plant]`: a reference plant (`model`, with its constants), a model of expressions (`states`, `inputs`,
-/// `parameters`, `derivatives`), a plug-in (`plugin`), or `inputs` alone, for a filter that is given the derivatives of its barriers.
+/// `parameters`, `derivatives`), a plug-in (`plugin`), or `inputs` alone, for a filter that is given the
+/// derivatives of its barriers.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantSection {
-    /// Which reference plant. Default: none, the model is given by expressions.
+    /// The reference plant. Default: none, the model is given by expressions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<ModelName>,
     /// The name of a plug-in, a shared library beside this file (`lib<name>.so`, `<name>.dll`, `lib<name>.dylib`);
     /// states, inputs and parameters are its own, and given here only to change ranges and values. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plugin: Option<String>,
-    /// What the plug-in's bytes must come to, on every platform or on each by its name. Default: whatever they do.
+    /// Digest of the plug-in's bytes, one for every platform or each by its name. Default: any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plugin_digest: Option<PluginDigest>,
     #[serde(skip)]
@@ -116,7 +117,7 @@ pub struct PlantSection {
     /// The constants. Default: none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<ParameterSection>,
-    /// For each state the expression for its derivative, affine in the inputs.
+    /// The expression for the derivative of each state, affine in the inputs.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<String, String>,
 }
@@ -218,7 +219,7 @@ impl PlantSection {
         Some(ReferenceSection { model, l_r: self.l_r, l_f: self.l_f })
     }
 
-    /// Its name in messages: that of the reference plant, or what it is instead.
+    /// The name in messages: that of the reference plant, or the kind of model that stands in its place.
     pub fn name(&self) -> &'static str {
         let unnamed = match self.plugin {
             Some(_) => "a plug-in",
@@ -228,7 +229,7 @@ impl PlantSection {
         self.model.map_or(unnamed, ModelName::name)
     }
 
-    /// What it is, for a human.
+    /// A description, for a human.
     pub fn title(&self) -> &'static str {
         let unnamed = match self.plugin {
             Some(_) => "plant given by a plug-in",
@@ -238,7 +239,7 @@ impl PlantSection {
         self.model.map_or(unnamed, ModelName::title)
     }
 
-    /// Whether nothing is known of it but its inputs.
+    /// Whether its inputs are all that is known of it.
     pub fn is_external(&self) -> bool {
         let unknown = self.states.is_empty() && self.parameters.is_empty() && self.derivatives.is_empty();
         self.model.is_none() && self.plugin.is_none() && unknown && !self.inputs.is_empty()
@@ -279,6 +280,7 @@ impl PlantSection {
     pub(super) fn complete(&mut self, loader: &dyn PluginLoader) -> Result<(), ConfigurationError> {
         let refuse =
             |field: &str, message: String| Err(ConfigurationError::new(format!("plant.{field}"), message));
+        // The kind of plant decides which keys belong to it.
         let given = [
             ("plugin", self.plugin.is_some()),
             ("states", !self.states.is_empty()),
@@ -289,6 +291,7 @@ impl PlantSection {
         if self.plugin_digest.is_some() && self.plugin.is_none() {
             return refuse("plugin_digest", "given without `plugin`".into());
         }
+        // A reference plant needs nothing more.
         if let Some(mut reference) = self.reference() {
             if let Some((field, _)) = given.iter().find(|(_, given)| *given) {
                 let message = format!("given beside `model`; {} has its own", reference.model.name());
@@ -298,6 +301,7 @@ impl PlantSection {
             (self.l_r, self.l_f) = (reference.l_r, reference.l_f);
             return Ok(());
         }
+        // The other kinds have no constants; a plug-in brings everything else.
         for (field, value) in [("l_r", self.l_r), ("l_f", self.l_f)] {
             if value.is_some() {
                 return refuse(field, "is a constant of the bicycle; other models have `parameters`".into());
@@ -312,6 +316,7 @@ impl PlantSection {
                 "missing; either name a model or give `states`, `inputs` and `derivatives`".into(),
             );
         }
+        // Expressions, or inputs alone: check the names and ranges.
         for (group, variables) in [("states", &self.states), ("inputs", &self.inputs)] {
             for (i, variable) in variables.iter().enumerate() {
                 let path = format!("plant.{group}[{i}]");
@@ -321,6 +326,7 @@ impl PlantSection {
         if self.is_external() {
             return check_external_inputs(self);
         }
+        // Every state has one expression, and every expression can be used.
         self.check_parameters()?;
         if let Some(unknown) = self.derivatives.keys().find(|k| self.states.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = self.states.iter().map(|s| s.name.as_str()).collect();
@@ -345,7 +351,7 @@ impl PlantSection {
         Ok(())
     }
 
-    /// For each state the range in which it is meant to be, or infinite.
+    /// The range in which each state is meant to be, or an infinite one.
     pub(super) fn ranges(&self) -> Vec<[f64; 2]> {
         let end = |value: Option<f64>, none: f64| value.unwrap_or(none);
         let range = |s: VariableSection| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)];

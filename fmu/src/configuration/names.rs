@@ -1,4 +1,4 @@
-//! Names that a configuration gives: what they are made of, and which are taken.
+//! Names that a configuration gives: their form, and those that are taken.
 
 use punctual_models::is_identifier;
 
@@ -17,7 +17,7 @@ pub(super) fn check_identifier(field: &str, name: &str) -> Result<(), Configurat
     Err(ConfigurationError::new(field, message))
 }
 
-/// Who must leave a name to the FMU's own variables.
+/// Things whose names must leave the FMU's own variables alone.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Named {
     /// A barrier, the first part of the names of its variables.
@@ -39,7 +39,7 @@ const RESERVED: [(&str, &[Named]); 13] = {
         ("rearm", BOTH),
         ("integrator", BOTH),
         ("measurement_error", BOTH),
-        // Models with parameters of their own have no other lengths.
+        // Parameters may have these names: models with parameters of their own have no such lengths.
         ("l_r", &[Named::Barrier]),
         ("l_f", &[Named::Barrier]),
         // A plant has no barriers.
@@ -48,12 +48,12 @@ const RESERVED: [(&str, &[Named]); 13] = {
     ]
 };
 
-/// Whether the FMU has a variable for which `who` cannot be called `name`.
+/// Whether the FMU has a variable that forbids to call `who` by `name`.
 pub(super) fn is_reserved(name: &str, who: Named) -> bool {
     RESERVED.iter().any(|(reserved, whose)| *reserved == name && whose.contains(&who))
 }
 
-/// The refusal of a name that something else has, by the path of its field.
+/// The refusal of a name that is already taken, by the path of its field.
 pub(super) fn taken(field: impl Into<String>, name: &str) -> ConfigurationError {
     ConfigurationError::new(field, format!("is {name:?}, which is already the name of something else"))
 }

@@ -64,11 +64,11 @@ pub(super) fn number(value: f64) -> String {
     if size == 0.0 || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
 }
 
-/// How a parameter's number is reached in a completed configuration of type `C`; `None` in one without it.
+/// Reaches a parameter's number in a completed configuration of type `C`; `None` in one without it.
 type Access<C> = Box<dyn Fn(&mut C) -> Option<&mut f64> + Send>;
 
-/// One number of a configuration: its name as an FMU variable, its path in the file, unit, range and
-/// meaning. Validation, the model description and the FMU's accessors all read this row.
+/// One number of a configuration: its name as an FMU variable, its path in the file, unit, range and meaning.
+/// Validation, the model description and the FMU's accessors all read this row.
 pub struct Parameter<C> {
     /// The variable's name, e.g. `goal.deadline`.
     pub name: String,
@@ -101,7 +101,7 @@ impl<C> Parameter<C> {
         }
     }
 
-    /// The value in `configuration`; not a number in one that does not have it.
+    /// The value in `configuration`; not a number where the configuration does not have it.
     pub fn get(&self, configuration: &mut C) -> f64 {
         (self.access)(configuration).copied().unwrap_or(f64::NAN)
     }

@@ -80,7 +80,7 @@ pub(super) static DISTURBANCE: Section = Section {
     },
 };
 
-/// `[integration]`: how the plant moves between communication points.
+/// `[integration]`: the motion of the plant between communication points.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IntegrationSection {
@@ -106,22 +106,22 @@ impl IntegrationSection {
     }
 }
 
-/// `[disturbance]`: what a plant gets and what is measured of it beside what the model says, uniformly distributed
-/// within bounds. Each value is a function of seed, signal and time alone, so that the same run gives the same.
+/// `[disturbance]`: noise on the inputs and the measurements of a plant that its model does not know, uniformly
+/// distributed within bounds. Each value is a function of seed, signal and time alone, so a run can be repeated.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DisturbanceSection {
-    /// Another number, another sequence; finite, ≥ 0. Default 0.
+    /// Seed of the sequence; finite, ≥ 0. Default 0.
     #[serde(default)]
     pub seed: f64,
     /// Time in s for which a value lasts, > 0, counted from time 0. Default 0.01.
     #[serde(default = "hold")]
     pub period: f64,
-    /// Largest size of what is added to an input, by name, in its unit; ≥ 0. Default: nothing.
+    /// Largest size of the disturbance of an input, by name, in its unit; ≥ 0. Default: nothing.
     #[serde(default)]
     pub inputs: BTreeMap<String, f64>,
-    /// Largest size of what is added to an output `x.<state>`, by the name of the state, in its unit; ≥ 0. The state
-    /// itself stays what it is. Default: nothing.
+    /// Largest size of the disturbance of an output `x.<state>`, by the name of the state, in its unit; ≥ 0. The
+    /// state itself stays as it is. Default: nothing.
     #[serde(default)]
     pub measurements: BTreeMap<String, f64>,
 }
@@ -130,7 +130,7 @@ fn hold() -> f64 {
     0.01
 }
 
-/// How a number of the section is reached.
+/// Reaches a number of the section.
 type Access = Box<dyn Fn(&mut DisturbanceSection) -> Option<&mut f64> + Send>;
 
 impl DisturbanceSection {
@@ -163,18 +163,18 @@ pub struct PlantConfiguration {
     /// The FMU's name, a C identifier. Default: the model's name.
     #[serde(default)]
     pub name: String,
-    /// Which plant.
+    /// The plant's model.
     pub plant: PlantSection,
-    /// How it is integrated.
+    /// Integration between communication points.
     #[serde(default)]
     pub integration: IntegrationSection,
-    /// What the model does not say. Default: nothing.
+    /// Disturbances that the model does not know. Default: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<DisturbanceSection>,
     /// Initial state by name, in the units of the states; finite. Default 0, or nearest to it in the state's range.
     #[serde(default)]
     pub x0: BTreeMap<String, f64>,
-    /// The run it is meant for.
+    /// The run that it is meant for.
     #[serde(default)]
     pub experiment: ExperimentSection,
 }
@@ -203,7 +203,7 @@ impl PlantConfiguration {
         for parameter in self.parameters() {
             parameter.check(&mut self)?;
         }
-        // Whatever the ranges of single numbers cannot say.
+        // The plant itself refuses what the ranges of single numbers cannot.
         self.build()?;
         Ok(self)
     }

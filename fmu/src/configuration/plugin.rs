@@ -1,8 +1,8 @@
 //! `plant.plugin`: a plant and barriers that are compiled code, a shared library beside the configuration.
 //!
-//! What the library says of itself (names, units, ranges, parameters) is written into the completed configuration,
-//! with a number made from the library's bytes; so variables and GUID follow from that as for any plant, and a
-//! library that is exchanged afterwards is noticed.
+//! The library describes itself: names, units, ranges, parameters. This is written into the completed
+//! configuration, with a digest of the library's bytes. So variables and GUID follow from it as for any plant,
+//! and a library that is exchanged afterwards is noticed.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -17,14 +17,14 @@ use super::model::check_variable;
 use super::names::{check_identifier, taken};
 use super::{ConfigurationError, ParameterSection, PlantSection, Range, VariableSection};
 
-/// What a plug-in says of itself, and its code, which stays loaded as long as this is there.
+/// The description of a plug-in, and its code, which stays loaded as long as this lives.
 #[derive(Clone)]
 pub struct Plugin {
     /// Its file, without the folder: for messages.
     pub file: String,
-    /// Its file.
+    /// Its path.
     pub path: PathBuf,
-    /// Made from its bytes: other bytes, another text.
+    /// Digest of its bytes: other bytes give another text.
     pub digest: String,
     /// The states, in order.
     pub states: Vec<VariableSection>,
@@ -38,18 +38,19 @@ pub struct Plugin {
     pub code: Arc<dyn Code>,
 }
 
-/// What the bytes of a plug-in must come to.
+/// The digest that the bytes of a plug-in must have.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "must be a text, or a table with a text for each platform")]
 pub enum PluginDigest {
-    /// On the platform that the FMU is built for.
+    /// The digest on the platform that the FMU is built for.
     One(String),
-    /// On each platform, by its name in FMI 2.0. The configuration is then the same on all of them, and so is the GUID.
+    /// The digest on each platform, by its name in FMI 2.0. The configuration is then the same on all of them,
+    /// and so is the GUID.
     Each(BTreeMap<String, String>),
 }
 
 impl PluginDigest {
-    /// Refuses a plug-in whose bytes come to something else on this platform.
+    /// Refuses a plug-in whose bytes have another digest on this platform.
     fn check(&self, plugin: &Plugin) -> Result<(), ConfigurationError> {
         let (file, found) = (&plugin.file, &plugin.digest);
         let (field, wanted) = match self {
@@ -73,11 +74,11 @@ pub trait PluginLoader {
     ///
     /// # Errors
     ///
-    /// Why there is none that can be used.
+    /// The reason why there is none that can be used.
     fn load(&self, name: &str) -> Result<Plugin, String>;
 }
 
-/// For configurations without a place: refuses every plug-in.
+/// Refuses every plug-in, for configurations without a folder.
 pub(super) struct NoPlugins;
 
 impl PluginLoader for NoPlugins {
@@ -103,7 +104,7 @@ impl fmt::Debug for Loaded {
 }
 
 impl Plugin {
-    /// Whether its names, units and ranges are possible.
+    /// Checks that its names, units and ranges are possible.
     fn check(&self) -> Result<(), ConfigurationError> {
         let groups = [("state", &self.states), ("input", &self.inputs), ("barrier", &self.barriers)];
         let variables = groups.iter().flat_map(|(group, variables)| {
@@ -130,7 +131,7 @@ impl Plugin {
 }
 
 impl PlantSection {
-    /// Loads its plug-in and takes over what that says of itself, unless the section says otherwise where it may.
+    /// Loads its plug-in and takes over its description, unless the section gives other values where it may.
     pub(super) fn complete_plugin(
         &mut self,
         name: &str,
@@ -163,7 +164,7 @@ impl PlantSection {
     ///
     /// # Errors
     ///
-    /// It has none; the code does what it must not.
+    /// The section has no plug-in, or the code does something that it must not.
     pub(super) fn code(&self) -> Result<CodeModel, ConfigurationError> {
         let Some(plugin) = self.loaded() else {
             return Err(ConfigurationError::new("plant.plugin", "is not loaded"));
@@ -189,7 +190,7 @@ impl PlantSection {
     }
 }
 
-/// `own` unless it is not said, which `unsaid` is.
+/// Replaces `own` by `theirs` where it has the value `unsaid`.
 fn fill<T: PartialEq>(own: &mut T, unsaid: &T, theirs: T) {
     if own == unsaid {
         *own = theirs;

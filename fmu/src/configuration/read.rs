@@ -5,10 +5,10 @@ use std::fmt;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Most characters of a line of an error: no name or number that is allowed comes near.
+/// Most characters of a line of an error, far more than any allowed name or number needs.
 const LONGEST_LINE: usize = 600;
 
-/// A configuration that cannot be used: which field, what was found, what is allowed.
+/// A configuration that cannot be used: the field, the value found, the values allowed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConfigurationError {
     field: String,
@@ -26,7 +26,7 @@ impl ConfigurationError {
         &self.field
     }
 
-    /// What is wrong with it, with the value found and the range allowed.
+    /// The defect, with the value found and the range allowed.
     pub fn message(&self) -> &str {
         &self.message
     }
@@ -44,7 +44,7 @@ impl fmt::Display for ConfigurationError {
 
 impl std::error::Error for ConfigurationError {}
 
-/// `text` with lines that a person can read: what is quoted from a file may be of any length.
+/// `text` with lines that a person can read, since quotations from a file may be of any length.
 fn shortened(text: &str) -> String {
     let line = |line: &str| match line.char_indices().nth(LONGEST_LINE) {
         Some((end, _)) => format!("{}...", &line[..end]),
@@ -66,7 +66,7 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, ConfigurationErro
     serde_path_to_error::deserialize(de).map_err(|e| {
         let path = e.path().to_string();
         let path = if path == "." { String::new() } else { path };
-        // The file is TOML; what is wrong at that place follows.
+        // The file is TOML as such; the message goes on with the defect at that place.
         let text = e.inner().to_string().replacen("TOML parse error at ", "at ", 1);
         ConfigurationError::new(path, text.trim_end())
     })

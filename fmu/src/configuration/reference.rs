@@ -71,7 +71,7 @@ impl ModelName {
         }
     }
 
-    /// What it is, for a human.
+    /// A description, for a human.
     pub fn title(self) -> &'static str {
         match self {
             Self::PointMass => "point mass in the plane",
@@ -148,7 +148,7 @@ pub(super) static SECTION: Section = Section {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceSection {
-    /// Which plant.
+    /// The plant's model.
     pub model: ModelName,
     /// Bicycles only: distance from the rear axle to the centre of mass in m, > 0. Default 10.
     #[serde(default, skip_serializing_if = "Option::is_none")]

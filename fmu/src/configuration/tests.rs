@@ -50,7 +50,7 @@ points = [[4.0, 3.0], [5.0, 6.0]]
 plant = { model = "bicycle" }
 "#;
 
-/// What the defective file is refused with; `from` stands exactly once in `valid`.
+/// The message that refuses the defective file; `from` stands exactly once in `valid`.
 fn refusal(valid: &str, from: &str, to: &str) -> String {
     assert_eq!(valid.matches(from).count(), 1, "{from:?} in {valid}");
     Configuration::parse(valid).expect("the file without the defect");
@@ -254,7 +254,7 @@ fn no_barrier() {
     assert_eq!(error, "barrier: is empty, must have at least 1");
 }
 
-/// Messages that serde or TOML words: the field and the culprit must be named.
+/// Messages that serde or TOML words must name the field and the culprit.
 #[test]
 fn unknown_and_missing_keys_and_wrong_types() {
     for (valid, from, to, wanted) in [
@@ -408,7 +408,7 @@ fn default_value(key: &Key) -> Option<toml::Value> {
     }
 }
 
-/// A key that says its default changes nothing.
+/// A key with its stated default changes nothing.
 #[test]
 fn defaults_of_the_tables_are_those_of_the_files() {
     let heading = HEADING.replace("unicycle", "bicycle_small_slip");
@@ -460,7 +460,7 @@ fn defaults_of_the_tables_are_those_of_the_files() {
     assert_eq!(compared, SECTIONS.iter().flat_map(valued).collect());
 }
 
-/// The keys that the table of shapes says a shape needs are enough, and none is too many.
+/// The keys that a shape needs by its row in the table are enough, and none is too many.
 #[test]
 fn shapes_need_what_their_row_says() {
     let values = [
@@ -484,7 +484,7 @@ fn shapes_need_what_their_row_says() {
         format!("{key} = {}\n", value.1)
     };
     let head = "kind = \"filter\"\nplant.model = \"unicycle\"\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\n";
-    // A plug-in has to be there: tests/cli.
+    // A plug-in has to exist, which tests/cli sees to.
     for row in SHAPES.iter().filter(|row| row.name != "plugin") {
         let needed: String = row.required.iter().map(line).collect();
         let head = format!("{head}shape = \"{}\"\n", row.name);

@@ -9,7 +9,7 @@ use super::ConfigurationError;
 /// Factors are joined by a dot, those after the one `/` divide, a number behind a symbol is its exponent; `1` is
 /// no unit.
 pub fn base_unit(name: &str) -> Option<BaseUnit> {
-    /// More would be a mistake, and overflow.
+    /// Largest exponent; a larger one would be a mistake, and overflow.
     const LARGEST: i32 = 99;
     let mut base = BaseUnit::default();
     for (part, sign) in name.splitn(2, '/').zip([1, -1]) {
@@ -55,7 +55,7 @@ pub(super) fn unit_per(unit: &str, by: &str) -> String {
         for (part, side) in name.splitn(2, '/').zip([sign, -sign]) {
             for factor in part.split('.') {
                 let symbol = factor.trim_end_matches(|c: char| c.is_ascii_digit());
-                // Only a symbol without a number has the exponent 1 unsaid.
+                // Only a symbol without a number leaves the exponent 1 unsaid.
                 let power = side * factor[symbol.len()..].parse().unwrap_or(1);
                 match powers.iter_mut().find(|p| p.0 == symbol) {
                     Some(known) => known.1 += power,

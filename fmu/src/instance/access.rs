@@ -1,4 +1,4 @@
-//! Which value references may be read and written.
+//! The value references that may be read and written.
 
 use punctual_modeldescription::{BaseType, Causality, Variable};
 
@@ -22,14 +22,15 @@ impl Instance {
         self.check_each(base, references, settable)
     }
 
-    /// Whether each of `references` is a variable of the type `base` with an `allowed` causality.
+    /// Checks that each of `references` is a variable of the type `base` with an `allowed` causality.
     fn check_each(
         &self,
         base: BaseType,
         references: &[u32],
         allowed: impl Fn(Causality) -> bool,
     ) -> Result<(), Failure> {
-        // The small table, since this is done at every step; the variables themselves to say what is wrong.
+        // Reads the small table, since this is done at every step; only the message looks at the variables
+        // themselves.
         let fits = |reference: u32| {
             let kind = self.kinds.get(reference as usize);
             kind.is_some_and(|&(found, causality)| found == base && allowed(causality))
@@ -40,7 +41,7 @@ impl Instance {
         }
     }
 
-    /// Why `reference` is not a variable of the type `base`, or cannot be set now.
+    /// The reason why `reference` is not a variable of the type `base`, or cannot be set now.
     #[cold]
     fn misfit(&self, base: BaseType, reference: u32) -> Failure {
         match self.variable(base, reference) {

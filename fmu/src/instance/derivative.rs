@@ -5,8 +5,8 @@ use punctual_modeldescription::{BaseType, Causality, Variable};
 use super::{Call, Failure, Instance, Mode};
 
 impl Instance {
-    /// Writes the derivatives of the outputs `unknowns` along `seed`, one number for each of the inputs
-    /// `knowns`: of the outputs that would be read now had these inputs just been set, with the units of the
+    /// Writes the derivatives of the outputs `unknowns` along `seed`, one number for each of the inputs `knowns`.
+    /// They are those of the outputs that would be read now had these inputs just been set, with the units of the
     /// output over those of the input. Does not allocate once configured, and changes no value.
     ///
     /// # Errors
@@ -21,6 +21,7 @@ impl Instance {
         out: &mut [f64],
     ) -> Result<(), Failure> {
         self.check(Call::GetDirectionalDerivative)?;
+        // Check the references and the seed.
         for (references, causality, which) in
             [(unknowns, Causality::Output, "unknown"), (knowns, Causality::Input, "known")]
         {
@@ -38,6 +39,7 @@ impl Instance {
             let name = &self.product.variables[knowns[i] as usize].name;
             return Err(format!("the seed of {name} is {}, must be finite", seed[i]));
         }
+        // Differentiate along the one direction that the seeds make.
         if !self.configured {
             self.configure().map_err(|e| e.to_string())?;
         }
@@ -51,6 +53,7 @@ impl Instance {
         if self.mode == Mode::INITIALIZATION || self.block.direct_feedthrough() {
             self.block.differentiate(self.time, &self.values, direction, derivative)?;
         }
+        // Hand out finite numbers, or none.
         for &unknown in unknowns {
             let value = derivative[unknown as usize];
             if !value.is_finite() {

@@ -1,4 +1,4 @@
-//! The outputs of each barrier of a filter: a row has name, meaning, type and unit, value and derivative.
+//! The outputs of each barrier of a filter. A row has name, meaning, type and unit, value and derivative.
 
 use punctual_core::filter::{BarrierDerivative, BarrierReport};
 
@@ -6,15 +6,15 @@ use crate::configuration::Unit::{self, Is, OfH, OfHighestDerivative};
 
 /// An output of each barrier.
 pub struct BarrierOutput {
-    /// What follows `<barrier>.` in the variable's name.
+    /// The variable's name after `<barrier>.`.
     pub name: &'static str,
     /// Meaning, for a human.
     pub description: &'static str,
-    /// Its type, and where its value comes from.
+    /// The type, and the source of the value.
     pub reading: Reading,
 }
 
-/// The type of an output, and its value in what a step reports.
+/// The type of an output, and its value in a step's report.
 pub enum Reading {
     /// A number, its unit, and its derivative along a direction of the inputs.
     Real(Unit, fn(&BarrierReport) -> f64, fn(&BarrierDerivative) -> f64),
@@ -43,7 +43,7 @@ pub static BARRIER_OUTPUTS: [BarrierOutput; 13] = [
     BarrierOutput {
         name: "time_left",
         description: "time to the deadline, 0 from then on",
-        // It does not depend on the inputs.
+        // The time left does not depend on the inputs.
         reading: Real(Is("s"), |b| b.time_left, |_| 0.0),
     },
     BarrierOutput {

@@ -161,7 +161,7 @@ fn dependencies_say_whether_outputs_follow_inputs_at_once() {
         let all: Vec<u32> = (0..product.layout.outputs as u32).collect();
         let wanted = match &product.configuration {
             Configuration::Filter(c) if c.direct_feedthrough => all,
-            // Below, one by one.
+            // The parts are tested one by one below.
             Configuration::Controller(_) => continue,
             _ => Vec::new(),
         };
@@ -171,7 +171,7 @@ fn dependencies_say_whether_outputs_follow_inputs_at_once() {
     }
 }
 
-/// What a controller's outputs depend on, by name, found by changing one input at a time.
+/// The dependencies of a controller's outputs, by name, are those found by changing one input at a time.
 #[test]
 fn dependencies_of_controllers_are_those_found() {
     for text in controllers() {
@@ -184,7 +184,7 @@ fn dependencies_of_controllers_are_those_found() {
                 *value = start;
             }
         }
-        // Small speeds and a near goal: no limit is active.
+        // With small speeds and a near goal no limit is active.
         values.reals[..product.layout.states.min(4)].copy_from_slice(&[0.9, 2.1, 0.3, 0.2]);
         block.configure(&values).unwrap();
         let mut sampled = |values: &mut crate::block::Values| {
@@ -216,7 +216,7 @@ fn enumerations_cover_every_status_and_phase() {
     assert_eq!(names.len(), Status::ALL.len(), "{names:?}");
 }
 
-/// One valid change per field; each gives another GUID, and no two the same.
+/// One valid change per field gives another GUID each, and no two the same.
 #[test]
 fn the_guid_differs_when_any_field_differs() {
     let filter = format!("kind = \"filter\"\nplant.model = \"bicycle\"\n{BARRIER}");
@@ -282,7 +282,7 @@ fn the_guid_does_not_depend_on_the_spelling() {
     assert_eq!(short.guid, stated.guid);
 }
 
-/// Some importers add one of this name themselves.
+/// Some importers add a variable of this name themselves.
 #[test]
 fn no_variable_is_called_time() {
     for product in every_product() {

@@ -1,9 +1,10 @@
-//! What the standard says of a description beyond the schema (FMI 2.0.4, sections 2.2 and 4.3): one list
-//! for descriptions that are about to be written and for those that were read.
+//! Rules of the standard beyond the schema (FMI 2.0.4, sections 2.2 and 4.3): one list for descriptions that are
+//! about to be written and for those that were read.
 //!
 //! A description that is written must keep all rules on the description; its structure follows from its
-//! variables. One that was read ([`Located`](crate::Located)) may break any rule, and some of its attributes may
-//! not be values of their type at all: the model has nothing there, and rules that would need it are silent.
+//! variables. A description that was read ([`Located`](crate::Located)) may break any rule, and some of its
+//! attributes may be no values of their type at all. The model has nothing in their place, and rules that need
+//! them are silent.
 
 // The structure of a description that is written follows from its variables.
 #[cfg(feature = "read")]
@@ -15,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-/// How bad it is to break a rule.
+/// Severity of breaking a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -36,8 +37,8 @@ impl fmt::Display for Severity {
 
 use Severity::{Error, Warning};
 
-/// Every rule on descriptions: its name, how bad it is to break it, and what it asks. A rule's name never
-/// changes its meaning.
+/// Every rule on descriptions: its name, the severity of breaking it, and its demand. A rule's name never changes
+/// its meaning.
 pub const RULES: &[(&str, Severity, &str)] = &[
     ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
     ("interface.identifier", Error, "modelIdentifier is a C identifier"),
@@ -114,16 +115,16 @@ pub enum Place {
 pub struct Violation {
     /// The name of one of [`RULES`].
     pub rule: &'static str,
-    /// Where.
+    /// The place in the description.
     pub place: Place,
-    /// What is wrong, with the values and those allowed.
+    /// The defect, with the values found and those allowed.
     pub message: String,
 }
 
 /// Attributes that are missing though they must be there, or are no value of their type.
 pub(crate) type Unread = HashSet<(Place, &'static str)>;
 
-/// What rules look at, and whom they tell.
+/// The description that rules look at, and the reporter that they tell.
 pub(crate) struct Check<'a> {
     pub(crate) description: &'a ModelDescription,
     pub(crate) unread: &'a Unread,

@@ -5,7 +5,7 @@ use crate::structure::index;
 use crate::{Causality, Initial, ModelStructure, Real, Unknown, Variable, VariableKind};
 use std::collections::{BTreeSet, HashSet};
 
-/// Names shown of a longer list.
+/// Most names shown of a longer list.
 const SHOWN: usize = 8;
 
 pub(super) fn check(check: &mut Check<'_>, structure: &ModelStructure) {
@@ -73,7 +73,7 @@ impl Check<'_> {
         }
     }
 
-    /// Whether a list holds the variables wanted, each once, and no other.
+    /// Checks that a list holds the variables wanted, each once, and no other.
     fn complete(
         &mut self,
         rule: &'static str,
@@ -124,7 +124,8 @@ impl Check<'_> {
         }
     }
 
-    /// Outputs that are computed in initialization, calculated parameters, and so states and derivatives.
+    /// Outputs that are computed in initialization, calculated parameters, and states and derivatives computed
+    /// then.
     fn initial_unknowns(&self, derivatives: &[Unknown]) -> BTreeSet<u32> {
         let description = self.description;
         let computed = |variable: &Variable| {

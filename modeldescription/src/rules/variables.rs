@@ -129,7 +129,7 @@ impl Check<'_> {
     }
 
     fn start(&mut self, v: usize, variable: &Variable) {
-        // An illegal combination is told already; what follows from it would be noise.
+        // An illegal combination is told already; further findings on it would be noise.
         let Some(rule) = InitialRule::of(variable.causality, variable.variability) else { return };
         if variable.initial.is_some_and(|initial| !rule.allowed.contains(&initial)) {
             return;

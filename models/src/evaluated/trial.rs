@@ -1,4 +1,4 @@
-//! Code run at sample states before anything depends on it.
+//! Trial of code at sample states, before anything depends on it.
 
 use punctual_core::lie;
 
@@ -7,28 +7,29 @@ use crate::Error;
 use crate::motion::Equations;
 use crate::series::Series;
 
-/// How far differences reach, as a part of a component and absolutely: their own error, of the order of its square,
-/// and round-off over it are both far below [`APART`] unless a function changes over such a distance.
+/// Reach of the differences, relative to a component and absolutely. The error of a difference is of the order of
+/// its square. That error and round-off are both far below [`APART`], unless a function changes over such a
+/// distance.
 const REACH: f64 = 1e-5;
 
-/// The part by which a difference may be off: a derivative that is wrong is mostly wrong as a whole.
+/// Relative error that a difference may have: a derivative that is wrong is mostly wrong as a whole.
 const APART: f64 = 0.05;
 
-/// Round-off of a value in a difference, as a part of it.
+/// Round-off of a value in a difference, relative to the value.
 const ROUND_OFF: f64 = 1e-10;
 
-/// What a call computed at a sample: values and slopes of f, g and all barriers.
+/// Values and slopes of f, g and all barriers at a sample.
 type Outcome = Vec<[f64; 2]>;
 
-/// Runs the code at samples within `ranges` as often as it takes to see what it does.
+/// Runs the code at samples within `ranges`, as often as it takes to see what it does.
 ///
 /// # Errors
 ///
-/// What it did that it must not.
+/// Something that the code must not do.
 pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]]) -> Result<(), Error> {
     let mut found: Vec<Found> = Vec::new();
     for (k, (t, x)) in lie::samples(ranges).into_iter().enumerate() {
-        // Forwards and backwards in turn, and no two components by the same part.
+        // Components move forwards and backwards in turn, and no two of them by the same part.
         let part = |i: usize| if (i + k).is_multiple_of(2) { 1.0 } else { -0.7 + 0.01 * i as f64 };
         let v: Vec<f64> = x.iter().enumerate().map(|(i, x)| (1.0 + x.abs()) * part(i)).collect();
         let at = |s: f64| x.iter().zip(&v).map(|(x, v)| x + s * v).collect::<Vec<_>>();
@@ -60,7 +61,7 @@ pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]
             let message = "is not finite at any sample: give the states the ranges (min, max) for which the model is meant";
             return Err(Error::new(place(i), message));
         }
-        // Not where it is so at few samples: a function may have kinks and jumps.
+        // A few samples prove nothing, since a function may have kinks and jumps.
         if 2 * wrong > samples {
             let message = format!(
                 "has a derivative along a direction of {slope:.6e}, but by its values {difference:.6e} at more than half of the samples: probably something was computed from plain values"
@@ -71,14 +72,14 @@ pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]
     Ok(())
 }
 
-/// What was found of a component at the samples.
+/// Findings on a component over all samples.
 #[derive(Clone, Copy, Default)]
 struct Found {
-    /// Those at which it and its difference are finite.
+    /// Samples at which the component and its difference are finite.
     samples: usize,
-    /// Those at which slope and difference differ.
+    /// Samples at which slope and difference differ.
     wrong: usize,
-    /// Slope and difference at the last of these.
+    /// Slope and difference at the last of the wrong samples.
     slopes: [f64; 2],
 }
 

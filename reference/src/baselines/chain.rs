@@ -45,13 +45,13 @@ impl ClassK {
 
 /// ψ_0 = h, ψ_i = ψ̇_{i−1} + α_i(ψ_{i−1}), and ψ_n ≥ 0, with class-K functions α_1 … α_n.
 ///
-/// Where ψ_i(t₀) ≥ 0 for all i < n it keeps all of them so. From outside:
+/// Where ψ_i(t₀) ≥ 0 for all i < n, it keeps all of them so. From outside:
 ///
 /// - Linear functions are Π (D + p_i) h ≥ 0, the constraint of [`Exponential`](super::Exponential): no deadline.
-/// - Powers with q_i in (0, 1) bring ψ_{n−1}, then ψ_{n−2}, … and last h to zero in finite time, each within
-///   |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) from where the one before it has; [`Self::reach_time`] is the sum of these
-///   at the start, which bounds the arrival where every ψ_i, i < n, is what it was then or has grown.
-///   A power is not Lipschitz at 0: near ψ_i = 0 the floor under h⁽ⁿ⁾ has the term p q |ψ|^{q−1} ψ̇.
+/// - Powers with q_i in (0, 1) bring ψ_{n−1}, then ψ_{n−2}, … and last h to zero in finite time. Each takes at
+///   most |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) from where the one before it has arrived. [`Self::reach_time`] is the
+///   sum of these at the start. It bounds the arrival where no ψ_i, i < n, falls below its value at the start. A
+///   power is not Lipschitz at 0: near ψ_i = 0 the floor under h⁽ⁿ⁾ has the term p q |ψ|^{q−1} ψ̇.
 ///
 /// # References
 ///
@@ -158,8 +158,8 @@ impl Chain {
         for i in 0..self.n {
             values[i] = psi.coefficients[0];
             let image = self.functions[i].of(psi);
-            // Coefficients that are not known any more are those of h⁽ⁿ⁾ = 0 or beyond; none of them comes
-            // down to the value at the end but that.
+            // Unknown coefficients are those of h⁽ⁿ⁾ = 0 or beyond. Of these only h⁽ⁿ⁾ = 0 itself reaches the
+            // value at the end.
             for k in 0..K - 1 {
                 psi.coefficients[k] = (k + 1) as f64 * psi.coefficients[k + 1] + image.coefficients[k];
             }

@@ -9,9 +9,9 @@ use punctual_core::error::{Error, positive};
 /// ψ_1 = ḣ + α |h|^p sign h with α = |h₀|^{1−p}/((1 − p) T), such that h = 0 at T where ψ_1 = 0 throughout.
 ///
 /// For n = 1 it is ψ_1 ≥ 0, below and above zero
-/// ([`Method::FirstOrder`](punctual_core::filter::Method::FirstOrder) is used below only). For n > 1 the constraint is
-/// (D + k)ⁿ⁻¹ ψ_1 ≥ 0, which is ours: it keeps the deadline where ψ_1 and its first n − 2 derivatives start so that
-/// ψ_1 ≥ 0 from then on. A start at rest outside has ψ_1 < 0, and arrives later than T.
+/// ([`Method::FirstOrder`](punctual_core::filter::Method::FirstOrder) is used below only). For n > 1 the
+/// constraint is (D + k)ⁿ⁻¹ ψ_1 ≥ 0, which is ours. It keeps the deadline where ψ_1 and its first n − 2
+/// derivatives start so that ψ_1 ≥ 0 from then on. A start at rest outside has ψ_1 < 0, and arrives later than T.
 ///
 /// # References
 ///

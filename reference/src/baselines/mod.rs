@@ -1,5 +1,6 @@
-//! Constraints of the literature, to compare with: each a [`Condition`] that
-//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) puts in the place of this project's methods.
+//! Baselines: constraints of the literature, to compare with. Each is a [`Condition`] that
+//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) puts in the place of this
+//! project's methods.
 //!
 //! | condition | h⁽ⁿ⁾ ≥ φ such that | deadline | source |
 //! |---|---|---|---|
@@ -9,8 +10,8 @@
 //! | [`FirstOrderFixedTime`] | ḣ + α \|h\|^p sign h ≥ 0 | T, for n = 1 | Bhat and Bernstein 2000; order n ours |
 //! | [`Tube`] | h + s(t) ≥ 0 kept, s shrinking to 0 | T | arXiv:2603.17003 for n = 1; order n ours |
 //!
-//! All but the tube are time-invariant. None says what a held input costs; the filter enforces them at the
-//! samples. With a margin μ in the settings all of them are conditions on h − μ.
+//! All but the tube are time-invariant. None accounts for the loss of a held input; the filter enforces them at
+//! the samples. With a margin μ in the settings all of them are conditions on h − μ.
 
 mod chain;
 mod exponential;
@@ -26,7 +27,7 @@ pub use tube::Tube;
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::error::{Error, ErrorKind};
 
-/// `n`, a possible number of links.
+/// Checks `n` as a number of links.
 fn checked_order(field: &str, n: usize) -> Result<usize, Error> {
     if (1..=MAX_RELATIVE_DEGREE).contains(&n) {
         return Ok(n);

@@ -11,9 +11,9 @@ use punctual_core::error::{Error, ErrorKind, positive};
 /// start is in the tube. The schedule is ours (the source leaves it free, bounded); k ≥ n makes s⁽ⁿ⁾ bounded.
 ///
 /// For n > 1, ours: the tube has to contain the start with its derivatives, (D + a)ⁱ(h + s) ≥ 0 at the anchor for
-/// every i < n. Each is linear in s₀, and the least s₀ ≥ 0 that meets all of them is taken. Then h ≥ −s
-/// throughout, and h ≥ 0 from T on. Where (D + a)ⁱ(1 − τ/T)ᵏ ≤ 0 at the anchor (aT too small for k) no s₀ may do;
-/// that condition is then left out, and nothing follows.
+/// every i < n. Each of these is linear in s₀, and the least s₀ ≥ 0 that meets all of them is taken. Then h ≥ −s
+/// throughout, and h ≥ 0 from T on. Where (D + a)ⁱ(1 − τ/T)ᵏ ≤ 0 at the anchor (aT too small for k) no s₀ may do.
+/// That condition is then left out, and nothing follows.
 ///
 /// # References
 ///

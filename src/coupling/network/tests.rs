@@ -146,7 +146,7 @@ fn undeclared_dependencies_can_be_said_to_be_none() {
     };
     let network = run("filter");
     assert_eq!((network.direct.as_slice(), network.delayed.as_slice()), (&[2][..], &[0, 1][..]));
-    // What an FMU declares counts.
+    // The FMU's own declaration counts.
     assert_eq!(run("gain").direct, [1, 2]);
 }
 

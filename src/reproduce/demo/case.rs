@@ -10,7 +10,7 @@ use crate::reproduce::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Sh
 pub struct Case {
     /// The plant.
     pub vehicle: Vehicle,
-    /// How the deadline is to be met.
+    /// The method by which the deadline is to be met.
     pub baseline: Baseline,
     /// Barrier, nominal controller, margin and times.
     pub setup: Setup,

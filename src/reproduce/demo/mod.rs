@@ -19,16 +19,16 @@ use crate::recording::Recording;
 
 /// One coupled run.
 pub struct Run {
-    /// What was run.
+    /// The case.
     pub case: Case,
-    /// What was recorded.
+    /// Its recording.
     pub recording: Recording,
     /// The numbers of the table.
     pub summary: Summary,
 }
 
-/// Runs all cases, for each vehicle the paper's method and ours; writes configurations, FMUs, system files, CSV and
-/// pictures into `folder`. `progress` hears of the fraction done (0 to 1).
+/// Runs all cases, for each vehicle the paper's method and ours. Writes configurations, FMUs, system files, CSV
+/// and pictures into `folder`. `progress` hears of the fraction done (0 to 1).
 ///
 /// # Errors
 ///

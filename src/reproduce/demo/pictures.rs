@@ -18,8 +18,8 @@ pub(super) fn draw(vehicle: Vehicle, paper: &Run, ours: &Run, folder: &Path) -> 
     Ok(())
 }
 
-/// The run up to its arrival where it is the paper's (what follows would hide everything else), else
-/// the whole of it.
+/// Number of samples shown: up to the arrival for a run of the paper's method, whose rest would hide everything
+/// else, and the whole of another run.
 fn shown(run: &Run) -> usize {
     let len = run.recording.len();
     let end = arrival(run).filter(|_| run.case.is_the_papers());
@@ -61,6 +61,7 @@ fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
 /// h of each method with the bound it promises, then both as distances near the deadline.
 fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
     let mut plots = Vec::new();
+    // h with its bound, a panel for each method.
     for run in [ours, paper] {
         let time = run.recording.times()[..shown(run)].to_vec();
         let line = |label: &str, name: &str, style, colour| {
@@ -86,6 +87,7 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
             ..TimePlot::default()
         });
     }
+    // Both as distances.
     let mut lines = Vec::new();
     for (run, colour) in [(ours, 0), (paper, 1)] {
         let (x, y) = (series(&run.recording, "plant.x.x_p")?, series(&run.recording, "plant.x.y_p")?);
@@ -119,7 +121,7 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
 fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
     let end = shown(run);
     let time = run.recording.times()[..end].to_vec();
-    // The paper's go from rest to tens of thousands: only a logarithm shows more than the last sample.
+    // The paper's inputs go from rest to tens of thousands: only a logarithm shows more than the last sample.
     let logarithmic = run.case.is_the_papers();
     let mut plots = Vec::new();
     for (i, signal) in run.case.vehicle.inputs().iter().enumerate() {

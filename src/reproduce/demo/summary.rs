@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::recording::Recording;
 use crate::reproduce::trial::{Measured, Outcome};
 
-/// What one run comes to.
+/// Numbers of one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// First communication point with h ≥ 0, in s.
@@ -24,7 +24,7 @@ pub struct Summary {
     pub peak: [f64; 2],
     /// Largest length of the input vector in the whole run; for the point mass, in m/s².
     pub peak_norm: f64,
-    /// Samples whose constraint could not be met.
+    /// Samples whose constraint was not met.
     pub unsatisfied: usize,
     /// Communication steps of the coupled system per second of wall time.
     pub steps_per_second: f64,

@@ -1,4 +1,4 @@
-//! What the XML schema of FMI 2.0 says, as one table ([`table`]) and one pass over the document.
+//! The XML schema of FMI 2.0, as one table ([`table`]) and one pass over the document.
 
 mod table;
 mod types;
@@ -12,10 +12,11 @@ use table::{Content, ELEMENTS, Element, Times, Use};
 /// The attributes that every element may have: those of the schema language itself.
 const SCHEMA_INSTANCE: &str = "http://www.w3.org/2001/XMLSchema-instance";
 
-/// Parses the text; a finding where it is not well-formed.
+/// Parses the text; a text that is not well-formed is a finding.
 pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Document<'a>> {
     findings.read(text);
-    // Without a document type, and as many nodes as the text has been looked through for.
+    // No document type is allowed. The number of nodes has no limit here, since the text was checked for it
+    // before.
     let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
     match Document::parse_with_options(text, options) {
         Ok(document) => {
@@ -33,7 +34,8 @@ pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Docume
     }
 }
 
-/// The standard asks for UTF-8; the parser goes by the bytes, other importers by the declaration.
+/// Checks the declared encoding. The standard asks for UTF-8; the parser goes by the bytes, other importers by
+/// the declaration.
 fn declared_encoding(text: &str, findings: &mut Findings) {
     let declaration = text.strip_prefix("<?xml").and_then(|rest| rest.split_once("?>")).map(|(head, _)| head);
     let Some((_, rest)) = declaration.and_then(|head| head.split_once("encoding")) else { return };
@@ -47,7 +49,7 @@ fn declared_encoding(text: &str, findings: &mut Findings) {
     }
 }
 
-/// Where a node begins.
+/// The beginning of a node.
 fn place(node: Node<'_, '_>) -> Mark {
     mark(node, node.range().start)
 }
@@ -66,7 +68,7 @@ pub(super) fn check(document: &Document<'_>, findings: &mut Findings) {
         findings.add("schema.element", place(root), message);
         return;
     }
-    // Not by recursion: the depth is the file's.
+    // A list replaces recursion, since the file decides the depth.
     let mut open = vec![(root, "fmiModelDescription")];
     while let Some((node, kind)) = open.pop() {
         let Some(element) = ELEMENTS.iter().find(|element| element.kind == kind) else { continue };
@@ -120,6 +122,7 @@ fn children<'a, 'i>(
     };
     let mut counts = vec![0_usize; rules.len()];
     let mut reached = 0;
+    // Each child: allowed here, in its order, and not too often.
     for child in node.children() {
         if let Some(text) = child.text().filter(|text| child.is_text() && !text.trim().is_empty()) {
             let message = format!("text {:?} between the elements of {name}", brief(text.trim()));
@@ -148,6 +151,7 @@ fn children<'a, 'i>(
         }
         open.push((child, rule.kind));
     }
+    // Exactly one of a choice, and every child that must be there.
     let choosing = rules.iter().filter(|rule| rule.times == Times::Choice).map(|rule| rule.name);
     let chosen: usize =
         rules.iter().zip(&counts).filter(|(rule, _)| rule.times == Times::Choice).map(|(_, n)| *n).sum();

@@ -7,7 +7,7 @@ use super::types::Value;
 use Times::{Choice, Many, Maybe, One, Some};
 use Value::{Boolean, DateTime, Double, Int, Line, OneOf, Text, Unsigned, Version, Words};
 
-/// How often an element stands in its parent.
+/// Number of times that an element stands in its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Times {
     /// Exactly once.
@@ -26,7 +26,7 @@ impl Times {
     pub(super) fn most(self) -> usize {
         match self {
             One | Maybe => 1,
-            // More than one of a choice is told for all of them together.
+            // A second element of a choice is told for the whole choice.
             Some | Many | Choice => usize::MAX,
         }
     }
@@ -39,12 +39,12 @@ pub(super) enum Use {
     Optional,
 }
 
-/// What else may stand in an element.
+/// Further content of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Content {
-    /// The children of the table, and nothing else.
+    /// Only the children of the table.
     Elements,
-    /// Whatever a tool put there.
+    /// Any content that a tool put there.
     Anything,
 }
 
@@ -116,7 +116,7 @@ pub(super) const ELEMENTS: &[Element] = &[
             may("numberOfEventIndicators", Unsigned),
         ],
         &[
-            // In either order; that each is there once is a rule beyond the schema.
+            // Both orders are allowed. A rule beyond the schema asks for one of each.
             child(0, "ModelExchange", "ModelExchange", Many),
             child(0, "CoSimulation", "CoSimulation", Many),
             child(1, "UnitDefinitions", "UnitDefinitions", Maybe),

@@ -1,4 +1,4 @@
-//! The simple types of XML Schema that the FMI 2.0 schema uses, and what a text must be to be one.
+//! The simple types of XML Schema that the FMI 2.0 schema uses, and the texts that they accept.
 
 use punctual_modeldescription::xsd::{boolean, double, int, is_date_time, unsigned, words};
 
@@ -30,7 +30,7 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// Whether the text is such a value; if not, what is allowed.
+    /// Accepts a text that is such a value; else says what is allowed.
     pub(super) fn accepts(self, text: &str) -> Result<(), String> {
         let one_of = |words: &[&str]| words.join(", ");
         let (good, allowed) = match self {

@@ -1,5 +1,5 @@
-//! Two importers that are not ours, `fmi` and `fmi-rs`, couple a filter with a plant; every output of both
-//! must equal what `punctual run` recorded, bit for bit, at every communication point.
+//! Two importers that are not ours, `fmi` and `fmi-rs`, couple a filter with a plant. Every output of both must
+//! equal that recorded by `punctual run`, bit for bit, at every communication point.
 //!
 //! `punctual-importers FOLDER STEP`, where FOLDER holds filter.fmu, plant.fmu and recorded.csv; see `run`.
 #![forbid(unsafe_code)]
@@ -13,11 +13,11 @@ use std::path::Path;
 
 use recording::Recording;
 
-/// How a value is read.
+/// Getters by which a value is read.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Real,
-    /// Enumerations too.
+    /// Integers, and enumerations too.
     Integer,
     Boolean,
 }
@@ -72,7 +72,7 @@ fn outputs(importer: &mut impl Importer) -> Vec<(String, f64)> {
     read.into_iter().map(value).collect()
 }
 
-/// Couples both FMUs in the order of `punctual run` and compares; the number of values compared.
+/// Couples both FMUs in the order of `punctual run` and compares; returns the number of values compared.
 fn compare<I: Importer>(folder: &Path, h: f64, recording: &Recording) -> usize {
     let (mut filter, mut plant) = (I::open(&folder.join("filter.fmu")), I::open(&folder.join("plant.fmu")));
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];

@@ -1,4 +1,4 @@
-//! What `punctual run` wrote.
+//! The recording of `punctual run`.
 
 use std::collections::HashMap;
 use std::path::Path;

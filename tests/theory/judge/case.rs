@@ -34,13 +34,14 @@ impl Numbers {
     }
 }
 
-/// A set and what is asked for.
+/// A set and the promise asked for on it.
 #[derive(Clone, Debug)]
 pub(crate) struct Set {
     pub(crate) shape: Shape,
-    /// T in s; of a set that is only kept, what the filter is given where it wants one.
+    /// Deadline T in s. For a set that is only kept, it is the deadline that the filter is given where it wants
+    /// one.
     pub(crate) deadline: f64,
-    /// Whether nothing is to be reached: only what is safe at the anchor stays so.
+    /// Whether nothing is to be reached: only a start that is inside at the anchor is to stay so.
     pub(crate) keeping: bool,
     pub(crate) rate: Option<f64>,
     pub(crate) stay_rate: Option<f64>,
@@ -79,7 +80,7 @@ fn told(builder: FilterBuilder, longest: f64) -> FilterBuilder {
     builder.period_max(longest).expect("a valid period")
 }
 
-/// Who is in control.
+/// The references by which u_ref is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Reference {
     Zero,
@@ -94,7 +95,7 @@ pub(crate) enum Reference {
     },
 }
 
-/// When samples come.
+/// The schedules by which samples come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Steps {
     Regular,
@@ -118,7 +119,7 @@ pub(crate) enum Steps {
 pub(crate) struct Case {
     pub(crate) plant: Plant,
     pub(crate) sets: Vec<Set>,
-    /// Of each |u_i|.
+    /// Bounds on each |u_i|.
     pub(crate) bounds: Input,
     pub(crate) start_time: f64,
     pub(crate) start: State,
@@ -126,11 +127,11 @@ pub(crate) struct Case {
     pub(crate) steps: Steps,
     /// The usual step in s, which the filter is told as the first.
     pub(crate) step: f64,
-    /// Whether it is told the longest.
+    /// Whether the filter is told the longest step.
     pub(crate) told: bool,
-    /// s from the anchor.
+    /// Length of the run in s from the anchor.
     pub(crate) horizon: f64,
-    /// Of what is drawn on the way.
+    /// Seed of the numbers drawn on the way.
     pub(crate) seed: u64,
 }
 
@@ -175,7 +176,7 @@ impl Case {
         builder.build().expect("a valid filter")
     }
 
-    /// The longest hold there will be.
+    /// The longest hold of the case.
     pub(crate) fn longest(&self) -> f64 {
         if self.steps == Steps::Missed { 3.0 * self.step } else { self.step }
     }
@@ -189,7 +190,7 @@ impl Case {
     pub(crate) fn next_sample(&self, k: usize, t: f64, numbers: &mut Numbers) -> f64 {
         let step = self.step;
         t + match self.steps {
-            // As a clock counts, without the sum of its round-off.
+            // Counts as a clock does, without the sum of its round-off.
             Steps::Regular => return self.start_time + (k + 1) as f64 * step,
             Steps::Jittered => step * numbers.within(0.5, 1.0),
             Steps::Scattered => step * numbers.scale(0.05, 1.0),
@@ -202,7 +203,7 @@ impl Case {
         }
     }
 
-    /// u_ref; `last` is when it was drawn and what, for [`Reference::Random`].
+    /// The wanted input u_ref; `last` is the time of the last draw and its value, for [`Reference::Random`].
     pub(crate) fn wanted(&self, t: f64, x: &State, last: &mut (f64, Input), numbers: &mut Numbers) -> Input {
         match self.reference {
             Reference::Zero => [0.0; 2],

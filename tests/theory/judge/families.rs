@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::case::{Case, Numbers, Reference, Set, Steps};
 use super::model::{Plant, Shape};
 
-/// What is drawn.
+/// The kinds of cases drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Family {
     /// So many integrators and a line.
@@ -72,12 +72,12 @@ impl Family {
     }
 }
 
-/// What all families have: rates, margin, sampling, bounds and reference for a deadline, a size of h and the
-/// inputs that a run of that size takes.
+/// Completes a case with the parts that all families have: rates, margin, sampling, bounds and reference. They
+/// suit a deadline, a size of h and the inputs that a run of that size takes.
 fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], numbers: &mut Numbers) -> Case {
     let deadline = sets[0].deadline;
     let mut step = deadline / numbers.scale(10.0, 1000.0);
-    // T on the grid.
+    // The deadline lies on the grid.
     if numbers.chance(0.5) {
         step = deadline / (deadline / step).round();
     }
@@ -107,7 +107,7 @@ fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], nu
     Case { sets, bounds, reference, steps, start_time, told, ..case }
 }
 
-/// 0 in half of the cases, else up to 5 % of `size`.
+/// A margin of 0 in half of the cases, else up to 5 % of `size`.
 fn margin(size: f64, numbers: &mut Numbers) -> f64 {
     if numbers.chance(0.5) { 0.0 } else { numbers.within(0.0, 0.05) * size }
 }
@@ -247,7 +247,7 @@ fn wave(numbers: &mut Numbers) -> Case {
     case
 }
 
-/// From outside, with a velocity that may lead into the disc.
+/// A start outside, with a velocity that may lead into the disc.
 fn keep_out(numbers: &mut Numbers) -> Case {
     let (radius, deadline) = (numbers.scale(0.2, 5.0), 5.0);
     let far = radius * numbers.scale(1.02, 10.0);

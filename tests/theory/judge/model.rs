@@ -103,7 +103,7 @@ impl Plant {
         dx
     }
 
-    /// How fast the state turns under the input, rad/s: a grid must resolve it.
+    /// Rate in rad/s at which the state turns under the input: a grid must resolve it.
     pub(crate) fn turning(&self, x: &State, u: &Input, dt: f64) -> f64 {
         match self {
             Self::Unicycle => u[1].abs(),
@@ -176,7 +176,7 @@ impl Shape {
         }
     }
 
-    /// How fast the set itself turns, rad/s.
+    /// Rate in rad/s at which the set itself turns.
     pub(crate) fn turning(&self) -> f64 {
         if let Self::Wave { rate, .. } = self { rate.abs() } else { 0.0 }
     }

@@ -1,12 +1,12 @@
 //! The judge's own integrator: Dormand and Prince of order 5 with steps of its own choice.
 //!
-//! Nothing of it is the crate's: the filter predicts by two steps of Runge-Kutta of order 4 per period.
+//! It shares nothing with the crate: the filter predicts by two steps of Runge-Kutta of order 4 per period.
 
 use super::model::{Input, Plant, State};
 
-/// What a step may be off by, as a part of 1 + |x|: a thousandth of what counts as broken.
+/// Tolerance of a step, as a part of 1 + |x|: a thousandth of the size that counts as broken.
 const TOLERANCE: f64 = 1e-12;
-/// Steps that one call may take. A state that needs more is given up, as not a number.
+/// Most steps of one call. A state that needs more becomes not a number.
 const STEPS: usize = 5000;
 
 const STAGES: [&[f64]; 6] = [
@@ -46,7 +46,7 @@ pub(crate) fn advance(plant: &Plant, x: &State, u: &Input, dt: f64) -> State {
     [f64::NAN; 8]
 }
 
-/// One step, and how large its error is in units of what is allowed.
+/// Makes one step, and returns its error in units of the tolerance.
 fn one(plant: &Plant, x: &State, u: &Input, dt: f64) -> (State, f64) {
     let n = plant.states();
     let mut rates = [plant.derivative(x, u); 7];
@@ -63,7 +63,7 @@ fn one(plant: &Plant, x: &State, u: &Input, dt: f64) -> (State, f64) {
     for i in 0..n {
         let sum: f64 = ERROR.iter().zip(&rates).map(|(w, rate)| w * rate[i]).sum();
         let part = (dt * sum).abs() / (TOLERANCE * (1.0 + x[i].abs()));
-        // Not `max`, which would hide what is not a number.
+        // Not `max`, which would hide a value that is not a number.
         worst = if part > worst || part.is_nan() { part } else { worst };
     }
     (next, worst)

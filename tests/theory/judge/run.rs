@@ -6,36 +6,36 @@ use super::case::{Case, Numbers};
 use super::model::{Input, State};
 use super::motion::advance;
 
-/// Parts of a hold at whose ends h is looked at; more where plant or set turn.
+/// Least number of parts of a hold at whose ends h is looked at; more where plant or set turn.
 const PARTS: f64 = 20.0;
 /// The angle that plant or set may turn by within a part, rad.
 const TURN: f64 = 0.3;
 /// Most parts: a run that turns faster than they resolve ends there.
 const MOST_PARTS: f64 = 2000.0;
-/// h below this part of the problem's size is outside. The filter meets its rows to 1e-9 of their terms, so
-/// that a promise with no margin can end that far below 0.
+/// Part of the problem's size below which h is outside. The filter meets its rows to 1e-9 of their terms, so that
+/// a promise with no margin can end that far below 0.
 const TOLERANCE: f64 = 1e-9;
 
 /// A promise seen broken.
 #[derive(Clone, Copy, Debug)]
 #[allow(dead_code, reason = "all of it is printed, to run a case again")]
 pub(crate) struct Break {
-    /// When, and the sample from which the input was held.
+    /// Time of the break, and of the sample from which the input was held.
     pub(crate) time: f64,
     pub(crate) sample: f64,
     pub(crate) hold: f64,
     pub(crate) h: f64,
-    /// h over what counts as outside.
+    /// h over the size that counts as outside.
     pub(crate) size: f64,
     pub(crate) phase: Phase,
 }
 
-/// What became of the promise on one set.
+/// Findings on the promise on one set.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Promise {
     /// Whether h ≥ 0 at the anchor.
     pub(crate) inside: bool,
-    /// h < 0 at T itself.
+    /// Whether h < 0 at T itself.
     pub(crate) late: bool,
     /// The first sample with h ≥ 0, and whether h < 0 at an instant from there on.
     pub(crate) arrival: Option<f64>,
@@ -59,12 +59,12 @@ impl Promise {
     }
 }
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     pub(crate) promises: Vec<Promise>,
     pub(crate) samples: usize,
-    /// Whether it was thrown so far, or turned so fast, that the rest was not looked at.
+    /// Whether the run was thrown so far, or turned so fast, that its rest was not looked at.
     pub(crate) ended: bool,
 }
 
@@ -101,12 +101,12 @@ pub(crate) fn run(case: &Case) -> Run {
     run_seen(case, |_, _, _, _| {})
 }
 
-/// What the last sample said of one set.
+/// The last report on one set.
 #[derive(Clone, Copy)]
 struct Said {
     guaranteed: bool,
     phase: Phase,
-    /// s into the hold from which h ≥ 0 is promised, infinite if it is not.
+    /// Time in s into the hold from which h ≥ 0 is promised, infinite if it is not.
     from: f64,
 }
 
@@ -114,7 +114,7 @@ struct Judge<'a> {
     case: &'a Case,
     promises: Vec<Promise>,
     said: Vec<Said>,
-    /// h below this is outside.
+    /// Values of h below which a set is outside.
     floors: Vec<f64>,
     /// The parts of a hold: their ends in s, and the states there.
     grid: Vec<f64>,
@@ -145,7 +145,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Notes what the filter says of each set at `t`.
+    /// Notes the filter's report on each set at `t`.
     fn sample(&mut self, t: f64, hold: f64, report: &Report) {
         let first = t == self.case.start_time;
         for (i, set) in self.case.sets.iter().enumerate() {
@@ -206,7 +206,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The lowest h of set `i` over a hold, where it is promised and where not.
+    /// Finds the lowest h of set `i` over a hold, where it is promised and where not.
     fn watch(&mut self, i: usize, t: f64, u: &Input, hold: f64) {
         let set = &self.case.sets[i];
         let (said, floor) = (self.said[i], self.floors[i]);
@@ -215,7 +215,7 @@ impl<'a> Judge<'a> {
             self.grid.iter().zip(&self.states).map(|(s, x)| set.shape.value(t + s, x)).collect();
         let (mut least, mut promised) = (f64::INFINITY, (f64::INFINITY, 0.0));
         let mut see = |s: f64, h: f64| {
-            // What is not a number is not inside.
+            // A value that is not a number is not inside.
             let h = if h.is_nan() { f64::NEG_INFINITY } else { h };
             least = h.min(least);
             if s >= said.from && h < promised.0 {
@@ -260,8 +260,8 @@ fn keep_worst(kept: &mut Option<Break>, found: Break) {
     }
 }
 
-/// Where the parabola through three points is lowest, the middle one of which is lowest; the middle where
-/// they are on a line.
+/// The place at which the parabola through three points is lowest, where the middle one of them is lowest; the
+/// middle where they are on a line.
 fn vertex(s: [f64; 3], h: [f64; 3]) -> f64 {
     let (left, right) = ((h[1] - h[0]) / (s[1] - s[0]), (h[2] - h[1]) / (s[2] - s[1]));
     let bend = right - left;

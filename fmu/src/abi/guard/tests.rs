@@ -1,4 +1,4 @@
-//! A panic cannot be caused from outside; here it is caused inside.
+//! Panics in an export. They cannot be caused from outside; here they are caused inside.
 
 use punctual_modeldescription::fmi2::{self, CallbackFunctions, Environment};
 
@@ -51,7 +51,7 @@ impl Drop for Bomb {
     }
 }
 
-/// One test, because the hook and the last message belong to the whole process.
+/// Tests all in one, because the hook and the last message belong to the whole process.
 #[test]
 fn a_panic_becomes_an_error_and_poisons_the_instance() {
     install_panic_hook();
@@ -75,7 +75,7 @@ fn a_panic_becomes_an_error_and_poisons_the_instance() {
     assert_eq!(catch(|| 1), Ok(1));
     let bomb = catch(|| std::panic::panic_any(Bomb)).unwrap_err();
     assert!(bomb.starts_with("internal error, please report it: panicked at "), "{bomb}");
-    // The messages of other tests are wanted.
+    // Other tests print their messages again.
     drop(std::panic::take_hook());
 
     assert_eq!(messages.len(), 2, "{messages:?}");

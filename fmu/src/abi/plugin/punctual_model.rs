@@ -1,8 +1,8 @@
 //! A plant and barriers in Rust as a plug-in of Punctual: `punctual_model.h` for Rust, in one file to copy.
 //!
-//! Implement [`Model`] and name it in [`export!`]; `docs/plugin.md` and `examples/plugin/arm.rs` show how, and the
-//! header says what numbers are, what functions must not do, and what is tried when a model is loaded. A panic in a
-//! function makes its results numbers that are none.
+//! Implement [`Model`] and name it in [`export!`]; `docs/plugin.md` and `examples/plugin/arm.rs` show how. The
+//! header says what numbers are, what functions must not do, and what is tried when a model is loaded. A panic in
+//! a function makes its results numbers that are none.
 //!
 //! Needs Rust 1.85 and no crate: `rustc --edition 2024 -O --crate-type cdylib arm.rs`.
 
@@ -20,7 +20,7 @@ const MAX_STATES: usize = 32;
 /// The id that stands for the literal.
 const LITERAL: u32 = u32::MAX;
 
-/// What computes.
+/// The host's calculator, which does the operations.
 #[repr(C)]
 pub struct Calculator {
     pub(super) host: *mut c_void,
@@ -28,7 +28,7 @@ pub struct Calculator {
     pub(super) value: unsafe extern "C" fn(*mut c_void, u32) -> f64,
 }
 
-/// A number that is computed with.
+/// A number in a computation of the host.
 #[derive(Clone, Copy)]
 pub struct Number<'c> {
     id: u32,
@@ -55,19 +55,19 @@ impl<'c> Number<'c> {
         self.apply(0, LITERAL, LITERAL, value)
     }
 
-    /// The plain value, to branch on and to look up with; what is computed from it has no derivatives.
+    /// The plain value, to branch on and to look up with. A number computed from it has no derivatives.
     pub fn value(self) -> f64 {
         // SAFETY: as in `apply`.
         unsafe { (self.calculator.value)(self.calculator.host, self.id) }
     }
 
-    /// To the power of a number that does not depend on x or t.
+    /// Raises to the power of a number that does not depend on x or t.
     pub fn powf(self, exponent: f64) -> Self {
         self.apply(5, self.id, LITERAL, exponent)
     }
 
-    /// A function given by its value and derivatives, of the orders 0, 1, …, at [`Self::value`]: n + 3 of them for a
-    /// relative degree of n.
+    /// A function given by its value and derivatives, of the orders 0, 1, …, at [`Self::value`]. A relative
+    /// degree of n needs n + 3 of them.
     pub fn function(self, derivatives: &[f64]) -> Self {
         let away = self - self.value();
         let mut factorial: f64 = (1..derivatives.len()).map(|k| k as f64).product();
@@ -141,7 +141,7 @@ impl Neg for Number<'_> {
     }
 }
 
-/// Where a function writes: comes as zeros.
+/// The output of a function: comes as zeros.
 pub struct Output<'a> {
     ids: &'a mut [u32],
     states: usize,
@@ -174,19 +174,19 @@ pub struct Variable {
 unsafe impl Sync for Variable {}
 
 impl Variable {
-    /// With a name, a C identifier, a unit such as `m/s2`, and a description.
+    /// A variable with a name, a C identifier, a unit such as `m/s2`, and a description.
     pub const fn new(name: &'static CStr, unit: &'static CStr, description: &'static CStr) -> Self {
         let (name, unit, description) = (name.as_ptr(), unit.as_ptr(), description.as_ptr());
         Self { name, unit, description, minimum: 0.0, maximum: 0.0, start: 0.0 }
     }
 
-    /// With a range; an infinite end is none.
+    /// Sets a range; an infinite end is none.
     #[must_use]
     pub const fn within(self, minimum: f64, maximum: f64) -> Self {
         Self { minimum, maximum, ..self }
     }
 
-    /// With a default value: a parameter.
+    /// Sets a default value: a parameter.
     #[must_use]
     pub const fn start(self, start: f64) -> Self {
         Self { start, ..self }
@@ -195,21 +195,21 @@ impl Variable {
 
 /// A model `ẋ = f(x) + g(x) u` with barriers.
 pub trait Model {
-    /// At most 32.
+    /// The states, at most 32.
     const STATES: &'static [Variable];
-    /// At most 12.
+    /// The inputs, at most 12.
     const INPUTS: &'static [Variable];
-    /// With their defaults.
+    /// The parameters, with their defaults. Default: none.
     const PARAMETERS: &'static [Variable] = &[];
-    /// In the order of the index of [`Self::barrier`].
+    /// The barriers, in the order of the index of [`Self::barrier`]. Default: none.
     const BARRIERS: &'static [Variable] = &[];
 
-    /// What is to be done before anything else: called for every instance, also while others run, so what is to be
-    /// done once needs a `OnceLock` (`get_or_init`).
+    /// Prepares the model before anything else. It is called for every instance, also while others run. So work
+    /// that must be done once needs a `OnceLock` (`get_or_init`).
     ///
     /// # Errors
     ///
-    /// Why the model cannot be used.
+    /// The reason why the model cannot be used.
     fn initialize() -> Result<(), &'static CStr> {
         Ok(())
     }
@@ -221,14 +221,14 @@ pub trait Model {
     fn barrier<'c>(index: usize, parameters: &[f64], t: Number<'c>, x: &[Number<'c>]) -> Number<'c>;
 }
 
-/// Calculator, parameters, x, f, g.
+/// The function of a plant. Arguments: calculator, parameters, x, f, g.
 pub(super) type PlantFunction =
     unsafe extern "C" fn(*const Calculator, *const f64, *const u32, *mut u32, *mut u32);
-/// Calculator, index, parameters, t, x.
+/// The function of the barriers. Arguments: calculator, index, parameters, t, x.
 pub(super) type BarrierFunction =
     unsafe extern "C" fn(*const Calculator, u32, *const f64, u32, *const u32) -> u32;
 
-/// What the host reads: `punctual_model_description`.
+/// The description that the host reads: `punctual_model_description`.
 #[repr(C)]
 pub struct Description {
     pub(super) abi: u32,
@@ -246,11 +246,11 @@ pub struct Description {
     pub(super) barrier_value: Option<BarrierFunction>,
 }
 
-// SAFETY: what it points to are constants.
+// SAFETY: it points to constants only.
 unsafe impl Sync for Description {}
 
 impl Description {
-    /// That of `M`.
+    /// The description of `M`.
     pub const fn of<M: Model>() -> Self {
         Self {
             abi: ABI,

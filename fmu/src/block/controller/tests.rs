@@ -120,10 +120,10 @@ fn waypoints_go_on_in_steps_and_never_back() {
         assert_eq!(bench.sample(&x), wanted.map(f64::to_bits), "{x:?}");
         assert_eq!(bench.waypoint(), present as i32 + 1);
     }
-    // The last is held when it is reached.
+    // The last point is held when it is reached.
     bench.sample(&[2.0, 5.0, 0.0, 0.0]);
     assert_eq!(bench.waypoint(), 3);
-    // Looking does not go on: a step does.
+    // Looking does not pass a point; only a step does.
     bench.block.configure(&bench.values.clone()).unwrap();
     bench.set(&[1.0, 0.0, 0.0, 0.0]);
     bench.block.output(0.0, &mut bench.values);

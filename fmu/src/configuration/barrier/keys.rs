@@ -1,4 +1,4 @@
-//! The keys of `[[barrier]]`, and the parameters of the FMU that their numbers are.
+//! The keys of `[[barrier]]`, and the parameters of the FMU that belong to their numbers.
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 
@@ -14,20 +14,20 @@ use super::shape::NAMES;
 const S: Unit = Is("s");
 const M: Unit = Is("m");
 
-/// A key with the parameters that it gives.
+/// A key with its parameters.
 struct Row {
     key: Key,
-    /// In the order of its components. Those that reach a number are parameters of that barrier.
+    /// The parameters, one for each component of its value. A barrier has those that reach a number in it.
     parameters: &'static [Part],
 }
 
 /// A number behind a key.
 struct Part {
-    /// What follows the key in its name: `[1]` of a first component.
+    /// Suffix to the key in the parameter's name, such as `[1]` of a first component.
     index: &'static str,
-    /// Where it is narrower than that of the key.
+    /// Range of the part, where it is narrower than that of the key.
     range: Option<Range>,
-    /// Meaning, as the FMU says it.
+    /// Meaning, as the FMU tells it.
     description: &'static str,
     access: fn(&mut BarrierSection) -> Option<&mut f64>,
 }
@@ -328,13 +328,13 @@ static KEYS: [Row; 33] = [
     ),
 ];
 
-/// `[[barrier]]`.
+/// The table `[[barrier]]`.
 pub(in super::super) static SECTION: Section =
     Section { name: "barrier", keys: || KEYS.iter().map(|row| &row.key).collect() };
 
 impl BarrierSection {
-    /// Its numbers that are parameters of the FMU: of barrier `index` of a filter for `plant`, of relative
-    /// degree `degree` where that is known.
+    /// Numbers of the barrier that are parameters of the FMU: barrier `index` of a filter for `plant`, of
+    /// relative degree `degree` where that is known.
     pub(in super::super) fn parameters(
         &self,
         index: usize,

@@ -1,7 +1,8 @@
 //! `[[barrier]]`: a safe set, the deadline for reaching it if it has one, and when that is in force.
 //!
-//! A file has every key of every shape ([`raw`]). What is read from it has one [`Shape`] with the numbers of that
-//! shape. The table in [`keys`] says what the keys mean and which of them are parameters of the FMU.
+//! A file may have every key of every shape ([`raw`]). After reading, a barrier has one [`Shape`] with the
+//! numbers of that shape. The table in [`keys`] gives the meaning of the keys, and tells which are parameters of
+//! the FMU.
 
 mod keys;
 mod raw;
@@ -23,7 +24,7 @@ use super::{BarrierInput, ConfigurationError, PlantSection, external};
 /// Default margin as a part of the radius, or of the smaller half axis or side.
 const MARGIN_OF_SIZE: f64 = 0.01;
 
-/// How the deadline is met.
+/// The method by which the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MethodName {
@@ -45,7 +46,7 @@ pub enum ProfileName {
     LowPeak,
 }
 
-/// What is done where the bounds certainly do not allow the deadline.
+/// The reaction where the bounds certainly do not allow the deadline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InfeasibleName {
@@ -56,7 +57,8 @@ pub enum InfeasibleName {
     Soonest,
 }
 
-/// A number of which 0 means that the filter chooses, or does without: a parameter of an FMU cannot be left out.
+/// A number that is 0 where the filter chooses it or does without, since a parameter of an FMU cannot be left
+/// out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Automatic(pub f64);
@@ -89,35 +91,36 @@ pub struct BarrierSection {
     /// Deadline T in s after the first step, > 0; none for a set that is only to be kept from a start inside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deadline: Option<f64>,
-    /// How it is met.
+    /// The method by which it is met.
     pub method: MethodName,
     /// The profile of `reference_profile`.
     #[serde(skip_serializing_if = "is_default")]
     pub profile: ProfileName,
-    /// What is done where the bounds certainly do not allow the deadline.
+    /// The reaction where the bounds certainly do not allow the deadline.
     #[serde(skip_serializing_if = "is_default")]
     pub when_infeasible: InfeasibleName,
-    /// Rate a of the profile method in 1/s, ≥ 0; without it 20 / deadline, without a deadline what the bounds can
-    /// brake; at most 0.5 / step.
+    /// Rate a of the profile method in 1/s, ≥ 0, at most 0.5 / step. Default: 20 / deadline, without a deadline
+    /// the rate that the bounds can brake.
     pub rate: Automatic,
-    /// As many rates as the relative degree, in 1/s, > 0, in place of `rate`; else empty.
+    /// Rates in 1/s, > 0, as many as the relative degree, in place of `rate`; else empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<f64>,
-    /// Rate of the stay constraint in 1/s, ≥ 0; without it `rate`, and the default of that where there are `rates`.
+    /// Rate of the stay constraint in 1/s, ≥ 0. Default: `rate`, or the default of `rate` where there are
+    /// `rates`.
     pub stay_rate: Automatic,
-    /// Margin μ in the unit of h, ≥ 0; what held inputs are expected to cost is added.
+    /// Margin μ in the unit of h, ≥ 0; the expected cost of held inputs is added.
     pub margin: f64,
     /// Time in s to be inside again after leaving, ≥ 0; without it leaving is reported only.
     pub recovery: Automatic,
-    /// A bound on what the model does not know of h⁽ⁿ⁾ (a disturbance), in the unit of h per sⁿ, ≥ 0: the promise
-    /// holds for all within it.
+    /// Bound on the part of h⁽ⁿ⁾ that the model does not know (a disturbance), in the unit of h per sⁿ, ≥ 0. The
+    /// promise holds for all disturbances within it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<f64>,
-    /// Where not all barriers can be met: those of smaller numbers go first, of equal ones the one above. Without
-    /// it 0 for one whose set the start is in, 1 for the others.
+    /// Rank where not all barriers can be met: smaller numbers go first, of equal ones the one above. Default: 0
+    /// for a barrier whose set the start is in, 1 for the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub priority: Option<u32>,
-    /// Makes it soft: it yields where it would cost more than this ‖u − u_ref‖, in units of u, > 0.
+    /// Makes it soft: it is relaxed where it would cost more than this ‖u − u_ref‖, in units of u, > 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub penalty: Option<f64>,
     /// Time in s after the first step from which it is enforced, ≥ 0, < deadline if there is one.
@@ -126,16 +129,16 @@ pub struct BarrierSection {
     /// The barrier, above in the file, whose arrival it waits for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<String>,
-    /// Time in s after the first step at which it is let go, > begin; 0: never.
+    /// Time in s after the first step at which it is released, > begin; 0: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end: Option<f64>,
-    /// Whether it is let go when it has been reached.
+    /// Whether it is released when it has been reached.
     #[serde(skip_serializing_if = "is_default")]
     pub until_arrival: bool,
 }
 
 impl BarrierSection {
-    /// What `raw` says, a barrier of a filter for `plant`; `path` names it in errors.
+    /// Parses and checks `raw`, a barrier of a filter for `plant`; `path` names it in errors.
     pub(super) fn parse(
         raw: RawBarrier,
         path: &str,
@@ -143,7 +146,7 @@ impl BarrierSection {
     ) -> Result<Self, ConfigurationError> {
         check_identifier(&format!("{path}.name"), &raw.name)?;
         let shape = Shape::parse(&raw, path, plant)?;
-        // A size out of range is refused by its own name.
+        // A size out of range is refused under its own name.
         let margin = MARGIN_OF_SIZE * shape.size().unwrap_or(0.0).max(0.0);
         Ok(Self {
             name: raw.name,

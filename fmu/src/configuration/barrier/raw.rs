@@ -1,11 +1,11 @@
-//! `[[barrier]]` as it stands in a file: every key of every shape.
+//! `[[barrier]]` as it stands in a file: the keys of all shapes.
 
 use serde::Deserialize;
 
 use super::reader::Kind;
 use super::{InfeasibleName, MethodName, ProfileName};
 
-/// The keys of a `[[barrier]]`; [`KEYS`](super::keys::KEYS) says what they mean.
+/// The keys of a `[[barrier]]`; [`KEYS`](super::keys::KEYS) has their meanings.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in super::super) struct RawBarrier {
@@ -58,7 +58,7 @@ pub(in super::super) struct RawBarrier {
 }
 
 impl RawBarrier {
-    /// The keys that some shapes have and others not, and whether they are given; looked at in this order.
+    /// The keys that only some shapes have, and whether they are given; looked at in this order.
     pub(super) fn of_shape(&self) -> [(&'static str, bool); 15] {
         [
             ("centre", self.centre.is_some()),

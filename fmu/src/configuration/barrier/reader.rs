@@ -1,4 +1,4 @@
-//! From the keys of a `[[barrier]]` to its shape: which shape it is, and what its keys say.
+//! From the keys of a `[[barrier]]` to its shape: which shape it is, and the numbers of its keys.
 
 use std::fmt;
 
@@ -33,7 +33,7 @@ impl<'de> Deserialize<'de> for Kind {
     }
 }
 
-/// A `[[barrier]]` of which the shape is read.
+/// A `[[barrier]]` whose shape is being read.
 pub(super) struct Reader<'a> {
     pub(super) raw: &'a RawBarrier,
     row: &'static ShapeRow,
@@ -55,7 +55,7 @@ impl Reader<'_> {
         value.map_or_else(|| self.missing(key), Ok)
     }
 
-    /// Refuses keys of other shapes, and what is missing.
+    /// Refuses keys of other shapes, and missing keys.
     fn check_keys(&self) -> Result<(), ConfigurationError> {
         for (key, given) in self.raw.of_shape() {
             let (required, optional) = (self.row.required.contains(&key), self.row.optional.contains(&key));
@@ -104,7 +104,7 @@ impl Reader<'_> {
         self.raw.angle.unwrap_or_default()
     }
 
-    /// A state of the plant.
+    /// The name of a state of the plant.
     pub(super) fn state(&self) -> Result<String, ConfigurationError> {
         let state = self.need("state", self.raw.state.clone())?;
         let names: Vec<_> = self.plant.states().into_iter().map(|s| s.name).collect();
@@ -141,7 +141,7 @@ impl Reader<'_> {
 }
 
 impl Shape {
-    /// The shape that `raw` says, of a barrier of `plant`; `path` names the barrier in errors.
+    /// Parses the shape in `raw`, of a barrier of `plant`; `path` names the barrier in errors.
     pub(super) fn parse(
         raw: &RawBarrier,
         path: &str,

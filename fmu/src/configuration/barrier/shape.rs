@@ -1,4 +1,4 @@
-//! The shapes of barriers: which keys each one has, and what it is in a filter.
+//! The shapes of barriers: the keys of each one, and the barrier that it adds to a filter.
 
 use punctual_core::Error;
 use punctual_core::barriers::{
@@ -58,18 +58,18 @@ pub enum Shape {
     Expression { expression: String, unit: String },
     /// A barrier of the plant's plug-in.
     Plugin { output: String, unit: String },
-    /// Its derivatives are inputs of the FMU ([`punctual_core::lie::external`]).
+    /// A barrier whose derivatives are inputs of the FMU ([`punctual_core::lie::external`]).
     External { unit: String, relative_degree: usize },
 }
 
 /// The centre of a disc.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Point {
-    /// Where it is at time 0 of the simulation, in m.
+    /// Position at time 0 of the simulation, in m.
     pub centre: [f64; 2],
     /// Its velocity in m/s.
     pub velocity: [f64; 2],
-    /// Whether both are inputs of the FMU that start with these values, and not parameters.
+    /// Whether both are inputs of the FMU that start with these values, rather than parameters.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub centre_input: bool,
 }
@@ -78,13 +78,13 @@ pub struct Point {
 pub struct ShapeRow {
     /// Its name in a configuration.
     pub name: &'static str,
-    /// Where h >= 0, in Markdown.
+    /// Region where h >= 0, in Markdown.
     pub meaning: &'static str,
     /// The keys that it needs.
     pub required: &'static [&'static str],
     /// The keys that it may have besides.
     pub optional: &'static [&'static str],
-    /// Reads it.
+    /// Reads the shape from the keys.
     pub(super) read: fn(&Reader<'_>) -> Result<Shape, ConfigurationError>,
 }
 
@@ -289,7 +289,7 @@ impl Shape {
         match *self {
             Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } => Some(at.centre),
             Self::Ellipse { centre, .. } | Self::Rectangle { centre, .. } => Some(centre),
-            // At rest, wherever that is.
+            // A speed limit is largest at rest, wherever that is.
             Self::SpeedLimit { .. } => Some([0.0; 2]),
             _ => None,
         }
@@ -348,7 +348,8 @@ impl Shape {
 }
 
 impl Point {
-    /// A disc around it, on a plant with the states `on`; an input is behind these.
+    /// A disc around the point, on a plant with the states `on`; a centre that is an input is a state behind
+    /// these.
     fn disc(&self, radius: f64, smoothing: Automatic, on: &[Signal]) -> Result<DistanceDisc, Error> {
         let smoothing = smoothing.given().unwrap_or(radius);
         let disc = DistanceDisc::new(self.centre, radius, smoothing)?.moving(self.velocity)?;

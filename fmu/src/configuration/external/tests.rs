@@ -67,7 +67,7 @@ fn variables_are_named_with_their_units() {
     assert_eq!(mixed.relative_degrees(), [2, 1]);
 }
 
-/// What stands at the places of a barrier's inputs is what that barrier reports.
+/// Each barrier reports the derivatives that stand at the places of its own inputs.
 #[test]
 fn each_barrier_reads_its_own() {
     let state = |own: usize, rest: [f64; 4]| {

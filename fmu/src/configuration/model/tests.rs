@@ -178,14 +178,14 @@ fn ranges_of_inputs_are_bounds_and_those_of_states_hold_for_starts() {
     assert_eq!((c.x0["p"], c.x0["v"]), (3.0, 10.0));
 }
 
-/// The reference plants, as they are and as expressions, along a run from rest: the inputs of both.
+/// The reference plants, by name and as expressions, along a run from rest: the inputs of both agree.
 #[test]
 fn the_reference_plants_by_name_and_by_expression_filter_alike() {
     const BARRIERS: [&str; 2] = [
         "centre = [45.0, 44.0]\nradius = 2.0\n",
         "expression = \"sqrt(2^2 + 2^2) - sqrt((x_p - 45)^2 + (y_p - 44)^2 + 2^2)\"\nmargin = 0.02\nunit = \"m\"\n",
     ];
-    // Pointwise only round-off is left: of a barrier of some 60 m, divided by rows as small as 0.01. Over the
+    // Pointwise only round-off is left, from a barrier of some 60 m divided by rows as small as 0.01. Over the
     // period the filter iterates with Newton's method, and stops where its own tolerance is met.
     const STEP: f64 = 0.02;
     const ROUND_OFF: f64 = 1e-9;
@@ -204,7 +204,7 @@ fn the_reference_plants_by_name_and_by_expression_filter_alike() {
         };
         let shape = parsed(&by_name(BARRIERS[0]));
         let expression = parsed(&by_name(BARRIERS[1]));
-        // All of it as expressions.
+        // The same configuration with all of it as expressions.
         let mut written = expression.clone();
         let (reference, plant) = (shape.plant.reference().expect("by name"), &mut written.plant);
         (plant.states, plant.inputs) = (shape.plant.states(), shape.plant.inputs());
@@ -228,7 +228,7 @@ fn the_reference_plants_by_name_and_by_expression_filter_alike() {
         let mut filters = [&shape, &expression, &written].map(|c| c.build().expect("a filter"));
         let plants = [shape.plant.build(), written.plant.build()].map(|p| p.expect("a plant"));
         let states = shape.plant.states().len();
-        // Vehicles drive already: at a standstill a turn moves nothing.
+        // Vehicles drive already, since at a standstill a turn moves nothing.
         let mut x = vec![0.0; states];
         (x[2], x[3]) = (0.6, 3.0);
         for k in 0..300 {
