@@ -33,7 +33,7 @@ impl Phase {
         self.words().0
     }
 
-    /// Where the barrier stands, in a few words.
+    /// The meaning of the phase, in a few words.
     pub fn meaning(self) -> &'static str {
         self.words().1
     }

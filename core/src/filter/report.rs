@@ -54,7 +54,7 @@ impl Status {
         self.words().0
     }
 
-    /// What the returned input is, in a few words.
+    /// The meaning of the returned input, in a few words.
     pub fn meaning(self) -> &'static str {
         self.words().1
     }
