@@ -52,6 +52,12 @@
 //! of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
 //! `punctual-reference`.
 //!
+//! # Dependencies in the interface
+//!
+//! Models are written with [`nalgebra`], which is part of this interface and exported again here. So a new minor version of
+//! it (0.x) comes with a new minor version of this crate, and with no other. The feature `interior-point` adds a second
+//! solver of the quadratic program, to compare with.
+//!
 //! # References
 //!
 //! Janani S K and S. Kolathaya, *Fixed time convergence guarantees for Higher Order Control Barrier

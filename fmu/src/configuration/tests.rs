@@ -460,25 +460,41 @@ fn defaults_of_the_tables_are_those_of_the_files() {
     assert_eq!(compared, SECTIONS.iter().flat_map(valued).collect());
 }
 
+/// A value of every key that only some shapes have.
+const SHAPE_VALUES: [(&str, &str); 14] = [
+    ("centre", "[1.0, 2.0]"),
+    ("radius", "1.0"),
+    ("half_axes", "[2.0, 1.0]"),
+    ("half_sides", "[2.0, 1.0]"),
+    ("normal", "[1.0, 0.0]"),
+    ("state", "\"v\""),
+    ("bound", "1.0"),
+    ("expression", "\"v\""),
+    ("relative_degree", "1"),
+    ("smoothing", "0.5"),
+    ("velocity", "[1.0, 0.0]"),
+    ("centre_input", "true"),
+    ("angle", "0.5"),
+    ("unit", "\"m\""),
+];
+
+/// A file with each shape, named b, with the keys that it needs.
+fn every_shape() -> Vec<(String, &'static ShapeRow)> {
+    let value = |key: &str| SHAPE_VALUES.iter().find(|v| v.0 == key).map_or("", |v| v.1);
+    // A plug-in has to exist.
+    let rows = SHAPES.iter().filter(|row| row.name != "plugin");
+    rows.map(|row| {
+        let keys: String = row.required.iter().map(|key| format!("{key} = {}\n", value(key))).collect();
+        let head = "kind = \"filter\"\nplant.model = \"unicycle\"\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\n";
+        (format!("{head}shape = \"{}\"\n{keys}", row.name), row)
+    })
+    .collect()
+}
+
 /// The keys that a shape needs by its row in the table are enough, and none is too many.
 #[test]
 fn shapes_need_what_their_row_says() {
-    let values = [
-        ("centre", "[1.0, 2.0]"),
-        ("radius", "1.0"),
-        ("half_axes", "[2.0, 1.0]"),
-        ("half_sides", "[2.0, 1.0]"),
-        ("normal", "[1.0, 0.0]"),
-        ("state", "\"v\""),
-        ("bound", "1.0"),
-        ("expression", "\"v\""),
-        ("relative_degree", "1"),
-        ("smoothing", "0.5"),
-        ("velocity", "[1.0, 0.0]"),
-        ("centre_input", "true"),
-        ("angle", "0.5"),
-        ("unit", "\"m\""),
-    ];
+    let values = SHAPE_VALUES;
     let line = |key: &&str| {
         let value = values.iter().find(|v| v.0 == *key).unwrap_or_else(|| panic!("no value of {key}"));
         format!("{key} = {}\n", value.1)
@@ -500,7 +516,52 @@ fn shapes_need_what_their_row_says() {
             let error = Configuration::parse(&(head.clone() + &needed.replace(&line(key), ""))).unwrap_err();
             assert_eq!(error.to_string(), format!("barrier[0].{key}: missing, {} needs it", row.name));
         }
+        // A key of another shape is no key of this one.
+        let known = |key: &str| row.required.contains(&key) || row.optional.contains(&key);
+        for (key, _) in values.iter().filter(|(key, _)| !known(key)) {
+            let text = format!("{head}{needed}{}", line(key));
+            let error = Configuration::parse(&text).map(|_| text.clone()).unwrap_err();
+            assert_eq!(error.field(), format!("barrier[0].{key}"), "{error}");
+        }
     }
+}
+
+/// Every number that a shape needs is a parameter, but for the relative degree, which decides on the code that runs.
+#[test]
+fn the_numbers_of_shapes_are_parameters() {
+    for (kind, row) in every_shape() {
+        let Configuration::Filter(c) = Configuration::parse(&kind).unwrap() else { panic!("not a filter") };
+        let names: BTreeSet<_> = c.parameters().into_iter().map(|row| row.name).collect();
+        let numbers =
+            row.required.iter().filter(|key| !["state", "expression", "relative_degree"].contains(key));
+        for key in numbers {
+            let (one, first) = (format!("b.{key}"), format!("b.{key}[1]"));
+            assert!(names.contains(&one) || names.contains(&first), "{} of {}: {names:?}", key, row.name);
+        }
+    }
+}
+
+/// The words that the tables list are those that the parser takes.
+#[test]
+fn the_words_of_the_tables_are_those_of_the_parser() {
+    let words =
+        |text: &str| -> BTreeSet<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+    let mut compared = 0;
+    let section = SECTIONS.iter().find(|section| section.name == "barrier").expect("its section");
+    for key in (section.keys)() {
+        let Value::Word(listed) = key.value else { continue };
+        let text = FILTER.replace("radius = 2.0", &format!("radius = 2.0\n{} = \"none of them\"", key.name));
+        let error = Configuration::parse(&text).unwrap_err().to_string();
+        let (_, expected) = error.split_once("expected ").unwrap_or_else(|| panic!("{}: {error}", key.name));
+        assert_eq!(
+            words(expected),
+            listed.iter().map(|w| (*w).to_owned()).collect(),
+            "{}: {error}",
+            key.name
+        );
+        compared += 1;
+    }
+    assert!(compared >= 4, "{compared} keys have words");
 }
 
 #[test]
