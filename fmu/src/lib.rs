@@ -12,6 +12,7 @@
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |
+//! | [`fmi2`] | its C types and the table of its functions, for whoever calls such a library |
 #![deny(unsafe_code)]
 
 #[cfg(not(panic = "unwind"))]
@@ -26,5 +27,5 @@ pub mod instance;
 pub mod product;
 pub mod state;
 
-pub use abi::{PluginFolder, file_name as plugin_file_name};
+pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2};
 pub use filter_loop::FilterLoop;

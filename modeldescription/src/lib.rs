@@ -23,7 +23,6 @@
 //! | `read` | the file, read |
 //! | `names` | characters and forms of a text, a C identifier and a structured name |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
-//! | `fmi2` | the C interface: types, and one table of the functions |
 //! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and their rules |
 //! | `archive` | the zip file |
 //!
@@ -77,7 +76,6 @@ mod archive;
 mod calendar;
 mod description;
 mod error;
-pub mod fmi2;
 mod names;
 #[cfg(feature = "read")]
 mod read;

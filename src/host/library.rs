@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use punctual_modeldescription::fmi2;
+use punctual_fmu::fmi2;
 
 use super::archive::chain;
 use super::logging::owned;

@@ -7,7 +7,7 @@ use std::fmt;
 use std::rc::Rc;
 use std::sync::{Mutex, PoisonError};
 
-use punctual_modeldescription::fmi2::{self, CallbackFunctions, Status, Text};
+use punctual_fmu::fmi2::{self, CallbackFunctions, Status, Text};
 
 /// Messages kept per instance; older ones are dropped.
 const KEPT: usize = 8;

@@ -19,7 +19,7 @@ pub use archive::{
 };
 pub use description::{Description, Output};
 pub use logging::LogMessage;
-pub use punctual_modeldescription::fmi2::Status;
+pub use punctual_fmu::fmi2::Status;
 pub use punctual_modeldescription::{
     Causality, DefaultExperiment, PLATFORM, ScalarType, Variability, Variable, VariableKind,
 };

@@ -5,7 +5,7 @@ use std::ffi::CString;
 use std::ptr::NonNull;
 use std::rc::Rc;
 
-use punctual_modeldescription::fmi2::{CO_SIMULATION, Component, FALSE, TRUE};
+use punctual_fmu::fmi2::{CO_SIMULATION, Component, FALSE, TRUE};
 
 use super::library::Functions;
 use super::logging::{Logging, owned};

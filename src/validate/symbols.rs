@@ -5,8 +5,8 @@ use std::collections::HashSet;
 
 use object::read::NameOrOrdinal;
 use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
+use punctual_fmu::fmi2::FUNCTIONS;
 use punctual_modeldescription::Located;
-use punctual_modeldescription::fmi2::FUNCTIONS;
 
 use super::finding::Findings;
 use super::layout::ending;

@@ -4,8 +4,8 @@ use std::ffi::{c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use punctual_modeldescription::fmi2::{self, Boolean, CallbackFunctions, Logger, StatusKind, ValueReference};
-pub(crate) use punctual_modeldescription::fmi2::{CallbackFunctions as Callbacks, Component, State, Text};
+use punctual_fmu::fmi2::{self, Boolean, CallbackFunctions, Logger, StatusKind, ValueReference};
+pub(crate) use punctual_fmu::fmi2::{CallbackFunctions as Callbacks, Component, State, Text};
 
 /// Statuses are compared and printed as numbers here.
 type Status = c_int;
@@ -62,7 +62,7 @@ macro_rules! api {
     };
 }
 
-punctual_modeldescription::fmi2_functions!(api);
+punctual_fmu::fmi2_functions!(api);
 
 /// The path where cargo puts the library of the tested build: beside the test's executable.
 pub(crate) fn library_path() -> PathBuf {

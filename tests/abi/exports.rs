@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use std::process::Command;
 use std::ptr::{null, null_mut};
 
-use punctual_modeldescription::fmi2::FUNCTIONS;
+use punctual_fmu::fmi2::FUNCTIONS;
 
 use crate::api::{API, ERROR, library_path};
 

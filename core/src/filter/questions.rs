@@ -39,7 +39,7 @@ impl SafetyFilter {
     /// # Errors
     ///
     /// A slice of the wrong length.
-    pub fn barrier_values(&mut self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), Error> {
+    pub fn barrier_values(&self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), Error> {
         length("x", x.len(), self.state_dim)?;
         length("h", h.len(), self.slots.len())?;
         let mut derivatives = Derivatives::ZERO;

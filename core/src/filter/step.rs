@@ -64,8 +64,8 @@ impl SafetyFilter {
         let moment = self.moment(t, x, u_ref);
         match self.rows(&moment) {
             Err(status) => self.abstain(status, u),
-            Ok(is_sampled) => {
-                self.require_longest(&moment, is_sampled);
+            Ok(()) => {
+                self.require_longest(&moment);
                 let solution = self.solve(&moment, u);
                 self.report_on(&moment, solution, u);
             }
@@ -93,12 +93,12 @@ impl SafetyFilter {
     }
 
     /// Evaluates every barrier, moves its promise to the sample, and forms its row
-    /// (docs/theory.md, sections 1 and 6 to 8). Returns whether all have a row over the period.
+    /// (docs/theory.md, sections 1 and 6 to 8). Where not all have a row over the period, none is required.
     ///
     /// # Errors
     ///
     /// Derivatives or a row that are no constraint.
-    fn rows(&mut self, moment: &Moment) -> Result<bool, Status> {
+    fn rows(&mut self, moment: &Moment) -> Result<(), Status> {
         let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
         let Workspace { next, report, requirements, .. } = &mut self.workspace;
         // Within the capacity: a step does not allocate.
@@ -130,20 +130,19 @@ impl SafetyFilter {
                 requirements.push(Requirement { barrier: i, bound: slot.now.period_bound, ahead });
             }
         }
-        found.map(|()| is_sampled)
+        found?;
+        report.period = moment.period.filter(|_| is_sampled).unwrap_or(0.0);
+        if !is_sampled {
+            requirements.clear();
+        }
+        Ok(())
     }
 
     /// Asks for (S) at the end of the longest step too, where that is longer than the period
     /// (docs/theory.md, section 7).
-    fn require_longest(&mut self, moment: &Moment, is_sampled: bool) {
+    fn require_longest(&mut self, moment: &Moment) {
         let Workspace { next, report, requirements, .. } = &mut self.workspace;
-        let period = moment.period.filter(|_| is_sampled);
-        report.period = period.unwrap_or(0.0);
-        let Some(period) = period else {
-            requirements.clear();
-            return;
-        };
-        if period <= 0.0 || self.period_max <= period * (1.0 + SAME_PERIOD) {
+        if report.period <= 0.0 || self.period_max <= report.period * (1.0 + SAME_PERIOD) {
             return;
         }
         let room = MAX_ROWS - self.slots.len();

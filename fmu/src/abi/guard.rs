@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, Once, PoisonError};
 
-use punctual_modeldescription::fmi2::{Component, Status, Text};
+use super::fmi2::{Component, Status, Text};
 
 use super::logger::Logger;
 use crate::instance::{Failure, Instance};

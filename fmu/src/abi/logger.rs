@@ -2,7 +2,7 @@
 
 use std::ffi::{CStr, CString};
 
-use punctual_modeldescription::fmi2::{self, CallbackFunctions, Environment, Status};
+use super::fmi2::{self, CallbackFunctions, Environment, Status};
 
 use crate::product::LOG_CATEGORIES;
 

@@ -12,6 +12,7 @@
 //! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
 //! for does not exist.
 
+pub mod fmi2;
 #[cfg(old_glibc)]
 mod glibc;
 mod guard;
@@ -26,11 +27,10 @@ use std::ptr;
 
 pub use plugin::{PluginFolder, file_name};
 
-use punctual_modeldescription::fmi2::{
-    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
+use fmi2::{
+    Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
     TERMINATED, Text, ValueReference,
 };
-
 use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
 use logger::Logger;
 use states::{
@@ -48,7 +48,7 @@ macro_rules! exported {
     };
 }
 
-punctual_modeldescription::fmi2_functions!(exported);
+crate::fmi2_functions!(exported);
 
 /// Returns `"default"`: the types of `fmi2TypesPlatform.h`.
 #[unsafe(no_mangle)]

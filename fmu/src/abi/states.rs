@@ -9,7 +9,7 @@ use std::ffi::c_char;
 use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use punctual_modeldescription::fmi2::{self, Component, Status};
+use super::fmi2::{self, Component, Status};
 
 use super::guard::{Handle, guarded, slice, slice_mut};
 use crate::instance::{Failure, State};

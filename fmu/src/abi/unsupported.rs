@@ -1,7 +1,7 @@
 //! Exports that the capability flags of the model description exclude: each answers `fmi2Error` and
 //! names the flag.
 
-use punctual_modeldescription::fmi2::{Component, Status};
+use super::fmi2::{Component, Status};
 
 use super::guard::{Handle, guarded};
 

@@ -260,8 +260,8 @@ impl FilterConfiguration {
             parameter.check(&mut configuration)?;
         }
         // The filter itself refuses what the ranges of single numbers cannot.
-        configuration.build_loop()?;
-        configuration.check_margins(&mut configuration.build()?)?;
+        let filter = configuration.build_loop()?;
+        configuration.check_margins(filter.filter())?;
         Ok(configuration)
     }
 
@@ -288,7 +288,7 @@ impl FilterConfiguration {
     }
 
     /// Refuses a margin that h never has. It checks shapes whose largest h is known, at their centre or at rest.
-    fn check_margins(&self, filter: &mut SafetyFilter) -> Result<(), ConfigurationError> {
+    fn check_margins(&self, filter: &SafetyFilter) -> Result<(), ConfigurationError> {
         let states = self.plant.states().len();
         let mut x = vec![0.0; states];
         x.extend(self.barrier_inputs().iter().map(|input| input.start));

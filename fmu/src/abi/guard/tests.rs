@@ -1,6 +1,6 @@
 //! Panics in an export. They cannot be caused from outside; here they are caused inside.
 
-use punctual_modeldescription::fmi2::{self, CallbackFunctions, Environment};
+use super::super::fmi2::{self, CallbackFunctions, Environment};
 
 use super::super::logger::Logger;
 use super::*;
