@@ -12,7 +12,8 @@
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |
-//! | [`fmi2`] | its C types and the table of its functions, for whoever calls such a library |
+//!
+//! [`fmi2`] has the C types of `abi` and the table of its functions, for whoever calls such a library.
 #![deny(unsafe_code)]
 
 #[cfg(not(panic = "unwind"))]

@@ -288,12 +288,9 @@ impl Located {
     ) -> Vec<Unknown> {
         let found = structure.and_then(|n| children(n, list.as_str()).next());
         self.positions.insert(Place::Unknowns(list), found.or(structure).unwrap_or(root).range().start);
-        // An unknown without an index stands for nothing.
-        let indexed = found.into_iter().flat_map(|n| children(n, "Unknown"));
-        let indexed = indexed.filter_map(|n| Some((n, n.attribute("index").and_then(unsigned)?)));
-        let unknown = |(u, (node, index)): (usize, (Node<'_, '_>, u32))| {
+        let unknown = |(u, node): (usize, Node<'_, '_>)| {
             let place = Place::Unknown(list, u);
-            self.positions.insert(place, node.range().start);
+            let index = self.enter(place, node).required("index", unsigned);
             // Each word counts, even one that is no index.
             let dependencies = node.attribute("dependencies").map(|text| {
                 let index = |word| {
@@ -308,7 +305,7 @@ impl Located {
             let dependency_kinds = kinds.map(|text| words(text).map(str::to_owned).collect());
             Unknown { index, dependencies, dependency_kinds }
         };
-        indexed.enumerate().map(unknown).collect()
+        found.into_iter().flat_map(|n| children(n, "Unknown")).enumerate().map(unknown).collect()
     }
 }
 

@@ -140,7 +140,11 @@ fn outputs(model: &ModelDescription, structure: &ModelStructure) -> Result<Vec<O
     let position = |&index: &u32| {
         let position = usize::try_from(index).ok().and_then(|i| i.checked_sub(1));
         position.filter(|&i| i < count).ok_or_else(|| {
-            FmuProblem::Description(format!("ModelStructure names variable {index} of {count}"))
+            let named = match index {
+                0 => "has an index that is missing or 0".to_owned(),
+                _ => format!("names variable {index} of {count}"),
+            };
+            FmuProblem::Description(format!("ModelStructure {named}"))
         })
     };
     let mut outputs: Vec<Output> = model

@@ -47,7 +47,7 @@ def test_workflows_call_scripts_that_exist(workflow):
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
 def test_every_job_says_why_it_exists(workflow):
     lines = workflow.read_text().partition("\njobs:\n")[2].splitlines()
-    jobs = [k for k, line in enumerate(lines) if re.fullmatch(r"  [a-z]+:", line)]
+    jobs = [k for k, line in enumerate(lines) if re.fullmatch(r"  [A-Za-z_][\w-]*:", line)]
     assert jobs and all(k > 0 and lines[k - 1].startswith("  # ") for k in jobs)
 
 

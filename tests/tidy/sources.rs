@@ -57,7 +57,7 @@ pub(crate) static SOURCES: LazyLock<Vec<Source>> = LazyLock::new(|| {
     rust.map(|text| Source { path: text.path.clone(), lexed: lex(&text.text) }).collect()
 });
 
-/// The Rust files of the six crates themselves.
+/// The Rust files of the seven crates themselves.
 pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
     let folders = [
         "src/",

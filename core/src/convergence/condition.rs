@@ -15,7 +15,7 @@ use super::profile::Derivatives;
 use crate::MAX_RELATIVE_DEGREE;
 
 /// No error of any derivative.
-const EXACT: Stack = [0.0; MAX_RELATIVE_DEGREE];
+pub(super) const EXACT: Stack = [0.0; MAX_RELATIVE_DEGREE];
 
 /// A sample, as a condition sees it. With e = h − μ:
 #[derive(Clone, Copy, Debug)]
@@ -231,6 +231,6 @@ pub trait Condition {
 
     /// The derivative of [`profile`](Self::profile) where the anchor changes by `change`; `None` where it is not known.
     fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
-        Some([0.0; MAX_RELATIVE_DEGREE + 1])
+        None
     }
 }

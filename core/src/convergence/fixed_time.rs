@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::approach::Approach;
 use super::comparison::Stack;
-use super::condition::{Anchored, Anchoring, Condition, Sample};
+use super::condition::{Anchored, Anchoring, Condition, EXACT, Sample};
 use super::phase::{Phase, Seen};
 use super::profile::{Profile, ProfileError};
 use super::repeated_root::NoAdmissibleRate;
@@ -110,7 +110,11 @@ impl FixedTime {
     /// A method other than the default, a profile of one's own, or a recovery time.
     pub fn with_condition(self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
         let settings = &self.settings;
-        let is_plain = matches!(&self.approach, Approach::Profile(reference) if !reference.has_own_profile());
+        let is_plain = match &self.approach {
+            Approach::Profile(reference) => !reference.has_own_profile(),
+            Approach::Own(_) => true,
+            Approach::Root(_) | Approach::First(_) => false,
+        };
         let message = if !is_plain {
             Some(("method", "a constraint of one's own takes the place of method and profile"))
         } else if settings.recovery.is_some() {
@@ -235,13 +239,13 @@ impl FixedTime {
                 state.gain *= means.weight;
             }
         } else {
-            state.observe(seen);
+            state.observe(Seen { is_inside: h[0] >= 0.0, ..seen });
         }
         // The floor of the condition in force. Leaving the set breaks its promise, even where a new one begins here.
         let (floor, profile) = self.enforce(state, elapsed, h, &lowest, errors, means);
         state.guaranteed &= !was_left;
         let floor = floor + self.settings.disturbance;
-        let has_deadline = state.deadline.is_finite() || state.phase == Phase::Approach;
+        let has_deadline = state.deadline.is_finite() || !self.hands_over();
         let time_left = if has_deadline { (state.deadline - elapsed).max(0.0) } else { 0.0 };
         DerivativeBound { floor, profile, time_left }
     }
@@ -306,7 +310,7 @@ impl FixedTime {
             f(&Stay(&self.settings), &state.on_stay(elapsed, e))
         } else {
             e[0] -= state.margin;
-            f(self.approach.condition(), &state.on_approach(elapsed, e, &[]))
+            f(self.approach.condition(), &state.on_approach(elapsed, e, &EXACT))
         }
     }
 

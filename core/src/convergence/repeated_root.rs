@@ -38,6 +38,7 @@ use super::comparison::{Stack, coefficients, factorial, lower_bound, lower_terms
 use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Rates, Sample};
 use super::fixed_time::Refusal;
 use super::polynomial::{self, Roots};
+use super::profile::Derivatives;
 use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
 
@@ -275,6 +276,10 @@ impl Condition for RepeatedRoot {
             change.rate = rate_change(at.rate, at.anchor, dh, at.deadline);
         }
         Some(change)
+    }
+
+    fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
+        Some([0.0; MAX_RELATIVE_DEGREE + 1])
     }
 
     fn bound_change(&self, at: &Sample, change: Option<&AnchorChange>, de: &[f64]) -> Option<[f64; 2]> {

@@ -263,8 +263,8 @@ pub(super) fn over_period_change(
     let n = at.degree();
     let mut out = PeriodBound { attenuation: 0.0, ..PeriodBound::ZERO };
     let Some(rates) = condition.rates(at) else { return Some(out) };
-    let Cascade { weights, last, .. } = Cascade::of(&rates, n, at.time_left(period));
-    let decay = (-last * period).exp();
+    let cascade = Cascade::of(&rates, n, at.time_left(period));
+    let (decay, weights) = (cascade.decay(period), cascade.weights);
     let target = |elapsed: f64| match change {
         Some(change) => {
             let mut r = condition.profile_change(at, change, elapsed)?;
@@ -278,7 +278,7 @@ pub(super) fn over_period_change(
     let by_rate = change.map_or(0.0, |change| change.rate);
     if by_rate != 0.0 {
         // Only the repeated root has a rate that moves, and its target is the margin alone.
-        let rate = last;
+        let rate = cascade.last;
         for k in 0..n {
             out.weights[k] = power_change(rate, n - 1, k) * by_rate;
             let target = if k == 0 { at.margin } else { 0.0 };
@@ -334,13 +334,13 @@ mod tests {
             let mut state = FixedTimeState::default();
             promise.advance(&mut state, 0.0, &h[..n]);
             let moved = [-1.0, 1.0, 0.25, 3.0];
-            let demand = promise.advance(&mut state, 0.5, &moved[..n]);
+            let bound = promise.advance(&mut state, 0.5, &moved[..n]);
             let period = 1e-6;
             let sampled = promise.over_period(&state, 0.5, &moved[..n], period).expect("linear");
             // Moving along h⁽ⁿ⁾ = floor, Σ weights h⁽ᵏ⁾ grows by Σ weights h⁽ᵏ⁺¹⁾ δ.
-            let next = |k: usize| if k + 1 < n { moved[k + 1] } else { demand.floor };
+            let next = |k: usize| if k + 1 < n { moved[k + 1] } else { bound.floor };
             let reached: f64 = (0..n).map(|k| sampled.weights[k] * (moved[k] + period * next(k))).sum();
-            let scale = lower_terms(state.rate, &moved[..n]).abs() + demand.floor.abs() + 1.0;
+            let scale = lower_terms(state.rate, &moved[..n]).abs() + bound.floor.abs() + 1.0;
             // The remainder is of second order in the period, with rates of order a = 10.
             let error = (reached - sampled.floor) / period;
             assert!(error.abs() < 1e-3 * scale, "n {n}: {error} of {scale}");
@@ -350,11 +350,11 @@ mod tests {
     #[test]
     fn the_loss_is_that_of_an_even_slope() {
         // (D + 2)² e = −c + 2cτ/δ over a period: ψ dips by cδ/4, e by no more than cδ/8.
-        let demand = PeriodBound { attenuation: 2.0, ..PeriodBound::ZERO };
-        assert_eq!(demand.loss(-8.0, 0.1), 8.0 * 0.1 / 4.0 / 2.0);
-        assert_eq!(demand.loss(3.0, 0.1), 0.0);
+        let bound = PeriodBound { attenuation: 2.0, ..PeriodBound::ZERO };
+        assert_eq!(bound.loss(-8.0, 0.1), 8.0 * 0.1 / 4.0 / 2.0);
+        assert_eq!(bound.loss(3.0, 0.1), 0.0);
         // n = 2: ψ = −c for a time τ at the rate −a makes e = −c (e^{aτ} − 1)/a, less than c τ e^{aτ}.
-        let growing = PeriodBound { attenuation: attenuation(-0.2, 2, 3.0), ..demand }.loss(-8.0, 0.1);
+        let growing = PeriodBound { attenuation: attenuation(-0.2, 2, 3.0), ..bound }.loss(-8.0, 0.1);
         let exact = 0.2 * ((0.6_f64).exp() - 1.0) / 0.2;
         assert!(growing > exact && growing < 2.0 * exact, "{growing} for {exact}");
     }

@@ -38,7 +38,7 @@ pub struct BoundDerivative {
 impl FixedTime {
     /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give
     /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether
-    /// it was anchored there, with a deadline that does not depend on h.
+    /// it was anchored there, at `h` itself, with a deadline that does not depend on h.
     ///
     /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
     /// [derivative](super::profile::Profile::along), and under most [conditions](super::condition) of one's own.

@@ -1,7 +1,7 @@
 //! The memory of a promise between samples.
 
 use super::comparison::Stack;
-use super::condition::Sample;
+use super::condition::{EXACT, Sample};
 use super::phase::Phase;
 
 /// The memory of a promise between samples: plain data, all that a snapshot needs.
@@ -109,7 +109,7 @@ impl FixedTimeState {
 
     /// The anchor as the method of the approach sees it.
     pub(super) fn at_anchor(&self, n: usize) -> Sample<'_> {
-        self.on_approach(0.0, &self.anchor[..n], &[])
+        self.on_approach(0.0, &self.anchor[..n], &EXACT)
     }
 
     /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.

@@ -27,8 +27,10 @@ use std::array::from_fn;
 use super::comparison::{Stack, lower_terms, scaled_coefficient};
 use super::condition::{AnchorChange, Bound, Condition, Rates, Sample};
 use super::polynomial::first;
+use super::profile::Derivatives;
 use super::settings::FixedTimeSettings;
 use super::state::FixedTimeState;
+use crate::MAX_RELATIVE_DEGREE;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
 /// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
@@ -141,7 +143,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
     let kept = affordable.clamp(0.0, if is_gentle { margin } else { ENOUGH * margin });
-    let mut own = [0.0; crate::MAX_RELATIVE_DEGREE];
+    let mut own = [0.0; MAX_RELATIVE_DEGREE];
     own[..h.len()].copy_from_slice(h);
     own[0] -= kept;
     let e = &own[..h.len()];
@@ -270,6 +272,10 @@ impl Condition for Stay<'_> {
         Some(Rates::Repeated(at.rate))
     }
 
+    fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
+        Some([0.0; MAX_RELATIVE_DEGREE + 1])
+    }
+
     fn bound_change(&self, at: &Sample, _change: Option<&AnchorChange>, de: &[f64]) -> Option<[f64; 2]> {
         Some([-lower_terms(at.rate, de), 0.0])
     }
@@ -284,7 +290,7 @@ fn outwards(e: &[f64], rate: f64) -> f64 {
 
 /// The derivatives `e`, `hold` s later, with e⁽ⁿ⁾ = `highest`.
 fn ahead(e: &[f64], highest: f64, hold: f64) -> Stack {
-    let mut ahead = [0.0; crate::MAX_RELATIVE_DEGREE];
+    let mut ahead = [0.0; MAX_RELATIVE_DEGREE];
     for j in 0..e.len() {
         // Horner's scheme, from the highest derivative.
         ahead[j] = (j..e.len()).rev().fold(highest, |sum, i| e[i] + sum * hold / (i + 1 - j) as f64);

@@ -350,7 +350,8 @@ impl FilterBuilder {
     /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
     /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
     ///
-    /// Needs the reference profile and a prediction over the period. `deadline_unreachable` then stays false until the
+    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a condition
+    /// of one's own that says so. `deadline_unreachable` then stays false until the
     /// deadline has passed, and there are no directional derivatives. A step takes some four times the work per
     /// measured state.
     ///
@@ -372,7 +373,7 @@ impl FilterBuilder {
     ///
     /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation
     /// delay that exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a
-    /// delay, without a prediction over the period, with another method than the reference profile, or with a source
+    /// delay, without a prediction over the period, with a method that does not allow for them, or with a source
     /// that gives no derivatives along a direction.
     pub fn build(self) -> Result<SafetyFilter, Error> {
         let Self {

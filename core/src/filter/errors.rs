@@ -72,13 +72,13 @@ impl MeasurementErrors {
         sum
     }
 
-    /// The largest error of the row over the period of `demand`, divided by its divisor, from t, x, u and the time
+    /// The largest error of the row over the period of `bound`, divided by its divisor, from t, x, u and the time
     /// ahead. `None` where that is not finite.
     pub(super) fn of_row(
         &self,
         source: &dyn DerivativeSource,
         (t, x, u, period): (f64, &[f64], &[f64], f64),
-        (demand, divisor): (&PeriodBound, f64),
+        (bound, divisor): (&PeriodBound, f64),
         slopes: &[ErrorSlopes],
     ) -> Option<Uncertainty> {
         let zeros = [0.0; MAX_INPUTS];
@@ -90,8 +90,8 @@ impl MeasurementErrors {
             }
             let (mut along, mut gradient) = (0.0, [0.0; MAX_INPUTS]);
             for k in 0..source.relative_degree() {
-                let weight = demand.weights[k] / divisor;
-                along += weight * (change.value[k] - demand.decay * slopes[k]);
+                let weight = bound.weights[k] / divisor;
+                along += weight * (change.value[k] - bound.decay * slopes[k]);
                 for (g, d) in gradient.iter_mut().zip(&change.gradient[k]) {
                     *g += weight * d;
                 }
@@ -134,7 +134,8 @@ pub(super) fn check_all(
     for slot in slots {
         let named = |e: Error| e.within(&slot.name);
         if !slot.promise.allows_errors() {
-            return refuse("needs the reference profile".into()).map_err(named);
+            return refuse("needs a method that allows for errors, such as the reference profile".into())
+                .map_err(named);
         }
         check(&*slot.source, inputs).map_err(named)?;
         slot.exact = false;

@@ -2,6 +2,7 @@
 
 use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
+use crate::lie::DerivativeSource;
 use crate::qp::Bounds;
 
 /// A filter with an integrator between it and its plant. The filter inside is one of a plant whose state
@@ -104,6 +105,24 @@ impl IntegratedFilter {
     /// As [`SafetyFilter::rearm`]; the value stays.
     pub fn rearm(&mut self) {
         self.filter.rearm();
+    }
+
+    /// As [`SafetyFilter::set_deadline`].
+    ///
+    /// # Errors
+    ///
+    /// No such barrier; a deadline out of range.
+    pub fn set_deadline(&mut self, index: usize, deadline: f64) -> Result<(), Error> {
+        self.filter.set_deadline(index, deadline)
+    }
+
+    /// As [`SafetyFilter::set_source`]; the source has the state with the integral.
+    ///
+    /// # Errors
+    ///
+    /// No such barrier; a source of other dimensions or another relative degree.
+    pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
+        self.filter.set_source(index, source)
     }
 
     /// Puts back the state of the [filter](Self::filter) and the [`value`](Self::value).

@@ -192,8 +192,7 @@ impl SafetyFilter {
     /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the conditions of
     /// optimality of its QP. They are small multiples of 1e-16 for a pointwise step. Where the step looked over the
     /// period ([`Report::predicted`]) they are of the rows linearised at `u`, and up to the 1e-9 at which the search
-    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step. Inside an
-    /// [`IntegratedFilter`] u and u_ref are those of the rate.
+    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step.
     ///
     /// # Errors
     ///

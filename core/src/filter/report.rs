@@ -158,12 +158,12 @@ impl BarrierReport {
 
     /// The report before the QP is solved.
     #[inline]
-    pub(super) fn of(promise: &FixedTimeState, h: f64, demand: DerivativeBound, row: Row) -> Self {
+    pub(super) fn of(promise: &FixedTimeState, h: f64, bound: DerivativeBound, row: Row) -> Self {
         Self {
             h,
             phase: promise.phase,
-            profile: demand.profile,
-            time_left: demand.time_left,
+            profile: bound.profile,
+            time_left: bound.time_left,
             arrived: promise.arrival.is_some(),
             arrival_time: promise.arrival,
             guaranteed: promise.guaranteed,

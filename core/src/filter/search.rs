@@ -2,20 +2,20 @@
 //!
 //! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`])
 //! is not, because the state at the end of the period depends on u through the plant. Newton's method on the rows
-//! solves it: linearise at the present candidate, solve the QP, and go towards its answer. Each step goes as far as
+//! solves it: linearise at the present guess, solve the QP, and go towards its answer. Each step goes as far as
 //! the violation of the rows that the QP does not give up decreases, halving the way. Only rows that are active or
 //! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
 //! evaluated where the search ends.
 //!
-//! There are two candidates to start from: the answer of the pointwise rows, and the input of the step before. The
+//! There are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
 //! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
-//! candidate matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
+//! guess matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
 //! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
 //! has met every row by full steps that became shorter tenfold each, and is no further from u_ref than the last input
 //! is. The rows are all but affine there, and the answer is the only one near. Answers that differ by round-off count
 //! as equal, so a sample taken again gives the same bits.
 //!
-//! An answer is settled where its steps contracted like that, or where both candidates end at it. Two answers are not
+//! An answer is settled where its steps contracted like that, or where both guesses end at it. Two answers are not
 //! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside:
 //! the row that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where
 //! it could turn to either side is at rest between two such answers. So a master that takes a step again, or cuts it
@@ -48,7 +48,7 @@ const SAME: f64 = 1e-6;
 const FAR: f64 = 8.0;
 /// Distance aside of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
 const ASIDE: f64 = 0.5;
-/// Linearisations per candidate.
+/// Linearisations per guess.
 const ITERATIONS: u32 = 12;
 /// Halvings of the way to the answer of one linearisation.
 const HALVINGS: u32 = 8;
@@ -151,7 +151,7 @@ impl PeriodProblem<'_> {
         if self.is_met_by_reference(u, doubtful, &mut at)? {
             return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
         }
-        // Newton's method from both candidates.
+        // Newton's method from both guesses.
         let watched = doubtful | at.violated();
         let against = at.most_violated();
         let Found { mut best, mut at_best, mut settled } =

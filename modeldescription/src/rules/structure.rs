@@ -34,7 +34,7 @@ impl Check<'_> {
         let most = description.variables.len();
         for (u, unknown) in unknowns.iter().enumerate() {
             let place = Place::Unknown(list, u);
-            if description.at(unknown.index).is_none() {
+            if !self.is_unread(place, "index") && description.at(unknown.index).is_none() {
                 let index = unknown.index;
                 let message = format!("{name}: index is {index}; must be that of a variable, 1 to {most}");
                 self.add("structure.index", place, message);
@@ -146,15 +146,19 @@ impl Check<'_> {
     }
 
     fn sorted(&mut self, unknowns: &[Unknown]) {
-        for (u, pair) in unknowns.windows(2).enumerate() {
-            let (before, after) = (pair[0].index, pair[1].index);
+        let mut before = 0;
+        for (u, unknown) in unknowns.iter().enumerate() {
+            let (after, place) = (unknown.index, Place::Unknown(UnknownList::InitialUnknowns, u));
+            if self.is_unread(place, "index") {
+                continue;
+            }
             if before > after {
                 let message =
                     format!("InitialUnknowns has index {after} after {before}; must be sorted by index");
-                let place = Place::Unknown(UnknownList::InitialUnknowns, u + 1);
                 self.add("structure.order", place, message);
                 return;
             }
+            before = after;
         }
     }
 

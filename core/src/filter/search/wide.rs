@@ -1,4 +1,4 @@
-//! The wide search, for samples at which Newton's method from its two candidates ends at no settled answer.
+//! The wide search, for samples at which Newton's method from its two guesses ends at no settled answer.
 //!
 //! A row is F(u) ≥ 0 with F smooth. It is hard where F turns with some inputs: a unicycle that stands across the line
 //! of sight gains by turning either way and then driving either way. Four parts find the nearest of these answers.
@@ -152,13 +152,13 @@ impl PeriodProblem<'_> {
         }
         // Make it exact: by Newton's method, or where that fails by sharpening.
         let mut exact = nearest.u;
-        if let Some(guess) = self.newton(&mut exact[..m], RowSet::ALL, at, qp)
-            && guess.is_met(relaxed)
-            && guess.ended
-            && guess.distance <= (1.0 + NEARER) * nearest.distance
+        if let Some(found) = self.newton(&mut exact[..m], RowSet::ALL, at, qp)
+            && found.is_met(relaxed)
+            && found.ended
+            && found.distance <= (1.0 + NEARER) * nearest.distance
         {
             u.copy_from_slice(&exact[..m]);
-            return Some(Candidate { iterations: iterations + guess.iterations, ..guess });
+            return Some(Candidate { iterations: iterations + found.iterations, ..found });
         }
         self.sharpen(&mut nearest, relaxed, at, qp);
         u.copy_from_slice(&nearest.u[..m]);
@@ -283,7 +283,7 @@ impl PeriodProblem<'_> {
     }
 
     /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of
-    /// their demands where they contradict.
+    /// their floors where they contradict.
     fn on_axis(&self, start: &Start, axis: usize, relaxed: RowSet, at: &Linearised) -> f64 {
         let m = self.u_ref.len();
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
