@@ -48,7 +48,7 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
-//! bounded inputs can do); [`filter`]. Beside it, [`barriers`] are regions and limits to use, and [`judge`] says what became
+//! bounded inputs can do); `plan` (witnesses, a feature); [`filter`]. Beside it, [`barriers`] are regions and limits to use, and [`judge`] says what became
 //! of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
 //! `punctual-reference`.
 //!
@@ -56,7 +56,8 @@
 //!
 //! Models are written with [`nalgebra`], which is part of this interface and exported again here. So a new minor version of
 //! it (0.x) comes with a new minor version of this crate, and with no other. The feature `interior-point` adds a second
-//! solver of the quadratic program, to compare with.
+//! solver of the quadratic program, to compare with. The feature `plan` adds plans: `filter::AssuredFilter` promises only
+//! what a verified plan keeps.
 //!
 //! # References
 //!
@@ -75,6 +76,8 @@ pub mod filter;
 pub mod jet;
 pub mod judge;
 pub mod lie;
+#[cfg(feature = "plan")]
+pub mod plan;
 pub mod qp;
 pub mod reach;
 pub mod scalar;

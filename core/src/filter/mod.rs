@@ -4,6 +4,8 @@
 //! phase, build its row, solve the QP, report. [`FilterState`] is all that is remembered between samples: plain
 //! data. Everything else can be rebuilt without changing a bit of the result.
 
+#[cfg(feature = "plan")]
+mod assured;
 mod builder;
 mod errors;
 mod hold;
@@ -20,6 +22,8 @@ mod step;
 pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
+#[cfg(feature = "plan")]
+pub use assured::{Assurance, AssuredFilter, AssuredState, Driver, Standing};
 pub use builder::FilterBuilder;
 pub use integrator::{IntegratedFilter, Integration};
 pub use report::{BarrierReport, Report, Status};

@@ -1,0 +1,315 @@
+//! A filter whose promise has a witness: decided at the first sample, kept within the bounds whatever u_ref is
+//! (`docs/theory.md#witness`).
+
+use super::{Begin, End, FilterState, Report, SafetyFilter, Strictness};
+use crate::MAX_INPUTS;
+use crate::error::{Error, ErrorKind, length, positive};
+use crate::plan::{Failure, Plan, Planner, Requirement, Witness};
+
+/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
+const MARGIN: f64 = 1e-4;
+/// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
+const COMFORTABLE: f64 = 0.5;
+/// Halvings between the input of the plan and the one that is preferred.
+const BISECTIONS: u32 = 4;
+/// Delay of a sample that counts as none, as a part of the period.
+const ON_TIME: f64 = 1e-6;
+
+/// Who chose the input of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Driver {
+    /// u_ref, with a comfortable plan behind it.
+    Reference,
+    /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
+    #[default]
+    Rows,
+    /// A compromise: the last input towards the rows' answer that has a plan behind it.
+    Between,
+    /// The plan: nothing else keeps the promise.
+    Plan,
+}
+
+/// Where the promise stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum Standing {
+    /// No sample yet.
+    #[default]
+    Undecided,
+    /// Every promise is kept: there is a witness.
+    Assured,
+    /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
+    Refused(Failure),
+    /// Was assured, and is no more: the plant is not where the model led.
+    Withdrawn(Failure),
+    /// Was assured, and is no more: a sample came later than the period allows.
+    Overdue,
+}
+
+/// The report of a step of an [`AssuredFilter`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Assurance {
+    /// Where the promise stands.
+    pub standing: Standing,
+    /// Who chose the input.
+    pub driver: Driver,
+    /// Time in s until which every promise is kept whatever comes; infinite for ever, not a number without promise.
+    pub until: f64,
+}
+
+impl Assurance {
+    /// Whether every promise is kept, whatever u_ref is.
+    pub fn is_assured(&self) -> bool {
+        self.standing == Standing::Assured
+    }
+}
+
+/// What is remembered between samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AssuredState {
+    /// The memory of the filter inside.
+    pub filter: FilterState,
+    /// Where the promise stands.
+    pub standing: Standing,
+    /// For each barrier the times in s from which and until which h ≥ 0 is promised, and the margin of its plans;
+    /// `None` where nothing is.
+    promises: Vec<Option<[f64; 3]>>,
+    plan: Plan,
+    time: f64,
+}
+
+/// A [`SafetyFilter`] that promises only what a plan keeps.
+///
+/// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier is
+/// promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on by its rows. From then on
+/// every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a compromise, or where nothing
+/// else keeps the promise the next input of the plan itself.
+///
+/// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A filter with bounds on
+/// disturbance or measurement errors, a delay or windows cannot be assured yet, and is refused by [`Self::new`].
+///
+/// The search allocates, as do the plans.
+pub struct AssuredFilter {
+    filter: SafetyFilter,
+    period: f64,
+    state: AssuredState,
+    report: Assurance,
+}
+
+impl AssuredFilter {
+    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0.
+    ///
+    /// # Errors
+    ///
+    /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, a window, a
+    /// recovery; a bound on disturbance or measurement errors; a delay.
+    pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
+        positive("period", period)?;
+        let refuse = |field: &str, message: &str| {
+            Err(Error::new(
+                ErrorKind::Unsupported,
+                field,
+                format!("{message}, which no plan accounts for yet"),
+            ))
+        };
+        if filter.delay > 0.0 {
+            return refuse("actuation_delay", "is not 0");
+        }
+        if !filter.errors.is_exact() {
+            return refuse("measurement_errors", "are not 0");
+        }
+        for slot in &filter.slots {
+            let named = |e: Error| e.within(&slot.name);
+            let settings = slot.promise.settings();
+            if settings.disturbance > 0.0 {
+                return refuse("disturbance", "is not 0").map_err(named);
+            }
+            if slot.begin != Begin::AtOnce {
+                return refuse("begin", "is later than the first sample").map_err(named);
+            }
+            let mut x = vec![0.0; filter.state_dim];
+            if !slot.source.predict(&mut x, &[0.0; MAX_INPUTS][..filter.input_dim], period) {
+                let message = "has no model to run ahead";
+                return Err(named(Error::new(ErrorKind::Unsupported, "source", message)));
+            }
+        }
+        let state = AssuredState { filter: filter.state().clone(), ..AssuredState::default() };
+        Ok(Self { filter, period, state, report: Assurance::default() })
+    }
+
+    /// The filter inside: to look at.
+    pub fn filter(&self) -> &SafetyFilter {
+        &self.filter
+    }
+
+    /// The plan that is committed, where there is one.
+    pub fn plan(&self) -> Option<&Witness> {
+        (self.state.standing == Standing::Assured).then_some(&self.state.plan.witness)
+    }
+
+    /// The report of the last step.
+    pub fn report(&self) -> &Assurance {
+        &self.report
+    }
+
+    /// The memory between samples.
+    pub fn state(&mut self) -> &AssuredState {
+        self.state.filter.clone_from(self.filter.state());
+        &self.state
+    }
+
+    /// Restores what [`Self::state`] returned: the filter goes on exactly as it would have then.
+    ///
+    /// # Errors
+    ///
+    /// A state with another number of barriers.
+    pub fn restore(&mut self, state: &AssuredState) -> Result<(), Error> {
+        self.filter.restore(&state.filter)?;
+        self.state.clone_from(state);
+        Ok(())
+    }
+
+    /// Forgets promise and plan: the next sample decides anew.
+    pub fn rearm(&mut self) {
+        self.filter.rearm();
+        self.state = AssuredState { filter: self.filter.state().clone(), ..AssuredState::default() };
+    }
+
+    /// Computes the safe input at time `t` in s and remembers the sample; arguments as for [`SafetyFilter::step`]. The
+    /// report of the rows is that of [`Self::filter`].
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
+        length("x", x.len(), self.filter.state_dim)?;
+        let status = self.filter.step(t, x, u_ref, u)?.status;
+        let late = t - self.state.time > self.period * (1.0 + ON_TIME);
+        match self.state.standing {
+            _ if status == super::Status::InvalidInput => {}
+            Standing::Undecided => self.decide(t, x, u),
+            Standing::Assured if late => self.state.standing = Standing::Overdue,
+            _ => {}
+        }
+        self.report.driver = Driver::Rows;
+        if self.state.standing == Standing::Assured {
+            self.report.driver = self.choose(t, x, u_ref, u);
+            self.filter.state.input[..u.len()].copy_from_slice(u);
+        }
+        self.state.time = t;
+        self.report.standing = self.state.standing;
+        self.report.until = match self.state.standing {
+            Standing::Assured => self.state.plan.witness.until,
+            _ => f64::NAN,
+        };
+        Ok(&self.report)
+    }
+
+    /// The report of the rows at the last step.
+    pub fn rows(&self) -> &Report {
+        self.filter.report()
+    }
+
+    /// Decides at the first sample: what is promised, and whether a plan keeps it.
+    fn decide(&mut self, t: f64, x: &[f64], u: &[f64]) {
+        let promises = self.filter.slots.iter().zip(&self.filter.report().barriers).map(|(slot, report)| {
+            let soft = matches!(slot.strictness, Strictness::Soft(_));
+            let from = match slot.promise.settings().deadline {
+                _ if report.h >= 0.0 => t,
+                Some(deadline) => t + deadline,
+                None => return None,
+            };
+            let until = match slot.end {
+                End::Never => f64::INFINITY,
+                End::At(seconds) => t + seconds,
+                End::OnArrival => from + self.period,
+            };
+            (!soft && until > from).then_some([from, until, MARGIN * report.h.abs()])
+        });
+        self.state.promises = promises.collect();
+        self.state.standing = match self.planned(u, |planner| planner.search(t, x)) {
+            Ok(plan) => {
+                self.state.plan = plan;
+                Standing::Assured
+            }
+            Err(failure) => Standing::Refused(failure),
+        };
+    }
+
+    /// Runs `f` with the planner of the present promises.
+    fn planned<R>(&self, u: &[f64], f: impl FnOnce(&Planner<'_>) -> R) -> R {
+        let requirements: Vec<Requirement<'_>> = self
+            .filter
+            .slots
+            .iter()
+            .zip(&self.state.promises)
+            .filter_map(|(slot, promise)| {
+                let [from, until, margin] = (*promise)?;
+                Some(Requirement { source: &*slot.source, from, until, margin })
+            })
+            .collect();
+        let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
+        let source = &*self.filter.slots[0].source;
+        f(&Planner::new(source, &self.filter.bounds, &requirements, self.period, size))
+    }
+
+    /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
+    /// does, else the plan's own.
+    fn choose(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
+        let reached = self.state.promises.iter().flatten().all(|[from, ..]| *from <= t);
+        let mut wanted = [0.0; MAX_INPUTS];
+        let wanted = &mut wanted[..u.len()];
+        for (i, w) in wanted.iter_mut().enumerate() {
+            *w = self.filter.bounds.clamp(i, u_ref[i]);
+        }
+        let plan = &self.state.plan;
+        let found = self.planned(u, |planner| {
+            if reached
+                && wanted.iter().zip(u_ref).all(|(w, r)| w == r)
+                && let Ok(witness) = planner.behind(plan, t, x, wanted)
+                && witness.effort <= COMFORTABLE
+            {
+                return Ok((Driver::Reference, witness));
+            }
+            wanted.copy_from_slice(u);
+            if let Ok(witness) = planner.behind(plan, t, x, wanted) {
+                return Ok((Driver::Rows, witness));
+            }
+            // Towards the answer of the rows, from the plan's own input.
+            let mut kept = planner.tail(plan, t, x)?;
+            let own = kept.inputs[0].1;
+            let (mut low, mut high, mut driver) = (0.0, 1.0, Driver::Plan);
+            for _ in 0..BISECTIONS {
+                let part = 0.5 * (low + high);
+                for i in 0..u.len() {
+                    wanted[i] = own[i] + part * (u[i] - own[i]);
+                }
+                match planner.behind(plan, t, x, wanted) {
+                    Ok(witness) => (low, kept, driver) = (part, witness, Driver::Between),
+                    Err(_) => high = part,
+                }
+            }
+            Ok((driver, kept))
+        });
+        match found {
+            Ok((driver, witness)) => {
+                u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
+                self.state.plan.witness = witness;
+                driver
+            }
+            Err(failure) => match self.planned(u, |planner| planner.search(t, x)) {
+                Ok(plan) => {
+                    u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
+                    self.state.plan = plan;
+                    Driver::Plan
+                }
+                Err(_) => {
+                    self.state.standing = Standing::Withdrawn(failure);
+                    Driver::Rows
+                }
+            },
+        }
+    }
+}

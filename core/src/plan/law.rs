@@ -1,0 +1,152 @@
+//! Two laws of feedback: one stops the plant, the other follows a reference.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::{Linear, Model};
+
+/// Price of an input against what one hold of it gains: near 0 the plant is stopped in as few holds as it can be.
+const GENTLENESS: f64 = 0.3;
+/// Steps of the Riccati equation until it counts as settled.
+const RICCATI: u32 = 2000;
+
+/// u = `input` + `gain` (x − `state`), moved into the bounds: stops the plant, wherever that is.
+///
+/// The gain is that of the linear-quadratic regulator at the rest, with the price ‖ẋ‖². So it asks for no place, only
+/// that nothing moves: a vehicle is braked where it is, a pendulum is held upright.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Brake {
+    pub(super) state: Vec<f64>,
+    pub(super) input: Vec<f64>,
+    pub(super) gain: DMatrix<f64>,
+    /// The length of a hold in s.
+    pub(super) hold: f64,
+}
+
+impl Brake {
+    /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
+    pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
+        let (state, input) = model.rest(x, hold)?;
+        let Linear { a, b } = model.linear(&state, &input, hold);
+        let nx = a.nrows();
+        let rate = (&a - DMatrix::identity(nx, nx)) / hold;
+        let q = rate.transpose() * rate;
+        let gained = b.transpose() * &q * &b;
+        // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
+        let most = gained.diagonal().max().max(f64::MIN_POSITIVE);
+        let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
+        let mut p = q.clone();
+        for _ in 0..RICCATI {
+            let (next, _) = riccati(&p, &a, &b, &q, &r)?;
+            let change = (&next - &p).amax();
+            p = next;
+            if !p.iter().all(|v| v.is_finite()) {
+                return None;
+            }
+            if change <= 1e-12 * p.amax() {
+                break;
+            }
+        }
+        let (_, gain) = riccati(&p, &a, &b, &q, &r)?;
+        Some(Self { state, input, gain, hold })
+    }
+
+    /// Writes the input at `x`.
+    pub(super) fn input(&self, model: &Model<'_>, x: &[f64], u: &mut [f64]) {
+        feedback(&self.input, &self.gain, |i| x[i] - self.state[i], u);
+        model.clamp(u);
+    }
+}
+
+/// Inputs and states on a grid of equal holds, with the gains of a feedback along it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Reference {
+    /// Time of the first input, s.
+    pub(super) start: f64,
+    /// The length of a hold in s.
+    pub(super) hold: f64,
+    /// One input for every hold.
+    pub(super) inputs: Vec<Vec<f64>>,
+    /// The state at the beginning of every hold, and at the end of the last.
+    pub(super) states: Vec<Vec<f64>>,
+    pub(super) gains: Vec<DMatrix<f64>>,
+}
+
+impl Reference {
+    /// The reference `inputs` from `x` at time `start`, with gains by the Riccati equation backwards along it.
+    pub(super) fn along(
+        model: &Model<'_>,
+        start: f64,
+        x: &[f64],
+        hold: f64,
+        inputs: Vec<Vec<f64>>,
+    ) -> Option<Self> {
+        let (nx, nu) = (model.states(), model.inputs());
+        let mut states = vec![x.to_vec()];
+        for u in &inputs {
+            let mut x = states[states.len() - 1].clone();
+            model.flow(&mut x, u, hold);
+            states.push(x);
+        }
+        // A deviation is priced by how far its state moves along the reference, an input by its bounds.
+        let span = |i: usize| {
+            let (low, high) = states
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
+            high - low
+        };
+        let largest = (0..nx).map(span).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+        let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| span(i).max(0.01 * largest).powi(-2)));
+        let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
+        let r =
+            DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| 0.01 * model.reach(i, reached(i)).powi(-2)));
+        let mut p = &q * 10.0;
+        let mut gains = Vec::with_capacity(inputs.len());
+        for (u, x) in inputs.iter().zip(&states).rev() {
+            let Linear { a, b } = model.linear(x, u, hold);
+            let (next, gain) = riccati(&p, &a, &b, &q, &r)?;
+            p = next;
+            gains.push(gain);
+        }
+        gains.reverse();
+        let finite = gains.iter().all(|k| k.iter().all(|v| v.is_finite()));
+        finite.then_some(Self { start, hold, inputs, states, gains })
+    }
+
+    /// The number of the hold that `t` lies in, if one is left.
+    pub(super) fn hold_at(&self, t: f64) -> Option<usize> {
+        // A time that is a sum of steps counts as the instant it is meant to be.
+        let k = ((t - self.start) / self.hold + 1e-6).floor().max(0.0) as usize;
+        (k < self.inputs.len()).then_some(k)
+    }
+
+    /// Writes the input for the rest of hold `k`, at time `t` and `x`.
+    pub(super) fn input(&self, model: &Model<'_>, k: usize, t: f64, x: &[f64], u: &mut [f64]) {
+        let part = ((t - self.start) / self.hold - k as f64).clamp(0.0, 1.0);
+        let (from, to) = (&self.states[k], &self.states[k + 1]);
+        feedback(&self.inputs[k], &self.gains[k], |i| x[i] - (from[i] + part * (to[i] - from[i])), u);
+        model.clamp(u);
+    }
+}
+
+/// `u` = `input` + `gain` · `deviation`.
+fn feedback(input: &[f64], gain: &DMatrix<f64>, deviation: impl Fn(usize) -> f64, u: &mut [f64]) {
+    for (i, u) in u.iter_mut().enumerate() {
+        *u = input[i] + (0..gain.ncols()).fold(0.0, |sum, j| sum + gain[(i, j)] * deviation(j));
+    }
+}
+
+/// One step of the Riccati equation backwards: the price of a state before it, and the gain.
+fn riccati(
+    p: &DMatrix<f64>,
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    r: &DMatrix<f64>,
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let pb = p * b;
+    let gain = -((r + b.transpose() * &pb).cholesky()?.solve(&(pb.transpose() * a)));
+    let next = q + a.transpose() * p * (a + b * &gain);
+    // Symmetric but for round-off, which would grow.
+    let next = (&next + next.transpose()) * 0.5;
+    Some((next, gain))
+}

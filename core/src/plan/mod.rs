@@ -1,0 +1,60 @@
+//! Plans: a verified way to keep every promise, from a state on, within the bounds of the inputs.
+//!
+//! A *plan* is a list of held inputs and a law that holds the plant at rest after them. It is a *witness* of the promise:
+//! run ahead in the model, it meets every [`Requirement`] at all times. A filter that applies at every sample either an
+//! input with a new witness behind it, or the next input of the witness it has, keeps every requirement for ever. The
+//! lemma and its proof are in `docs/theory.md#witness`.
+//!
+//! | module | owns |
+//! |---|---|
+//! | `model` | the plant run ahead, its linearisation by differences, the rest near a state |
+//! | `law` | feedback that stops the plant, and feedback that follows a reference |
+//! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
+//! | `search` | reference trajectories by sequential convex programming |
+//! | `planner` | which trials are made, in which order, and what is kept between samples |
+//!
+//! The search is heuristic and may fail. The check does not depend on it: a promise rests on the check alone.
+
+mod check;
+mod law;
+mod model;
+mod planner;
+mod search;
+
+pub use check::{Failure, Witness};
+pub use planner::Planner;
+
+use std::sync::Arc;
+
+use crate::lie::DerivativeSource;
+use law::{Brake, Reference};
+
+/// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
+#[derive(Clone, Copy)]
+pub struct Requirement<'a> {
+    /// The barrier, along a model that can be run ahead.
+    pub source: &'a dyn DerivativeSource,
+    /// First time in s.
+    pub from: f64,
+    /// Last time in s; infinite for ever.
+    pub until: f64,
+    /// Least value in the unit of h, ≥ 0.
+    pub margin: f64,
+}
+
+impl Requirement<'_> {
+    fn is_in_force(&self, t: f64) -> bool {
+        self.from <= t && t < self.until
+    }
+}
+
+/// A witness, and the laws from which the next ones are made: plain data, remembered between samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    reference: Option<Arc<Reference>>,
+    brake: Option<Arc<Brake>>,
+    /// The inputs that keep every requirement.
+    pub witness: Witness,
+    /// The longest step in s in which the model is run ahead.
+    step: f64,
+}

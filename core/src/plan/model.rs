@@ -1,0 +1,129 @@
+//! The plant of a plan, run ahead in steps of bounded length.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::lie::DerivativeSource;
+use crate::qp::Bounds;
+
+/// Part of a state's size by which it is moved to differentiate.
+const DIFFERENCE: f64 = 1e-6;
+/// Most Gauss-Newton steps to a state of rest.
+const TO_REST: u32 = 30;
+/// Least singular value that counts, as a part of the largest.
+const RANK: f64 = 1e-9;
+
+/// The plant, and the longest step in s in which it is run ahead.
+#[derive(Clone, Copy)]
+pub(super) struct Model<'a> {
+    pub(super) source: &'a dyn DerivativeSource,
+    pub(super) bounds: &'a Bounds,
+    pub(super) step: f64,
+}
+
+/// x⁺ ≈ A δx + B δu beside a state and an input.
+pub(super) struct Linear {
+    pub(super) a: DMatrix<f64>,
+    pub(super) b: DMatrix<f64>,
+}
+
+impl Model<'_> {
+    pub(super) fn states(&self) -> usize {
+        self.source.state_dim()
+    }
+
+    pub(super) fn inputs(&self) -> usize {
+        self.source.input_dim()
+    }
+
+    /// Number of equal steps of at most [`Self::step`] in `duration`.
+    pub(super) fn steps(&self, duration: f64) -> usize {
+        // Round-off of a sum of steps is no further step.
+        ((duration / self.step) * (1.0 - 1e-9)).ceil().max(1.0) as usize
+    }
+
+    /// Moves `x` by `duration` s under the held input `u`.
+    pub(super) fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
+        let steps = self.steps(duration);
+        for _ in 0..steps {
+            self.source.predict(x, u, duration / steps as f64);
+        }
+    }
+
+    /// `u` moved into the bounds.
+    pub(super) fn clamp(&self, u: &mut [f64]) {
+        for (i, u) in u.iter_mut().enumerate() {
+            *u = self.bounds.clamp(i, *u);
+        }
+    }
+
+    /// Half the width of the bounds of input `i`, or `otherwise` where there is one missing.
+    pub(super) fn reach(&self, i: usize, otherwise: f64) -> f64 {
+        let half = (self.bounds.max[i] - self.bounds.min[i]) / 2.0;
+        if half.is_finite() { half } else { otherwise }
+    }
+
+    /// The linear model over `duration` s beside `x` and `u`, by central differences.
+    pub(super) fn linear(&self, x: &[f64], u: &[f64], duration: f64) -> Linear {
+        let (nx, nu) = (x.len(), u.len());
+        let (mut a, mut b) = (DMatrix::zeros(nx, nx), DMatrix::zeros(nx, nu));
+        let (mut held, mut ends) = (u.to_vec(), [x.to_vec(), x.to_vec()]);
+        for j in 0..nx + nu {
+            let size = DIFFERENCE * (1.0 + if j < nx { x[j].abs() } else { u[j - nx].abs() });
+            for (end, sign) in ends.iter_mut().zip([size, -size]) {
+                end.copy_from_slice(x);
+                held.copy_from_slice(u);
+                match j < nx {
+                    true => end[j] += sign,
+                    false => held[j - nx] += sign,
+                }
+                self.flow(end, &held, duration);
+            }
+            for i in 0..nx {
+                let slope = (ends[0][i] - ends[1][i]) / (2.0 * size);
+                match j < nx {
+                    true => a[(i, j)] = slope,
+                    false => b[(i, j - nx)] = slope,
+                }
+            }
+        }
+        Linear { a, b }
+    }
+
+    /// The rate of the state under `u`: its mean over `duration` s.
+    pub(super) fn rate(&self, x: &[f64], u: &[f64], duration: f64) -> DVector<f64> {
+        let mut end = x.to_vec();
+        self.flow(&mut end, u, duration);
+        DVector::from_iterator(x.len(), end.iter().zip(x).map(|(e, x)| (e - x) / duration))
+    }
+
+    /// A state near `x` and an input within the bounds that holds it there for `duration` s: least change by
+    /// Gauss-Newton steps. `None` where none is found.
+    pub(super) fn rest(&self, x: &[f64], duration: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (nx, nu) = (self.states(), self.inputs());
+        let (mut at, mut u) = (x.to_vec(), vec![0.0; nu]);
+        self.clamp(&mut u);
+        for _ in 0..TO_REST {
+            let rate = self.rate(&at, &u, duration);
+            if !rate.iter().all(|r| r.is_finite()) {
+                return None;
+            }
+            if rate.amax() <= 1e-9 * (1.0 + at.iter().fold(0.0, |m: f64, x| m.max(x.abs()))) {
+                return Some((at, u));
+            }
+            let Linear { a, b } = self.linear(&at, &u, duration);
+            let mut jacobian = DMatrix::zeros(nx, nx + nu);
+            jacobian.view_mut((0, 0), (nx, nx)).copy_from(&((a - DMatrix::identity(nx, nx)) / duration));
+            jacobian.view_mut((0, nx), (nx, nu)).copy_from(&(b / duration));
+            let svd = jacobian.svd(true, true);
+            let step = svd.solve(&rate, RANK * svd.singular_values.max()).ok()?;
+            for i in 0..nx {
+                at[i] -= step[i];
+            }
+            for i in 0..nu {
+                u[i] -= step[nx + i];
+            }
+            self.clamp(&mut u);
+        }
+        None
+    }
+}

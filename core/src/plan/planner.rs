@@ -1,0 +1,288 @@
+//! Which trials are made, in which order, and what is kept between samples.
+
+use std::sync::Arc;
+
+use super::check::{Failure, Walk, Witness};
+use super::law::{Brake, Reference};
+use super::model::Model;
+use super::search::{Search, Trajectory};
+use super::{Plan, Requirement};
+use crate::lie::DerivativeSource;
+use crate::qp::Bounds;
+
+/// Holds of a grid until the last deadline and after it: first for a plant that stops soon, then for one that does not.
+const GRIDS: [[usize; 2]; 2] = [[32, 12], [16, 28]];
+/// Guesses that are improved, the nearest ones.
+const GUESSES: usize = 4;
+/// Quadratic programs for each of them.
+const ITERATIONS: u32 = 15;
+/// Margins in the search, in units of those of the check, so that its answer passes.
+const SEARCHED: f64 = 3.0;
+/// Margins for the rest of a plan that was checked before: the model differs from the plant by round-off at least.
+const KEPT: f64 = 0.5;
+/// Error of the model over a hold, as a part of the size of a state.
+const RESOLVED: f64 = 1e-8;
+/// Halvings of the model's step until it is resolved.
+const HALVINGS: u32 = 7;
+/// Input of a first guess, as a part of its bounds, and the part of the time for which it is held.
+const GUESS: [f64; 2] = [0.4, 0.35];
+
+/// The plant, its bounds and the requirements at a sample, from which plans are made.
+#[derive(Clone, Copy)]
+pub struct Planner<'a> {
+    source: &'a dyn DerivativeSource,
+    bounds: &'a Bounds,
+    requirements: &'a [Requirement<'a>],
+    /// The sampling period in s.
+    period: f64,
+    /// The size of an input that has no bounds.
+    size: f64,
+}
+
+impl<'a> Planner<'a> {
+    /// A planner for the plant of `source`, whose inputs are within `bounds` and held for `period` s; `size` > 0 is the
+    /// size of an input that has no bounds, in its unit. Every source has to predict.
+    pub fn new(
+        source: &'a dyn DerivativeSource,
+        bounds: &'a Bounds,
+        requirements: &'a [Requirement<'a>],
+        period: f64,
+        size: f64,
+    ) -> Self {
+        Self { source, bounds, requirements, period, size }
+    }
+
+    fn model(&self, step: f64) -> Model<'a> {
+        Model { source: self.source, bounds: self.bounds, step }
+    }
+
+    /// Searches for a plan from `x` at `t`.
+    ///
+    /// # Errors
+    ///
+    /// What the nearest trial fails at.
+    pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
+        let last = self.requirements.iter().map(|r| r.from - t).filter(|d| d.is_finite()).fold(0.0, f64::max);
+        let mut failure = Failure::NoRest;
+        for [before, after] in GRIDS {
+            let hold = self.hold(last, before);
+            let step = self.resolved(x, hold);
+            let model = self.model(step);
+            let holds = (last / hold).ceil() as usize + after;
+            let Some(brake) = Brake::around(&model, x, hold) else { continue };
+            let brake = Arc::new(brake);
+            let search = Search {
+                model,
+                requirements: self.requirements,
+                strictness: SEARCHED,
+                t,
+                x,
+                hold,
+                size: self.size,
+            };
+            let mut guesses: Vec<Trajectory> = self
+                .guesses(&model, &brake, x, holds, last / hold)
+                .into_iter()
+                .map(|inputs| search.run(inputs))
+                .collect();
+            guesses.sort_by(|a, b| a.merit.total_cmp(&b.merit));
+            let mut nearest = f64::INFINITY;
+            for guess in guesses.into_iter().take(GUESSES) {
+                let found = search.improve(guess, ITERATIONS);
+                let merit = found.violation;
+                match self.finish(&model, t, x, hold, found, &brake) {
+                    Ok(plan) => return Ok(plan),
+                    Err(found) if merit < nearest => (nearest, failure) = (merit, found),
+                    Err(_) => (),
+                }
+            }
+        }
+        Err(failure)
+    }
+
+    /// The length of a hold in s: a number of periods, since inputs change at samples only. At least `holds` of them lead to
+    /// the deadline `last`, and a node is as soon after it as can be.
+    fn hold(&self, last: f64, holds: usize) -> f64 {
+        if last <= 0.0 {
+            return 5.0 * self.period;
+        }
+        let (most, mut nearest) =
+            ((last / holds as f64 / self.period).max(1.0), (f64::INFINITY, self.period));
+        let mut periods = most.floor();
+        while periods >= 1.0 && periods >= 0.6 * most {
+            let hold = periods * self.period;
+            // Round-off of a deadline that is a number of holds is no further hold.
+            let after = (last / hold * (1.0 - 1e-9)).ceil() * hold - last;
+            if after < nearest.0 - 1e-9 * last {
+                nearest = (after, hold);
+            }
+            periods -= 1.0;
+        }
+        nearest.1
+    }
+
+    /// The plan along `found`, checked.
+    fn finish(
+        &self,
+        model: &Model<'a>,
+        t: f64,
+        x: &[f64],
+        hold: f64,
+        found: Trajectory,
+        brake: &Arc<Brake>,
+    ) -> Result<Plan, Failure> {
+        let mut inputs = found.inputs;
+        inputs.pop();
+        let reference = Reference::along(model, t, x, hold, inputs).ok_or(Failure::Singular)?;
+        let mut plan = Plan {
+            reference: Some(Arc::new(reference)),
+            brake: Some(brake.clone()),
+            witness: Witness::default(),
+            step: model.step,
+        };
+        plan.witness = self.walk(&plan, 1.0, t, x, None, true)?;
+        Ok(plan)
+    }
+
+    /// A witness that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
+    /// the plant is stopped.
+    ///
+    /// # Errors
+    ///
+    /// What the first of these fails at.
+    pub fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
+        let first = Some((u, self.period));
+        let has_reference = plan.reference.as_ref().is_some_and(|r| r.hold_at(t + self.period).is_some());
+        if !has_reference {
+            return self.walk(plan, 1.0, t, x, first, false);
+        }
+        self.walk(plan, 1.0, t, x, first, true)
+            .or_else(|failure| self.walk(plan, 1.0, t, x, first, false).map_err(|_| failure))
+    }
+
+    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are, or the feedback along its
+    /// reference where the plant is not quite the model.
+    ///
+    /// # Errors
+    ///
+    /// What it fails at.
+    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
+        let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
+        let nu = self.source.input_dim();
+        let replay = || {
+            let mut walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
+            let mut at = t;
+            for (end, u) in &plan.witness.inputs {
+                if *end > at + 1e-9 * (1.0 + at.abs()) {
+                    walk.hold(&u[..nu], end - at)?;
+                    at = *end;
+                }
+            }
+            walk.stop(brake, f64::INFINITY)
+        };
+        replay().or_else(|failure| {
+            let follow = |follows| self.walk(plan, KEPT, t, x, None, follows);
+            follow(true).or_else(|_| follow(false)).map_err(|_| failure)
+        })
+    }
+
+    fn walk(
+        &self,
+        plan: &Plan,
+        strictness: f64,
+        t: f64,
+        x: &[f64],
+        first: Option<(&[f64], f64)>,
+        follows: bool,
+    ) -> Result<Witness, Failure> {
+        let mut walk = Walk::new(self.model(plan.step), self.requirements, strictness, t, x)?;
+        if let Some((u, duration)) = first {
+            walk.hold(u, duration)?;
+        }
+        if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
+            walk.follow(reference)?;
+        }
+        let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
+        walk.stop(brake, f64::INFINITY)
+    }
+
+    /// A step of the model with which a hold from `x` is resolved, with inputs at both bounds.
+    fn resolved(&self, x: &[f64], hold: f64) -> f64 {
+        let nu = self.source.input_dim();
+        let mut step = self.period.max(hold / 8.0);
+        for _ in 0..HALVINGS {
+            let error = |sign: f64| {
+                let mut u: Vec<f64> = (0..nu).map(|i| sign * self.model(step).reach(i, self.size)).collect();
+                self.model(step).clamp(&mut u);
+                let run = |step: f64| {
+                    let mut end = x.to_vec();
+                    self.model(step).flow(&mut end, &u, hold);
+                    end
+                };
+                let (coarse, fine) = (run(step), run(step / 2.0));
+                coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs() / (1.0 + b.abs())).fold(0.0, f64::max)
+            };
+            if error(1.0).max(error(-1.0)) <= RESOLVED {
+                break;
+            }
+            step /= 2.0;
+        }
+        step
+    }
+
+    /// First guesses: the plant stopped at once, and after inputs to either side.
+    fn guesses(
+        &self,
+        model: &Model<'_>,
+        brake: &Brake,
+        x: &[f64],
+        holds: usize,
+        deadline: f64,
+    ) -> Vec<Vec<Vec<f64>>> {
+        let nu = model.inputs();
+        let mut sides: Vec<Vec<f64>> = vec![vec![0.0; nu]];
+        if nu <= 2 {
+            for i in 0..nu {
+                let before = sides.clone();
+                for side in [-1.0, 1.0] {
+                    sides.extend(before.iter().map(|s| {
+                        let mut s = s.clone();
+                        s[i] = side;
+                        s
+                    }));
+                }
+            }
+        } else {
+            for i in 0..nu {
+                for side in [-1.0, 1.0] {
+                    let mut s = vec![0.0; nu];
+                    s[i] = side;
+                    sides.push(s);
+                }
+            }
+        }
+        let pushed = ((GUESS[1] * deadline).ceil() as usize).clamp(1, holds);
+        sides
+            .iter()
+            .enumerate()
+            .map(|(number, side)| {
+                let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
+                let mut inputs = Vec::with_capacity(holds + 1);
+                for k in 0..holds {
+                    if number > 0 && k < pushed {
+                        for i in 0..nu {
+                            u[i] = brake.input[i] + side[i] * GUESS[0] * model.reach(i, self.size);
+                        }
+                        model.clamp(&mut u);
+                    } else {
+                        brake.input(model, &x, &mut u);
+                    }
+                    model.flow(&mut x, &u, brake.hold);
+                    inputs.push(u.clone());
+                }
+                inputs.push(brake.input.clone());
+                inputs
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,346 @@
+//! Reference trajectories by sequential convex programming.
+//!
+//! The plant is run ahead under a guess, and linearised along it, as are the sets. A quadratic program moves the inputs:
+//!
+//! ```math
+//! \min \frac{1}{N} \sum_k \left(\frac{u_k}{w}\right)^2 + \rho \sum_j s_j
+//! \quad \text{with} \quad \delta x_{k+1} = A_k \delta x_k + B_k \delta u_k, \quad
+//! h_j + \nabla h_j \delta x_k + s_j \ge \mu_j, \quad |\dot x_N| \le s
+//! ```
+//!
+//! with u within its bounds and a trust region, and the convex part of the curvature of the sets at the last multipliers. A
+//! step is kept where the true merit falls. The solver is clarabel: sparse, interior point.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT};
+use nalgebra::DMatrix;
+
+use super::Requirement;
+use super::model::{Linear, Model};
+use crate::lie::Derivatives;
+
+/// Price of a violation of the size of h on the way, against the price of full inputs all the time.
+const PENALTY: f64 = 300.0;
+/// The trust region at first, in parts of half the width of the bounds.
+const TRUST: f64 = 0.7;
+/// Its least size.
+const LEAST_TRUST: f64 = 1e-3;
+/// A search: the start, the grid and what has to be met there.
+pub(super) struct Search<'a> {
+    pub(super) model: Model<'a>,
+    pub(super) requirements: &'a [Requirement<'a>],
+    /// What margins are multiplied by: larger than in the check.
+    pub(super) strictness: f64,
+    pub(super) t: f64,
+    pub(super) x: &'a [f64],
+    /// The length of a hold in s.
+    pub(super) hold: f64,
+    /// The size of each input, where it has no bounds.
+    pub(super) size: f64,
+}
+
+/// Inputs on the grid, one more for the rest at the end, and where they lead.
+#[derive(Clone, Default)]
+pub(super) struct Trajectory {
+    pub(super) inputs: Vec<Vec<f64>>,
+    states: Vec<Vec<f64>>,
+    /// h − margin at the nodes at which requirements are in force: requirement, node, value.
+    values: Vec<(usize, usize, f64)>,
+    /// Largest |h| of each requirement on the way.
+    sizes: Vec<f64>,
+    /// ẋ at the end.
+    rate: Vec<f64>,
+    /// Largest rate of each state on the way.
+    rates: Vec<f64>,
+    pub(super) merit: f64,
+    /// The largest violation in parts of its size.
+    pub(super) violation: f64,
+}
+
+/// The answer of a quadratic program.
+struct Answer {
+    inputs: Vec<Vec<f64>>,
+    /// The multiplier of each row.
+    prices: Vec<f64>,
+    /// The merit that the linear model expects.
+    merit: f64,
+}
+
+impl Search<'_> {
+    fn width(&self, i: usize) -> f64 {
+        self.model.reach(i, self.size).max(f64::MIN_POSITIVE)
+    }
+
+    /// Runs `inputs` ahead, of which the last is for the rest.
+    pub(super) fn run(&self, inputs: Vec<Vec<f64>>) -> Trajectory {
+        let (holds, nx) = (inputs.len() - 1, self.x.len());
+        let mut states = vec![self.x.to_vec()];
+        let mut rates = vec![0.0_f64; nx];
+        for u in &inputs[..holds] {
+            let from = &states[states.len() - 1];
+            let mut x = from.clone();
+            self.model.flow(&mut x, u, self.hold);
+            for (rate, (x, from)) in rates.iter_mut().zip(x.iter().zip(from)) {
+                *rate = rate.max((x - from).abs() / self.hold);
+            }
+            states.push(x);
+        }
+        let rate = self.model.rate(&states[holds], &inputs[holds], self.hold).as_slice().to_vec();
+        // A state that hardly moves is measured by its own size.
+        let fastest = rates.iter().fold(1e-3, |m: f64, r| m.max(*r));
+        rates.iter_mut().for_each(|r| *r = r.max(0.05 * fastest));
+        let (mut values, mut sizes) = (Vec::new(), vec![0.0_f64; self.requirements.len()]);
+        let mut derivatives = Derivatives::ZERO;
+        for (i, requirement) in self.requirements.iter().enumerate() {
+            for (k, x) in states.iter().enumerate() {
+                let t = self.t + self.hold * k as f64;
+                requirement.source.evaluate(t, x, &mut derivatives);
+                let h = derivatives.drift[0];
+                sizes[i] = sizes[i].max(h.abs());
+                // A deadline between two nodes is asked for at the one before, too, where that is near.
+                let begun = requirement.from <= t + 0.5 * self.hold && t < requirement.until;
+                if k > 0 && begun {
+                    values.push((i, k, h - self.strictness * requirement.margin));
+                }
+            }
+        }
+        let mut trajectory =
+            Trajectory { inputs, states, values, sizes, rate, rates, merit: 0.0, violation: 0.0 };
+        self.appraise(&mut trajectory);
+        trajectory
+    }
+
+    fn appraise(&self, of: &mut Trajectory) {
+        let share = 1.0 / of.inputs.len() as f64;
+        let effort: f64 = of
+            .inputs
+            .iter()
+            .flat_map(|u| u.iter().enumerate().map(|(i, u)| (u / self.width(i)).powi(2) * share))
+            .sum();
+        let mut violation = 0.0;
+        let mut most = 0.0_f64;
+        let missing = of.values.iter().map(|&(i, _, value)| -value / of.sizes[i].max(f64::MIN_POSITIVE));
+        let moving = of.rate.iter().zip(&of.rates).map(|(r, scale)| r.abs() / scale - 0.01);
+        for part in missing.chain(moving) {
+            violation += part.max(0.0);
+            most = most.max(part);
+        }
+        of.merit = effort + PENALTY * violation;
+        if !of.merit.is_finite() {
+            of.merit = f64::INFINITY;
+        }
+        of.violation = most;
+    }
+
+    /// Improves `guess`; at most `iterations` quadratic programs.
+    pub(super) fn improve(&self, guess: Trajectory, iterations: u32) -> Trajectory {
+        let (mut best, mut trust) = (guess, TRUST);
+        // The price of each row: where it is violated, that of its slack.
+        let mut prices: Vec<f64> =
+            best.values.iter().map(|&(.., value)| if value < 0.0 { PENALTY } else { 0.0 }).collect();
+        for _ in 0..iterations {
+            if !best.merit.is_finite() || trust < LEAST_TRUST {
+                break;
+            }
+            let Some(answer) = self.program(&best, &prices, trust) else {
+                trust *= 0.3;
+                continue;
+            };
+            let next = self.run(answer.inputs);
+            let (gain, expected) = (best.merit - next.merit, best.merit - answer.merit);
+            if gain > 0.0 {
+                let settled = next.violation <= 0.0 && gain <= 1e-2 * best.merit;
+                best = next;
+                prices = answer.prices;
+                if settled {
+                    break;
+                }
+            }
+            trust = match gain / expected {
+                r if r > 0.7 => (2.0 * trust).min(2.0),
+                r if r > 0.3 => trust,
+                r if r > 0.0 => 0.5 * trust,
+                _ => 0.3 * trust,
+            };
+        }
+        best
+    }
+
+    /// The answer of the quadratic program around `at`.
+    fn program(&self, at: &Trajectory, prices: &[f64], trust: f64) -> Option<Answer> {
+        let (nx, nu) = (self.model.states(), self.model.inputs());
+        let holds = at.inputs.len() - 1;
+        // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the rest.
+        let input = |k: usize, i: usize| k * nu + i;
+        let state = |k: usize, i: usize| (holds + 1) * nu + (k - 1) * nx + i;
+        let first_slack = (holds + 1) * nu + holds * nx;
+        let first_rest = first_slack + at.values.len();
+        let variables = first_rest + nx;
+        let (mut is, mut js, mut vs, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut entry = |i: usize, j: usize, v: f64| {
+            if v != 0.0 {
+                is.push(i);
+                js.push(j);
+                vs.push(v);
+            }
+        };
+        // The linear model, as equations.
+        for k in 0..holds {
+            let Linear { a, b: by } = self.model.linear(&at.states[k], &at.inputs[k], self.hold);
+            for i in 0..nx {
+                entry(b.len(), state(k + 1, i), 1.0);
+                for j in 0..nx {
+                    if k > 0 {
+                        entry(b.len(), state(k, j), -a[(i, j)]);
+                    }
+                }
+                for j in 0..nu {
+                    entry(b.len(), input(k, j), -by[(i, j)]);
+                }
+                b.push(0.0);
+            }
+        }
+        let equations = b.len();
+        // The sets at the nodes.
+        let mut gradient = vec![0.0; nx];
+        for (row, &(i, k, value)) in at.values.iter().enumerate() {
+            let size = at.sizes[i].max(f64::MIN_POSITIVE);
+            self.gradient(i, k, &at.states[k], &mut gradient);
+            for j in 0..nx {
+                entry(b.len(), state(k, j), -gradient[j] / size);
+            }
+            entry(b.len(), first_slack + row, -1.0);
+            b.push(value / size);
+        }
+        // The rest at the end.
+        let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], self.hold);
+        let a = (a - DMatrix::identity(nx, nx)) / self.hold;
+        let by = by / self.hold;
+        for i in 0..nx {
+            for sign in [1.0, -1.0] {
+                let scale = sign / at.rates[i];
+                for j in 0..nx {
+                    entry(b.len(), state(holds, j), scale * a[(i, j)]);
+                }
+                for j in 0..nu {
+                    entry(b.len(), input(holds, j), scale * by[(i, j)]);
+                }
+                entry(b.len(), first_rest + i, -1.0);
+                b.push(-scale * at.rate[i]);
+            }
+        }
+        // Slacks, bounds and the trust region.
+        for slack in first_slack..variables {
+            entry(b.len(), slack, -1.0);
+            b.push(0.0);
+        }
+        for (k, u) in at.inputs.iter().enumerate() {
+            for (i, &u) in u.iter().enumerate() {
+                let room = trust * self.width(i);
+                entry(b.len(), input(k, i), 1.0);
+                b.push((self.model.bounds.max[i] - u).min(room));
+                entry(b.len(), input(k, i), -1.0);
+                b.push((u - self.model.bounds.min[i]).min(room));
+            }
+        }
+        // ½ zᵀPz + qᵀz: effort and slacks.
+        let mut q = vec![0.0; variables];
+        let mut diagonal = vec![0.0; variables];
+        let share = 2.0 / (holds + 1) as f64;
+        for (k, u) in at.inputs.iter().enumerate() {
+            for (i, u) in u.iter().enumerate() {
+                let price = share / self.width(i).powi(2);
+                diagonal[input(k, i)] = price;
+                q[input(k, i)] = price * u;
+            }
+        }
+        q[first_slack..].fill(PENALTY);
+        // The curvature of the sets, where it is convex in the program.
+        let mut indices: Vec<usize> = (0..variables).collect();
+        let mut columns = indices.clone();
+        for (&(i, k, _), &price) in at.values.iter().zip(prices) {
+            if price > 1e-6 * PENALTY {
+                let weight = price / at.sizes[i].max(f64::MIN_POSITIVE);
+                let bent = self.curvature(i, k, &at.states[k]) * weight;
+                for r in 0..nx {
+                    for c in r..nx {
+                        if bent[(r, c)] != 0.0 {
+                            indices.push(state(k, r));
+                            columns.push(state(k, c));
+                            diagonal.push(bent[(r, c)]);
+                        }
+                    }
+                }
+            }
+        }
+        let p = CscMatrix::new_from_triplets(variables, variables, indices, columns, diagonal);
+        let rows = CscMatrix::new_from_triplets(b.len(), variables, is, js, vs);
+        let cones = [ZeroConeT(equations), NonnegativeConeT(b.len() - equations)];
+        let settings = DefaultSettings {
+            verbose: false,
+            max_iter: 60,
+            tol_gap_abs: 1e-6,
+            tol_gap_rel: 1e-6,
+            tol_feas: 1e-6,
+            ..DefaultSettings::default()
+        };
+        let mut solver = DefaultSolver::new(&p, &q, &rows, &b, &cones, settings).ok()?;
+        solver.solve();
+        let solution = &solver.solution;
+        let solved = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
+        if !solved || !solution.x.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let mut inputs = at.inputs.clone();
+        let mut merit = PENALTY * solution.x[first_slack..].iter().map(|s| s.max(0.0)).sum::<f64>();
+        for (k, u) in inputs.iter_mut().enumerate() {
+            for (i, u) in u.iter_mut().enumerate() {
+                *u += solution.x[input(k, i)];
+                merit += 0.5 * share * (*u / self.width(i)).powi(2);
+            }
+            self.model.clamp(u);
+        }
+        let prices = solution.z[equations..equations + at.values.len()].to_vec();
+        Some(Answer { inputs, prices, merit })
+    }
+
+    /// The part of −∂²h/∂x² that is convex, of requirement `i` at node `k`, by differences.
+    fn curvature(&self, i: usize, k: usize, x: &[f64]) -> DMatrix<f64> {
+        let nx = x.len();
+        let (mut moved, mut ends) = (x.to_vec(), [vec![0.0; nx], vec![0.0; nx]]);
+        let mut bent = DMatrix::zeros(nx, nx);
+        for j in 0..nx {
+            let size = 1e-3 * (1.0 + x[j].abs());
+            for (end, sign) in ends.iter_mut().zip([size, -size]) {
+                moved[j] = x[j] + sign;
+                self.gradient(i, k, &moved, end);
+            }
+            moved[j] = x[j];
+            for r in 0..nx {
+                bent[(r, j)] = (ends[1][r] - ends[0][r]) / (2.0 * size);
+            }
+        }
+        let symmetric = (&bent + bent.transpose()) * 0.5;
+        let parts = symmetric.symmetric_eigen();
+        let most = parts.eigenvalues.amax();
+        let kept = parts.eigenvalues.map(|v| if v > 1e-4 * most { v } else { 0.0 });
+        &parts.eigenvectors * DMatrix::from_diagonal(&kept) * parts.eigenvectors.transpose()
+    }
+
+    /// ∂h/∂x of requirement `i` at node `k`, by central differences.
+    fn gradient(&self, i: usize, k: usize, x: &[f64], out: &mut [f64]) {
+        let source = self.requirements[i].source;
+        let (t, mut moved, mut derivatives) = (self.t + self.hold * k as f64, x.to_vec(), Derivatives::ZERO);
+        for (j, out) in out.iter_mut().enumerate() {
+            let size = 1e-6 * (1.0 + x[j].abs());
+            let mut ends = [0.0; 2];
+            for (end, sign) in ends.iter_mut().zip([size, -size]) {
+                moved[j] = x[j] + sign;
+                source.evaluate(t, &moved, &mut derivatives);
+                *end = derivatives.drift[0];
+            }
+            moved[j] = x[j];
+            *out = (ends[0] - ends[1]) / (2.0 * size);
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! A filter with a witness keeps what it has promised, whatever u_ref is; judged by an integrator of its own.
+
+use punctual_core::barriers::{DistanceDisc, Outside};
+use punctual_core::filter::{
+    AssuredFilter, BarrierSettings, Driver, FilterBuilder, SafetyFilter, Sampling, Standing,
+};
+use punctual_reference::plants::{PointMass, Unicycle};
+
+const PERIOD: f64 = 0.02;
+const GOAL: ([f64; 2], f64) = ([20.0, 12.0], 2.0);
+const OBSTACLE: ([f64; 2], f64) = ([10.0, 7.5], 2.0);
+
+/// Numbers that are the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Vehicle {
+    PointMass,
+    Unicycle,
+}
+
+impl Vehicle {
+    fn rate(self, x: [f64; 4], u: [f64; 2]) -> [f64; 4] {
+        match self {
+            Self::PointMass => [x[2], x[3], u[0], u[1]],
+            Self::Unicycle => [x[3] * x[2].cos(), x[3] * x[2].sin(), u[1], u[0]],
+        }
+    }
+
+    fn move_by(self, x: [f64; 4], u: [f64; 2], dt: f64) -> [f64; 4] {
+        let at = |k: [f64; 4], s: f64| std::array::from_fn(|i| x[i] + s * k[i]);
+        let a = self.rate(x, u);
+        let b = self.rate(at(a, dt / 2.0), u);
+        let c = self.rate(at(b, dt / 2.0), u);
+        let d = self.rate(at(c, dt), u);
+        std::array::from_fn(|i| x[i] + dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
+    }
+
+    fn filter(self, deadline: f64, bounds: [f64; 2]) -> SafetyFilter {
+        let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
+        let (goal, clear) = (disc(GOAL), Outside(disc(OBSTACLE)));
+        let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(deadline) };
+        let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
+        let builder = SafetyFilter::builder(4, 2);
+        let builder = match self {
+            Self::PointMass => builder
+                .barrier("goal", PointMass, goal, within)
+                .and_then(|b| b.barrier("clear", PointMass, clear, keeping)),
+            Self::Unicycle => builder
+                .barrier("goal", Unicycle, goal, within)
+                .and_then(|b| b.barrier("clear", Unicycle, clear, keeping)),
+        };
+        builder
+            .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter")
+    }
+
+    fn assured(self, deadline: f64, bounds: [f64; 2]) -> AssuredFilter {
+        AssuredFilter::new(self.filter(deadline, bounds), PERIOD).expect("a filter that can be assured")
+    }
+}
+
+/// The wanted input number `kind`: none, damping, outwards, to the obstacle, at random.
+fn wanted(vehicle: Vehicle, kind: u64, x: [f64; 4], bounds: [f64; 2], random: &mut Random) -> [f64; 2] {
+    let to = |c: [f64; 2]| [c[0] - x[0], c[1] - x[1]];
+    match (kind, vehicle) {
+        (0, _) => [0.0; 2],
+        (1, Vehicle::PointMass) => [-x[2], -x[3]],
+        (1, Vehicle::Unicycle) => [-x[3], 0.0],
+        (2, Vehicle::PointMass) => to(GOAL.0).map(|d| -d),
+        (2, Vehicle::Unicycle) => [3.0 * bounds[0], 0.3 * bounds[1]],
+        (3, Vehicle::PointMass) => to(OBSTACLE.0),
+        (3, Vehicle::Unicycle) => {
+            let [dx, dy] = to(OBSTACLE.0);
+            [bounds[0], 4.0 * (dy.atan2(dx) - x[2]).sin()]
+        }
+        _ => bounds.map(|b| random.between(-b, b)),
+    }
+}
+
+#[test]
+fn what_is_promised_is_kept_whatever_is_wanted() {
+    let (mut accepted, mut plans) = ([0; 2], 0);
+    for seed in 1..=40_u64 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let vehicle = if seed % 2 == 0 { Vehicle::PointMass } else { Vehicle::Unicycle };
+        let deadline = random.between(3.0, 9.0);
+        let bounds = match vehicle {
+            Vehicle::PointMass => [random.between(2.0, 12.0); 2],
+            Vehicle::Unicycle => [random.between(2.0, 12.0), random.between(0.8, 3.0)],
+        };
+        let mut x = [random.between(-4.0, 4.0), random.between(-4.0, 4.0), 0.0, random.between(-4.0, 4.0)];
+        x[2] = random.between(-3.0, 3.0);
+        let mut filter = vehicle.assured(deadline, bounds);
+        for k in 0..((deadline + 4.0) / PERIOD) as usize {
+            let t = k as f64 * PERIOD;
+            let u_ref = wanted(vehicle, seed % 5, x, bounds, random);
+            let mut u = [0.0; 2];
+            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            if k == 0 {
+                if !assurance.is_assured() {
+                    assert!(matches!(assurance.standing, Standing::Refused(_)), "{assurance:?}");
+                    break;
+                }
+                accepted[(seed % 2) as usize] += 1;
+            }
+            assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
+            assert!(u.iter().zip(bounds).all(|(u, b)| u.abs() <= b), "{seed} at {t}: {u:?}");
+            plans += usize::from(assurance.driver == Driver::Plan);
+            // Ten instants of the hold, each with the distances themselves.
+            for part in 1..=10 {
+                x = vehicle.move_by(x, u, PERIOD / 10.0);
+                let t = t + PERIOD * f64::from(part) / 10.0;
+                let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+                assert!(distance(OBSTACLE.0) >= OBSTACLE.1, "{seed} {vehicle:?} at {t}: collision");
+                assert!(t < deadline || distance(GOAL.0) <= GOAL.1, "{seed} {vehicle:?} at {t}: not inside");
+            }
+        }
+    }
+    // Not all can be had: some bounds are too tight for their deadline.
+    assert!(accepted.iter().all(|&n| (8..20).contains(&n)), "accepted: {accepted:?}");
+    assert!(plans > 0, "the plan never had to drive: the cases are too easy");
+}
+
+#[test]
+fn what_no_input_can_keep_is_refused() {
+    // 23 m from rest within 2 s: reached at 12 m/s² at the earliest, and then much too fast to stay.
+    let mut filter = Vehicle::PointMass.assured(2.0, [12.0; 2]);
+    let mut u = [0.0; 2];
+    let assurance = *filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert!(matches!(assurance.standing, Standing::Refused(_)), "{assurance:?}");
+    assert!(assurance.until.is_nan() && filter.plan().is_none());
+    // The rows go on.
+    assert!(u != [0.0; 2]);
+}
+
+#[test]
+fn a_restored_filter_goes_on_bit_for_bit() {
+    let vehicle = Vehicle::Unicycle;
+    let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
+    let mut x = [0.0, 0.0, -0.4, 1.0];
+    let run = |filter: &mut AssuredFilter, x: &mut [f64; 4], steps: std::ops::Range<usize>| {
+        let mut bits = Vec::new();
+        for k in steps {
+            let mut u = [0.0; 2];
+            let u_ref = [6.0, -1.5];
+            let assurance = filter.step(k as f64 * PERIOD, &*x, &u_ref, &mut u).expect("right dimensions");
+            assert!(assurance.is_assured(), "{assurance:?}");
+            bits.push(u.map(f64::to_bits));
+            *x = vehicle.move_by(*x, u, PERIOD);
+        }
+        bits
+    };
+    run(&mut filter, &mut x, 0..150);
+    let (state, from) = (filter.state().clone(), x);
+    let uninterrupted = run(&mut filter, &mut x, 150..400);
+    let mut other = vehicle.assured(8.0, [6.0, 2.0]);
+    other.restore(&state).expect("its own state");
+    let mut x = from;
+    assert_eq!(run(&mut other, &mut x, 150..400), uninterrupted);
+}
+
+#[test]
+fn a_late_sample_ends_the_promise() {
+    let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);
+    let mut u = [0.0; 2];
+    assert!(filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+    let late = filter.step(1.5 * PERIOD, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert_eq!(late.standing, Standing::Overdue);
+    filter.rearm();
+    assert!(filter.step(1.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+}
+
+#[test]
+fn a_plant_that_is_not_the_model_ends_the_promise() {
+    let mut filter = Vehicle::PointMass.assured(4.5, [8.0; 2]);
+    let mut u = [0.0; 2];
+    assert!(filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+    // Somebody has carried it away.
+    let away = filter.step(PERIOD, &[-40.0, -40.0, 0.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
+    assert!(matches!(away.standing, Standing::Withdrawn(_)), "{away:?}");
+}
+
+#[test]
+fn filters_that_plans_do_not_account_for_are_refused() {
+    let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+    let refused = |settings: BarrierSettings, change: fn(FilterBuilder) -> FilterBuilder| {
+        let builder =
+            SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(), settings).expect("valid");
+        let filter = change(builder).build().expect("valid filter");
+        AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let within = BarrierSettings::within(5.0);
+    let delayed = refused(within, |b| b.actuation_delay(0.01).expect("a delay"));
+    assert_eq!(delayed, "actuation_delay: is not 0, which no plan accounts for yet");
+    let erring = refused(within, |b| b.measurement_errors(&[0.1, 0.1, 0.0, 0.0]).expect("errors"));
+    assert_eq!(erring, "measurement_errors: are not 0, which no plan accounts for yet");
+    let disturbed = refused(BarrierSettings { disturbance: 0.1, ..within }, |b| b);
+    assert_eq!(disturbed, "goal.disturbance: is not 0, which no plan accounts for yet");
+    assert_eq!(refused(within, |b| b), "");
+}
