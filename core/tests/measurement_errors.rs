@@ -118,7 +118,10 @@ fn what_is_refused() {
     );
     let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
     let done = builder(root).measurement_errors(&errors).and_then(|b| b.build());
-    refused("goal.measurement_errors: needs the reference profile", done);
+    refused(
+        "goal.measurement_errors: needs a method that allows for errors, such as the reference profile",
+        done,
+    );
     // h and the two parts of its row.
     let done = SafetyFilter::builder(4, 2)
         .source("goal", lie::external(1, 2).expect("in range"), settings())
