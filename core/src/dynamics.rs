@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::elementary;
 use crate::error::{Error, length};
 use crate::scalar::Scalar;
 
@@ -81,7 +82,8 @@ impl Region {
 
     /// Smallest and largest value of nᵀp over the region.
     pub fn along(&self, n: [f64; 2]) -> [f64; 2] {
-        let mut ends = [-self.radius * n[0].hypot(n[1]), self.radius * n[0].hypot(n[1])];
+        let mut ends =
+            [-self.radius * elementary::hypot(n[0], n[1]), self.radius * elementary::hypot(n[0], n[1])];
         for (side, n) in self.sides.iter().zip(n) {
             let (a, b) = (n * side[0], n * side[1]);
             ends = [ends[0] + a.min(b), ends[1] + a.max(b)];
@@ -92,7 +94,7 @@ impl Region {
     /// The distance in m from `point` (m), 0 inside.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let [x, y] = [0, 1].map(|i| (self.sides[i][0] - point[i]).max(point[i] - self.sides[i][1]).max(0.0));
-        ((x * x + y * y).sqrt() - self.radius).max(0.0)
+        (elementary::sqrt(x * x + y * y) - self.radius).max(0.0)
     }
 }
 

@@ -55,8 +55,18 @@
 //! # Dependencies in the interface
 //!
 //! Models are written with [`nalgebra`], which is part of this interface and exported again here. So a new minor version of
-//! it (0.x) comes with a new minor version of this crate, and with no other. The feature `interior-point` adds a second
-//! solver of the quadratic program, to compare with.
+//! it (0.x) comes with a new minor version of this crate, and with no other.
+//!
+//! # Features
+//!
+//! | feature | gives |
+//! |---|---|
+//! | `std` (default) | elementary functions (sin, exp, …) of the platform. Without it the crate needs `alloc` only. |
+//! | `libm` | elementary functions of the crate [`libm`](https://docs.rs/libm), with or without `std`. A filter then gives the same bits on every operating system; those of the platform differ in the last digit. It is slower where a model has many of them. |
+//! | `serde` | `Serialize` and `Deserialize` for states, reports, settings and derivatives. |
+//! | `interior-point` | a second solver of the quadratic program, to compare with. Needs `std`. |
+//!
+//! One of `std` and `libm` is needed.
 //!
 //! # References
 //!
@@ -64,12 +74,27 @@
 //! Functions*, arXiv:2507.13888 ("the paper" throughout). The comparison lemma for any order, the
 //! reference profile and the stay constraint go beyond it. Their proofs are in `docs/theory.md`; formulas
 //! have the same labels there and here.
+#![no_std]
 #![forbid(unsafe_code)]
+#![warn(clippy::alloc_instead_of_core, clippy::std_instead_of_alloc, clippy::std_instead_of_core)]
+// Elementary functions come from one module: core/clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!(
+    "punctual-core needs sin, exp and the like from somewhere: switch on its feature `std` (the default), or `libm`"
+);
+
+#[macro_use]
+extern crate alloc;
+#[cfg(any(feature = "std", test))]
+extern crate std;
 
 pub mod barrier;
 pub mod barriers;
 pub mod convergence;
 pub mod dynamics;
+mod elementary;
 pub mod error;
 pub mod filter;
 pub mod jet;
@@ -77,6 +102,8 @@ pub mod judge;
 pub mod lie;
 pub mod qp;
 pub mod reach;
+#[cfg(feature = "serde")]
+mod real;
 pub mod scalar;
 
 pub use error::{Error, ErrorKind};

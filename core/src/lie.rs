@@ -23,8 +23,9 @@ mod external;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
-use std::array::from_fn;
-use std::marker::PhantomData;
+use alloc::boxed::Box;
+use core::array::from_fn;
+use core::marker::PhantomData;
 
 use nalgebra::SVector;
 

@@ -3,7 +3,7 @@
 //! The error starts at zero, so h ≥ μ + r for ever (`docs/theory.md#profile`). The profiles themselves are in
 //! [`profile`].
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 use super::comparison::lower_terms;
 use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Rates, Sample};

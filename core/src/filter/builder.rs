@@ -1,5 +1,10 @@
 //! The builder of a filter. It checks every number, so that no step can fail on one.
 
+use alloc::borrow::ToOwned;
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};

@@ -4,6 +4,9 @@
 //! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u,
 //! so the row is no longer affine: it is linearised with the rest.
 
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use super::Sampling;
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::PeriodBound;

@@ -10,6 +10,7 @@
 //! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
 
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 use crate::lie::{Ahead, DerivativeSource};
 
 /// Parts of the first walk.
@@ -85,7 +86,7 @@ impl Hold<'_> {
             if sure.h >= 0.0 || seen.h < 0.0 || parts == MOST {
                 return Some(sure);
             }
-            std::mem::swap(&mut coarse, &mut fine);
+            core::mem::swap(&mut coarse, &mut fine);
         }
     }
 
@@ -161,7 +162,7 @@ fn dip(a: Node, b: Node) -> Lowest {
     // a.h + left s + c s² + d s³ for s in [0, 1].
     let (c, d) = (3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise);
     let mut lowest = Lowest { h: a.h, at: a.at }.or(Lowest { h: b.h, at: b.at });
-    let root = (c * c - 3.0 * d * left).max(0.0).sqrt();
+    let root = elementary::sqrt((c * c - 3.0 * d * left).max(0.0));
     // The two zeros of the slope, in the form that does not cancel.
     let sum = -(c + root.copysign(c));
     for s in [sum / (3.0 * d), left / sum] {

@@ -1,5 +1,8 @@
 //! Dynamic extension inside the filter: an integrator whose state is commanded and not measured.
 
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
 use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::DerivativeSource;
@@ -45,6 +48,7 @@ pub struct IntegratedFilter {
 
 /// The input that an [`IntegratedFilter`] integrates.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Integration {
     /// The number of the filter's state that is integrated, counted from 0.
     pub state: usize,
@@ -52,8 +56,10 @@ pub struct Integration {
     pub input: usize,
     /// Least and largest value of the state, in its unit; ±infinity where there is none. The value begins with the number
     /// nearest 0 within them.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub limits: [f64; 2],
     /// How fast the value follows the wish for it, 1/s, finite, > 0.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
 }
 

@@ -31,6 +31,7 @@ mod wide;
 use super::errors::{MeasurementErrors, Uncertainty};
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::{PeriodBound, Weighted};
+use crate::elementary;
 use crate::lie::Ahead;
 use crate::qp::{
     Bounds, Constraint, Enforcement, Outcome, Problem, Row, RowSet, Solution, Solver, Workspace,
@@ -250,7 +251,7 @@ impl PeriodProblem<'_> {
     }
 
     fn distance(&self, u: &[f64]) -> f64 {
-        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r))
+        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r))
     }
 
     /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
@@ -364,20 +365,20 @@ impl PeriodProblem<'_> {
         for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
             // The axis without its part along u − u_ref.
             let along = (u[axis] - self.u_ref[axis]) / far;
-            let mut aside: [f64; MAX_INPUTS] = std::array::from_fn(|j| {
+            let mut aside: [f64; MAX_INPUTS] = core::array::from_fn(|j| {
                 if j < m {
                     f64::from(u8::from(j == axis)) - along * (u[j] - self.u_ref[j]) / far
                 } else {
                     0.0
                 }
             });
-            let size = aside.iter().fold(0.0, |s: f64, v| s.hypot(*v));
+            let size = aside.iter().fold(0.0, |s: f64, v| elementary::hypot(s, *v));
             for (j, v) in aside[..m].iter_mut().enumerate() {
                 *v = self.bounds.clamp(j, u[j] + sign * ASIDE * far * *v / size);
             }
             let aside = &aside[..m];
             if self.linearise(aside, RowSet::of(i), at).is_some() {
-                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| s.hypot(*a));
+                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| elementary::hypot(s, *a));
                 found |= at.rows[i].slack(aside) > (self.distance(aside) - far) * normal;
             }
         }
@@ -462,7 +463,7 @@ impl PeriodProblem<'_> {
         found: &mut Candidate,
     ) -> bool {
         let m = u.len();
-        let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+        let from: [f64; MAX_INPUTS] = core::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
         let (violation, mut part) = (found.violation, 1.0);
         for _ in 0..=HALVINGS {
             for i in 0..m {

@@ -19,11 +19,13 @@
 //! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
 //! Press 1983, theorem 3.2.2.
 
-use std::fmt;
+use alloc::vec::Vec;
+use core::fmt;
 
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
 use crate::convergence::BoundDerivative;
 use crate::convergence::sampled::{PeriodBound, Weighted};
+use crate::elementary;
 use crate::error::{Error, finite, length};
 use crate::lie::{Ahead, Derivatives};
 use crate::qp::sensitivity::Equations;
@@ -32,27 +34,36 @@ use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SampleDerivative {
     /// Derivative of the returned input, unit of u over that of the direction; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub u: [f64; MAX_INPUTS],
     /// Derivatives of the reports, in the order of the barriers.
     pub barriers: Vec<BarrierDerivative>,
     /// State, direction and zeros.
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: [Vec<f64>; 3],
 }
 
 /// The derivative of those numbers of a [`BarrierReport`](super::BarrierReport) that vary continuously with the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BarrierDerivative {
     /// Derivative of [`BarrierReport::h`](super::BarrierReport::h).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub h: f64,
     /// Derivative of [`BarrierReport::profile`](super::BarrierReport::profile).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub profile: f64,
     /// Derivative of [`BarrierReport::margin`](super::BarrierReport::margin).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Derivative of [`BarrierReport::slack`](super::BarrierReport::slack).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
     /// Derivative of [`BarrierReport::sampling_loss`](super::BarrierReport::sampling_loss).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub sampling_loss: f64,
 }
 
@@ -100,7 +111,7 @@ impl fmt::Display for NoDerivative {
     }
 }
 
-impl std::error::Error for NoDerivative {}
+impl core::error::Error for NoDerivative {}
 
 /// The derivative of one row along the direction.
 #[derive(Clone, Copy)]
@@ -389,7 +400,7 @@ impl SafetyFilter {
             let moved = weighted(bound, &change, n, u.len(), period);
             let by_weights = sampled.weighted(&ahead.value[..n], &ahead.gradient, u.len(), period);
             row_derivative.slack = moved.value + by_weights.value;
-            row_derivative.normal = std::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
+            row_derivative.normal = core::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
         }
         Ok((row_derivative, derivative))
     }
@@ -439,7 +450,7 @@ fn is_anchored(before: &FixedTimeState, after: &FixedTimeState, begin: f64) -> b
 
 /// Whether a soft row has its largest multiplier.
 fn is_saturated(normal: &[f64; MAX_INPUTS], multiplier: f64, penalty: f64) -> bool {
-    multiplier * dot(normal, normal).sqrt() >= SATURATED * penalty
+    multiplier * elementary::sqrt(dot(normal, normal)) >= SATURATED * penalty
 }
 
 /// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖ where
@@ -452,14 +463,14 @@ fn pull_saturated(
     curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS],
 ) {
     let square = dot(row, row);
-    let by = penalty / square.sqrt();
+    let by = penalty / elementary::sqrt(square);
     let turned = |a: &[f64; MAX_INPUTS]| {
         let inside = dot(row, a) / square;
-        std::array::from_fn(|i| by * (a[i] - inside * row[i]))
+        core::array::from_fn(|i| by * (a[i] - inside * row[i]))
     };
     let mut pull = [[0.0; MAX_INPUTS]; MAX_INPUTS];
     for j in 0..MAX_INPUTS {
-        let column: [f64; MAX_INPUTS] = turned(&std::array::from_fn(|i| curvature[i][j]));
+        let column: [f64; MAX_INPUTS] = turned(&core::array::from_fn(|i| curvature[i][j]));
         for i in 0..MAX_INPUTS {
             pull[i][j] = column[i];
         }

@@ -1,6 +1,6 @@
 //! Numbers of any kind with their derivative along one direction.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
 use crate::scalar::Scalar;

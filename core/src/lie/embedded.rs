@@ -1,5 +1,8 @@
 //! A source of derivatives that knows some of the filter's states.
 
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
 use super::{Ahead, DerivativeSource, Derivatives};
 use crate::error::{Error, ErrorKind, length};
 

@@ -1,5 +1,7 @@
 //! Derivatives that somebody else computes, such as a simulator: the state is the derivatives themselves.
 
+use alloc::boxed::Box;
+
 use super::{Ahead, DerivativeSource, Derivatives, checked_degree, checked_inputs};
 use crate::error::Error;
 
@@ -93,6 +95,8 @@ pub fn external(n: usize, input_dim: usize) -> Result<Box<dyn DerivativeSource>,
 
 #[cfg(test)]
 mod tests {
+    use alloc::string::ToString;
+
     use super::*;
     use crate::MAX_INPUTS;
 
@@ -131,8 +135,8 @@ mod tests {
         let source = external(2, 2).expect("in range");
         let (dx, u, du) = ([1.0, 0.5, -2.0, 0.25, 3.0], [1.0, 2.0], [-0.5, 4.0]);
         let at = |by: f64| {
-            let x: [f64; 5] = std::array::from_fn(|i| X[i] + by * dx[i]);
-            let u: [f64; 2] = std::array::from_fn(|i| u[i] + by * du[i]);
+            let x: [f64; 5] = core::array::from_fn(|i| X[i] + by * dx[i]);
+            let u: [f64; 2] = core::array::from_fn(|i| u[i] + by * du[i]);
             let mut out = Ahead::ZERO;
             assert!(source.ahead(0.0, &x, &u, 0.0, &mut out));
             out

@@ -6,6 +6,8 @@
 //! columns. Only the first `len` columns mean anything, so starting anew costs nothing. Arrays have N
 //! components, of which those from `dim` on are 0.
 
+use crate::elementary;
+
 /// A normal whose part outside the span of the active ones is below this part of it depends on them.
 const DEPENDENT: f64 = 1e-14;
 
@@ -80,7 +82,7 @@ impl<const N: usize> Factors<N> {
     #[inline(always)]
     pub(super) fn append(&mut self, p: &Projection<N>) {
         let k = self.len;
-        let length = p.square.sqrt();
+        let length = elementary::sqrt(p.square);
         self.upper[k][..k].copy_from_slice(&p.inside[..k]);
         self.upper[k][k] = length;
         let inverse = 1.0 / length;
@@ -98,7 +100,7 @@ impl<const N: usize> Factors<N> {
             self.upper[k] = self.upper[k + 1];
             // The rotation of rows k and k + 1 that makes R(k + 1, k) vanish.
             let (a, b) = (self.upper[k][k], self.upper[k][k + 1]);
-            let length = a.hypot(b);
+            let length = elementary::hypot(a, b);
             let (c, s) = (a / length, b / length);
             self.upper[k][k] = length;
             self.inverse[k] = 1.0 / length;

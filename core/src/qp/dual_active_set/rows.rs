@@ -3,6 +3,7 @@
 use super::super::factors::{Projection, dot};
 use super::super::{Constraint, Enforcement, Problem, Row, power_of_two};
 use super::{DualActiveSet, Slot};
+use crate::elementary;
 
 impl<const N: usize> DualActiveSet<N> {
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
@@ -15,7 +16,7 @@ impl<const N: usize> DualActiveSet<N> {
         }
         let normal = self.normal(p, &slot);
         if let Constraint::Row(k) = constraint {
-            norm = dot(&normal, &normal).sqrt();
+            norm = elementary::sqrt(dot(&normal, &normal));
             if let Some(Enforcement::Soft { penalty }) = p.enforcement.get(k) {
                 slot.cap = penalty / norm;
             }
