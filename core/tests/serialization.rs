@@ -11,6 +11,7 @@ use punctual_core::filter::{
     BarrierSettings, Begin, End, FilterBuilder, FilterState, Integration, Method, Report, SafetyFilter,
     SampleDerivative, Sampling, Strictness,
 };
+use punctual_core::lie::Direction;
 use punctual_core::qp::Bounds;
 use punctual_reference::plants::Unicycle;
 use scenario::{distance_disc, quadratic_disc};
@@ -84,7 +85,8 @@ fn reports_and_fresh_states_come_back() {
     assert_eq!(&back::<Report>(&json(report)), report);
     let mut derivative = SampleDerivative::default();
     let (x, u_ref) = ([0.0, 0.0, 0.3, 1.0], [0.0; 2]);
-    let unknown = filter.differentiate(1.0, [&x, &[1.0; 4]], [&u_ref, &[0.0; 2]], &mut derivative);
+    let unknown =
+        filter.differentiate(1.0, &x, &u_ref, Direction { x: &[1.0; 4], u: &[0.0; 2] }, &mut derivative);
     assert_eq!(unknown, Ok(None));
     let read: SampleDerivative = back(&json(&derivative));
     assert_eq!((read.u, read.barriers), (derivative.u, derivative.barriers));

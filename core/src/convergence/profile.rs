@@ -36,9 +36,15 @@ pub trait Profile {
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for
+    /// The derivative of [`Self::evaluate`] where the anchor moves along `direction`; for
     /// [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not know it.
-    fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
+    fn directional(
+        &self,
+        _anchor: &[f64],
+        _direction: &[f64],
+        _deadline: f64,
+        _elapsed: f64,
+    ) -> Option<Derivatives> {
         None
     }
 }
@@ -87,8 +93,14 @@ impl Profile for LowPeak {
     }
 
     /// Linear but for n = 2, where (B) gives K' (2K + 4w) = 2y₁y₁' − 4Kw' with w = y₀ + y₁/2.
-    fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
-        let ([e, de], [e_along, de_along]) = (anchor, direction) else {
+    fn directional(
+        &self,
+        anchor: &[f64],
+        direction: &[f64],
+        deadline: f64,
+        elapsed: f64,
+    ) -> Option<Derivatives> {
+        let ([e, de], [e_directional, de_directional]) = (anchor, direction) else {
             return Some(self.evaluate(direction, deadline, elapsed));
         };
         let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
@@ -96,14 +108,18 @@ impl Profile for LowPeak {
             return Some(r);
         }
         let s = elapsed / deadline;
-        let (v, v_along) = (de * deadline, de_along * deadline);
-        let (w, w_along) = (e + v / 2.0, e_along + v_along / 2.0);
+        let (v, v_directional) = (de * deadline, de_directional * deadline);
+        let (w, w_directional) = (e + v / 2.0, e_directional + v_directional / 2.0);
         let a = -2.0 * (w + elementary::hypot(w, v / 2.0).copysign(w));
-        let a_along = (2.0 * v * v_along - 4.0 * a * w_along) / (2.0 * a + 4.0 * w);
+        let a_directional = (2.0 * v * v_directional - 4.0 * a * w_directional) / (2.0 * a + 4.0 * w);
         let values = if a != 0.0 && s < 0.5 - v / (2.0 * a) {
-            [e_along + s * (v_along + s * a_along / 2.0), v_along + s * a_along, a_along]
+            [
+                e_directional + s * (v_directional + s * a_directional / 2.0),
+                v_directional + s * a_directional,
+                a_directional,
+            ]
         } else {
-            [-a_along * (1.0 - s) * (1.0 - s) / 2.0, a_along * (1.0 - s), -a_along]
+            [-a_directional * (1.0 - s) * (1.0 - s) / 2.0, a_directional * (1.0 - s), -a_directional]
         };
         (r[0], r[1], r[2]) = (values[0], values[1] / deadline, values[2] / (deadline * deadline));
         Some(r)

@@ -172,6 +172,6 @@ impl Condition for ReferenceProfile {
         if !at.has_time() {
             return Some([0.0; MAX_RELATIVE_DEGREE + 1]);
         }
-        self.in_force(at).along([at.anchor, &change.anchor[..at.degree()]], at.deadline, elapsed)
+        self.in_force(at).directional(at.anchor, &change.anchor[..at.degree()], at.deadline, elapsed)
     }
 }

@@ -161,7 +161,7 @@ pub(super) fn margin_change(
 ) -> Option<f64> {
     let n = anchor.len();
     let Steepest { panel, slope } = steepest(profile, anchor, deadline);
-    let at = |i: usize| Some(profile.along([anchor, direction], deadline, panel_start(deadline, i))?[n]);
+    let at = |i: usize| Some(profile.directional(anchor, direction, deadline, panel_start(deadline, i))?[n]);
     let slope_change = (at(panel + 1)? - at(panel)?) * slope.signum() / panel_start(deadline, 1);
     let (size, k) = size(anchor, deadline);
     let size_change = anchor[k].signum() * direction[k] * elementary::powi(deadline, k as i32);

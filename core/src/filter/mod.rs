@@ -255,11 +255,11 @@ impl SafetyFilter {
     /// No such barrier; a source of other dimensions or another relative degree.
     pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
         let dims = (self.state_dim, self.input_dim);
-        let (exact, count) = (self.errors.is_exact(), dims.1);
+        let exact = self.errors.is_exact();
         let slot = self.slot(index)?;
         let named = |e: Error| e.within(&slot.name);
         if !exact {
-            errors::check(&*source, count).map_err(named)?;
+            errors::check(&*source).map_err(named)?;
         }
         length("x", source.state_dim(), dims.0).map_err(named)?;
         length("u", source.input_dim(), dims.1).map_err(named)?;

@@ -278,8 +278,8 @@ impl PeriodProblem<'_> {
     fn linearised(&self, requirement: &Requirement, u: &[f64]) -> Option<(Row, f64)> {
         let (slot, mut ahead) = (&self.slots[requirement.barrier], Ahead::ZERO);
         let x = &slot.now.from[..];
-        let known = slot.source.ahead(self.t, x, u, requirement.ahead, &mut ahead);
-        if !known || !ahead.is_finite() {
+        slot.source.predict()?.ahead(self.t, x, u, requirement.ahead, &mut ahead);
+        if !ahead.is_finite() {
             return None;
         }
         // A row on h⁽ⁿ⁾, as the pointwise one.
@@ -335,9 +335,7 @@ impl PeriodProblem<'_> {
         let slot = &self.slots[requirement.barrier];
         let x = &slot.now.from;
         let states = x.len();
-        if states > STATES {
-            return 0.0;
-        }
+        let Some(source) = slot.source.predict().filter(|_| states <= STATES) else { return 0.0 };
         let mut moved = [0.0; STATES];
         for (i, (moved, x)) in moved.iter_mut().zip(x).enumerate() {
             let part = if i % 2 == 0 { PART } else { -PART };
@@ -346,12 +344,12 @@ impl PeriodProblem<'_> {
         let mut ahead = [Ahead::ZERO; 2];
         let [here, there] = &mut ahead;
         let (later, duration) = (self.t * (1.0 + 0.7 * PART), requirement.ahead);
-        let known = slot.source.ahead(self.t, x, u, duration, here)
-            && slot.source.ahead(later, &moved[..states], u, duration, there);
+        source.ahead(self.t, x, u, duration, here);
+        source.ahead(later, &moved[..states], u, duration, there);
         let (n, weights) = (slot.degree(), &requirement.bound.weights);
         let change = |k: usize| (weights[k] * (there.value[k] - here.value[k])).abs() / PART;
         let size = (0..n).map(change).sum::<f64>() / requirement.divisor(n);
-        if known && size.is_finite() { size } else { 0.0 }
+        if size.is_finite() { size } else { 0.0 }
     }
 
     /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.

@@ -147,7 +147,9 @@ impl BarrierSlot {
         let h = now.derivatives.drift[0];
         now.from.copy_from_slice(moment.x);
         if moment.delay > 0.0 {
-            source.predict(&mut now.from, acting, moment.delay);
+            if let Some(source) = source.predict() {
+                source.flow(&mut now.from, acting, moment.delay);
+            }
             source.evaluate(moment.begin, &now.from, &mut now.derivatives);
         }
         h

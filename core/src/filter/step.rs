@@ -234,7 +234,7 @@ impl SafetyFilter {
     fn look(&mut self, moment: &Moment, u: &[f64]) {
         let Workspace { next, scratch, .. } = &mut self.workspace;
         for (slot, promise) in self.slots.iter_mut().zip(&next.barriers) {
-            let held = Hold { source: &*slot.source, t: moment.begin, x: &slot.now.from, u };
+            let held = Hold { source: slot.source.predict(), t: moment.begin, x: &slot.now.from, u };
             let holds = [moment.hold, moment.long];
             slot.now.lowest = match slot.now.in_force {
                 true => slot.outlook().look(promise, &held, &slot.now.row.normal, holds, scratch),
