@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 
 use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
 use crate::elementary;
-use crate::qp::{Active, Constraint, Row, Solver, dot};
+use crate::qp::{Active, Constraint, Row, Solver};
+use crate::scalar::dot;
 
 /// Part of the deadline without progress in [`BarrierReport::deadlocked`].
 const DEADLOCK_TIME: f64 = 0.1;

@@ -16,7 +16,7 @@ use nalgebra::SVector;
 
 use super::Direction;
 use crate::barrier::Barrier;
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, rk4};
 use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
@@ -70,15 +70,9 @@ where
     S: Scalar,
 {
     let dt = duration / steps as f64;
-    let moved =
-        |x: &SVector<S, NX>, k: &SVector<S, NX>, s: f64| SVector::<S, NX>::from_fn(|i, _| x[i] + k[i] * s);
     let mut x = *x;
     for _ in 0..steps {
-        let k1 = plant.derivative(&x, u);
-        let k2 = plant.derivative(&moved(&x, &k1, dt / 2.0), u);
-        let k3 = plant.derivative(&moved(&x, &k2, dt / 2.0), u);
-        let k4 = plant.derivative(&moved(&x, &k3, dt), u);
-        x = SVector::from_fn(|i, _| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0));
+        x = rk4(|x| plant.derivative(x, u), &x, dt);
     }
     x
 }

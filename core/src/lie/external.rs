@@ -4,6 +4,7 @@ use alloc::boxed::Box;
 
 use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, checked_degree, checked_inputs};
 use crate::error::Error;
+use crate::scalar::dot;
 
 /// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h, the last with one number for each input.
 struct External {
@@ -46,10 +47,6 @@ impl Directional for External {
         out.value[self.n] += dot(&x[self.n + 1..], direction.u);
         out.gradient[self.n][..self.inputs].copy_from_slice(row);
     }
-}
-
-fn dot(row: &[f64], u: &[f64]) -> f64 {
-    row.iter().zip(u).map(|(a, v)| a * v).sum()
 }
 
 /// Derivatives of one barrier of relative degree `n` that are computed elsewhere and handed over at every step

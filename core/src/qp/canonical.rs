@@ -7,9 +7,10 @@
 //! It is the minimiser, and no other set of rows and bounds is active in it. So [`solve`] gives the same u for a set
 //! from the last answer and for one that a method found.
 
-use super::factors::{Factors, dot};
+use super::factors::Factors;
 use super::{Active, Constraint, Enforcement, Problem, Row};
 use crate::elementary;
+use crate::scalar::dot;
 
 /// Multipliers and slacks count as strict from this part of their terms on: far above round-off, so that a method
 /// that is exact up to round-off cannot find another set.

@@ -7,6 +7,7 @@
 //! components, of which those from `dim` on are 0.
 
 use crate::elementary;
+use crate::scalar::dot;
 
 /// A normal whose part outside the span of the active ones is below this part of it depends on them.
 const DEPENDENT: f64 = 1e-14;
@@ -138,9 +139,4 @@ impl<const N: usize> Factors<N> {
     pub(super) fn component(&self, i: usize, y: &[f64; N]) -> f64 {
         self.basis[..self.len].iter().zip(y).map(|(q, y)| q[i] * y).sum()
     }
-}
-
-/// Σ a_i b_i over the shorter of the two.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -39,6 +39,7 @@ mod single_row;
 pub use kkt::Residuals;
 
 use crate::elementary;
+use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_ROWS};
 use dual_active_set::DualActiveSet;
 use one_active::Answer;
@@ -82,11 +83,6 @@ impl Row {
     pub fn holds(&self, u: &[f64]) -> bool {
         self.slack(u) >= -self.round_off(u)
     }
-}
-
-/// Σ a_i b_i over the shorter of the two.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// The power of two that brings the largest component of `normal` to 1 ..< 2: multiplying by it is exact.

@@ -12,9 +12,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::dot;
 use crate::MAX_INPUTS;
 use crate::elementary;
+use crate::scalar::dot;
 
 const SIZE: usize = 2 * MAX_INPUTS;
 
