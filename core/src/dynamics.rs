@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::elementary;
 use crate::error::{Error, length};
 use crate::scalar::Scalar;
 
@@ -81,7 +82,8 @@ impl Region {
 
     /// Smallest and largest value of nᵀp over the region.
     pub fn along(&self, n: [f64; 2]) -> [f64; 2] {
-        let mut ends = [-self.radius * n[0].hypot(n[1]), self.radius * n[0].hypot(n[1])];
+        let mut ends =
+            [-self.radius * elementary::hypot(n[0], n[1]), self.radius * elementary::hypot(n[0], n[1])];
         for (side, n) in self.sides.iter().zip(n) {
             let (a, b) = (n * side[0], n * side[1]);
             ends = [ends[0] + a.min(b), ends[1] + a.max(b)];
@@ -92,7 +94,7 @@ impl Region {
     /// The distance in m from `point` (m), 0 inside.
     pub fn distance(&self, point: [f64; 2]) -> f64 {
         let [x, y] = [0, 1].map(|i| (self.sides[i][0] - point[i]).max(point[i] - self.sides[i][1]).max(0.0));
-        ((x * x + y * y).sqrt() - self.radius).max(0.0)
+        (elementary::sqrt(x * x + y * y) - self.radius).max(0.0)
     }
 }
 
@@ -322,15 +324,17 @@ where
     rk4(|x| plant.derivative(x, u), x, dt)
 }
 
-/// As [`rk4_step`], for any `derivative` of the state.
-pub fn rk4<const NX: usize>(
-    derivative: impl Fn(&SVector<f64, NX>) -> SVector<f64, NX>,
-    x: &SVector<f64, NX>,
+/// As [`rk4_step`], for any `derivative` of the state and any scalar.
+#[inline]
+pub fn rk4<S: Scalar, const NX: usize>(
+    derivative: impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
+    x: &SVector<S, NX>,
     dt: f64,
-) -> SVector<f64, NX> {
+) -> SVector<S, NX> {
+    let moved = |k: &SVector<S, NX>, by: f64| SVector::<S, NX>::from_fn(|i, _| x[i] + k[i] * by);
     let k1 = derivative(x);
-    let k2 = derivative(&(x + k1 * (dt / 2.0)));
-    let k3 = derivative(&(x + k2 * (dt / 2.0)));
-    let k4 = derivative(&(x + k3 * dt));
-    x + (k1 + (k2 + k3) * 2.0 + k4) * (dt / 6.0)
+    let k2 = derivative(&moved(&k1, dt / 2.0));
+    let k3 = derivative(&moved(&k2, dt / 2.0));
+    let k4 = derivative(&moved(&k3, dt));
+    SVector::from_fn(|i, _| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0))
 }

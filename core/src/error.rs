@@ -2,7 +2,9 @@
 
 mod degree;
 
-use std::fmt;
+use alloc::boxed::Box;
+use alloc::string::String;
+use core::fmt;
 
 pub use degree::RelativeDegree;
 
@@ -74,7 +76,7 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl core::error::Error for Error {}
 
 /// `Ok(value)` if `value` is finite and > 0.
 ///

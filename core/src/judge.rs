@@ -36,6 +36,8 @@ pub enum Standing {
 
 /// The verdict on a promise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Verdict {
     /// On time, and inside from then on; always inside where it began inside.
     Kept,
@@ -50,20 +52,27 @@ pub enum Verdict {
 
 /// The facts seen of a barrier, and the verdict that follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Judgement {
     /// Time in s at which it was enforced first.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub began: Option<f64>,
     /// Whether h ≥ 0 held then.
     pub began_inside: bool,
     /// The instant of its deadline in s; `None` where it has none, or nothing was seen.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: Option<f64>,
     /// Time in s at which h ≥ 0 held first.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival: Option<f64>,
     /// Time in s at which it was known that the deadline is missed.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub late: Option<f64>,
     /// Time in s at which it was left after it had been inside, and was to stay so.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub left: Option<f64>,
     /// Least h while it was to be inside: from the deadline on, from the start where it began inside.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub least: Option<f64>,
     /// Whether there was an instant at which it was to be inside.
     reached: bool,

@@ -48,16 +48,26 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
-//! bounded inputs can do); `plan` (witnesses, a feature); [`filter`]. Beside it, [`barriers`] are regions and limits to use, and [`judge`] says what became
-//! of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
+//! bounded inputs can do); `plan` (witnesses of a promise, a feature); [`filter`]. Beside it, [`barriers`] are regions and
+//! limits to use, and [`judge`] says what became of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
 //! `punctual-reference`.
 //!
 //! # Dependencies in the interface
 //!
 //! Models are written with [`nalgebra`], which is part of this interface and exported again here. So a new minor version of
-//! it (0.x) comes with a new minor version of this crate, and with no other. The feature `interior-point` adds a second
-//! solver of the quadratic program, to compare with. The feature `plan` adds plans: `filter::AssuredFilter` promises only
-//! what a verified plan keeps.
+//! it (0.x) comes with a new minor version of this crate, and with no other.
+//!
+//! # Features
+//!
+//! | feature | gives |
+//! |---|---|
+//! | `std` (default) | elementary functions (sin, exp, …) of the platform. Without it the crate needs `alloc` only. |
+//! | `libm` | elementary functions of the crate [`libm`](https://docs.rs/libm), with or without `std`. A filter then gives the same bits on every operating system; those of the platform differ in the last digit. It is slower where a model has many of them. |
+//! | `serde` | `Serialize` and `Deserialize` for states, reports, settings and derivatives. |
+//! | `interior-point` | a second solver of the quadratic program, to compare with. Needs `std`. |
+//! | `plan` | plans: `filter::AssuredFilter` promises only what a verified plan keeps. Needs `std`. |
+//!
+//! One of `std` and `libm` is needed.
 //!
 //! # References
 //!
@@ -65,12 +75,27 @@
 //! Functions*, arXiv:2507.13888 ("the paper" throughout). The comparison lemma for any order, the
 //! reference profile and the stay constraint go beyond it. Their proofs are in `docs/theory.md`; formulas
 //! have the same labels there and here.
+#![no_std]
 #![forbid(unsafe_code)]
+#![warn(clippy::alloc_instead_of_core, clippy::std_instead_of_alloc, clippy::std_instead_of_core)]
+// Elementary functions come from one module: core/clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!(
+    "punctual-core needs sin, exp and the like from somewhere: switch on its feature `std` (the default), or `libm`"
+);
+
+#[macro_use]
+extern crate alloc;
+#[cfg(any(feature = "std", test))]
+extern crate std;
 
 pub mod barrier;
 pub mod barriers;
 pub mod convergence;
 pub mod dynamics;
+mod elementary;
 pub mod error;
 pub mod filter;
 pub mod jet;
@@ -80,6 +105,8 @@ pub mod lie;
 pub mod plan;
 pub mod qp;
 pub mod reach;
+#[cfg(feature = "serde")]
+mod real;
 pub mod scalar;
 
 pub use error::{Error, ErrorKind};

@@ -20,11 +20,13 @@ mod ahead;
 mod degree;
 mod embedded;
 mod external;
+mod source;
 
 pub use ahead::{Ahead, SUBSTEPS, flow};
 
-use std::array::from_fn;
-use std::marker::PhantomData;
+use alloc::boxed::Box;
+use core::array::from_fn;
+use core::marker::PhantomData;
 
 use nalgebra::SVector;
 
@@ -39,6 +41,7 @@ pub use crate::error::RelativeDegree;
 pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
 pub use embedded::embedded;
 pub use external::external;
+pub use source::{DerivativeSource, Direction, Directional, Predict, PredictDirectional};
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
@@ -109,61 +112,6 @@ impl Derivatives {
     }
 }
 
-/// A supplier of the derivatives of one barrier. [`along`] makes one from the traits, [`external()`] takes the
-/// derivatives from whoever computes them, and a user's own code can be another.
-pub trait DerivativeSource: Send {
-    /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
-    fn relative_degree(&self) -> usize;
-
-    /// Number of states.
-    fn state_dim(&self) -> usize;
-
-    /// Number of inputs.
-    fn input_dim(&self) -> usize;
-
-    /// Writes the derivatives at time `t` (s) and state `x` (of [`Self::state_dim`] components).
-    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives);
-
-    /// Moves `x` by `duration` seconds under the held input `u`, if the source knows the plant. The
-    /// default does not: it leaves `x` alone and returns false.
-    fn predict(&self, _x: &mut [f64], _u: &[f64], _duration: f64) -> bool {
-        false
-    }
-
-    /// Writes the derivatives of h `duration` seconds after `t` and `x` along the held input `u`, if the
-    /// source knows the plant; at time `t + duration`. The default does not: it returns false.
-    fn ahead(&self, _t: f64, _x: &[f64], _u: &[f64], _duration: f64, _out: &mut Ahead) -> bool {
-        false
-    }
-
-    /// Writes the derivative along a direction of what [`Self::ahead`] writes: `state` is x and its direction,
-    /// `input` the held u and its direction. For
-    /// [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate). The default does not know it and
-    /// returns false.
-    fn ahead_along(
-        &self,
-        _t: f64,
-        _state: [&[f64]; 2],
-        _input: [&[f64]; 2],
-        _duration: f64,
-        _out: &mut Ahead,
-    ) -> bool {
-        false
-    }
-
-    /// Moves `x` as [`Self::predict`] does, and the direction `dx` by the derivative of that. The default does not
-    /// know it and returns false.
-    fn predict_along(&self, _x: &mut [f64], _dx: &mut [f64], _u: &[f64], _duration: f64) -> bool {
-        false
-    }
-
-    /// A number that h does not exceed between `time[0]` and `time[1]` s after `t` and `x`, under any input
-    /// with `bounds[0]` ≤ u ≤ `bounds[1]`; for [`crate::reach`]. The default knows none.
-    fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
-        None
-    }
-}
-
 /// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken.
 struct Along<P, B, const NX: usize, const NU: usize, const K: usize> {
     plant: P,
@@ -206,39 +154,70 @@ where
         }
     }
 
-    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
-        let (from, held) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
-        x.copy_from_slice(flow(&self.plant, &from, &held, duration, SUBSTEPS).as_slice());
-        true
+    fn predict(&self) -> Option<&dyn Predict> {
+        Some(self)
     }
 
-    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
-        let x = SVector::from_column_slice(x);
-        ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
-        true
+    fn directional(&self) -> Option<&dyn Directional> {
+        Some(self)
     }
 
-    fn ahead_along(
-        &self,
-        t: f64,
-        state: [&[f64]; 2],
-        input: [&[f64]; 2],
-        duration: f64,
-        out: &mut Ahead,
-    ) -> bool {
-        let model = (&self.plant, &self.barrier);
-        ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), state, input, out);
-        true
-    }
-
-    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
-        ahead::predict_along::<P, NX, NU>(&self.plant, x, dx, u, duration);
-        true
+    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        Some(self)
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
         let region = self.plant.region(&SVector::from_column_slice(x), bounds, time)?;
         self.barrier.highest(time.map(|after| t + after), &region)
+    }
+}
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize> Predict for Along<P, B, NX, NU, K>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
+        let (from, held) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
+        x.copy_from_slice(flow(&self.plant, &from, &held, duration, SUBSTEPS).as_slice());
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        let x = SVector::from_column_slice(x);
+        ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
+    }
+}
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize> Directional for Along<P, B, NX, NU, K>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    fn evaluate_directional(&self, t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead) {
+        self.ahead_directional(t, x, u, direction, 0.0, out);
+    }
+}
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize> PredictDirectional for Along<P, B, NX, NU, K>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
+        ahead::flow_directional::<P, NX, NU>(&self.plant, x, dx, u, duration);
+    }
+
+    fn ahead_directional(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        direction: Direction,
+        duration: f64,
+        out: &mut Ahead,
+    ) {
+        let model = (&self.plant, &self.barrier);
+        ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), x, u, direction, out);
     }
 }
 

@@ -2,9 +2,11 @@
 //! numbers ([`f64`]), on first derivatives ([`Dual`](crate::jet::Dual)) and on Taylor series
 //! ([`Taylor`](crate::jet::Taylor)).
 
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use num_traits::{One, Zero};
+
+use crate::elementary;
 
 /// A number that plants and barriers compute with.
 ///
@@ -116,7 +118,7 @@ pub trait Scalar:
         // Of the two quotients the one that does not exceed 1; the branch is that of the values.
         let angle =
             if self.value().abs() <= x.value().abs() { (self / x).atan() } else { -(x / self).atan() };
-        angle - angle.value() + self.value().atan2(x.value())
+        angle - angle.value() + elementary::atan2(self.value(), x.value())
     }
 
     /// `self · self`.
@@ -153,40 +155,45 @@ impl Scalar for f64 {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        f64::sqrt(self)
+        elementary::sqrt(self)
     }
     #[inline]
     fn exp(self) -> Self {
-        f64::exp(self)
+        elementary::exp(self)
     }
     #[inline]
     fn ln(self) -> Self {
-        f64::ln(self)
+        elementary::ln(self)
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
+        elementary::sin_cos(self)
     }
     #[inline]
     fn atan(self) -> Self {
-        f64::atan(self)
+        elementary::atan(self)
     }
     #[inline]
     fn hypot(self, other: Self) -> Self {
-        f64::hypot(self, other)
+        elementary::hypot(self, other)
     }
     #[inline]
     fn atan2(self, x: Self) -> Self {
-        f64::atan2(self, x)
+        elementary::atan2(self, x)
     }
     #[inline]
     fn tanh(self) -> Self {
-        f64::tanh(self)
+        elementary::tanh(self)
     }
     #[inline]
     fn powf(self, exponent: f64) -> Self {
-        f64::powf(self, exponent)
+        elementary::powf(self, exponent)
     }
+}
+
+/// Σ a_i b_i over the shorter of the two.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Whether all of `values` are finite, without a branch per number.

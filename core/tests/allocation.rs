@@ -6,6 +6,7 @@ mod scenario;
 
 use punctual_core::convergence::repeated_root;
 use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, SampleDerivative, Sampling, Status};
+use punctual_core::lie::Direction;
 use punctual_core::qp::Solver;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use scenario::{distance_disc, one, quadratic_disc};
@@ -82,8 +83,8 @@ fn a_step_allocates_nothing() {
         });
         assert_eq!(first, 0, "{name}: the first step");
         let mut derivative = SampleDerivative::default();
-        let (dx, du_ref) = ([0.1, -0.2, 0.3, -0.4], [0.5, -0.6]);
-        filter.differentiate(0.0, [&[0.0; 4], &dx], [&[0.0; 2], &du_ref], &mut derivative).expect("lengths");
+        let direction = Direction { x: &[0.1, -0.2, 0.3, -0.4], u: &[0.5, -0.6] };
+        filter.differentiate(0.0, &[0.0; 4], &[0.0; 2], direction, &mut derivative).expect("lengths");
         let found = allocations(|| {
             for k in 1..2000 {
                 let t = f64::from(k) * 0.005;
@@ -99,7 +100,7 @@ fn a_step_allocates_nothing() {
                 }
                 let u_ref = [0.1, -0.1];
                 filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions");
-                filter.differentiate(t, [&x, &dx], [&u_ref, &du_ref], &mut derivative).expect("lengths");
+                filter.differentiate(t, &x, &u_ref, direction, &mut derivative).expect("lengths");
                 let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
                 seen[report.status as usize] = true;
                 assert_ne!(report.solver, Solver::InteriorPoint);

@@ -3,7 +3,7 @@
 
 use punctual_core::barriers::{DistanceDisc, NormBound};
 use punctual_core::filter::{BarrierSettings, SafetyFilter, SampleDerivative, Sampling, Status};
-use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
+use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction};
 use punctual_reference::plants::Unicycle;
 
 /// Of numbers of order 1 to 10: two ways through the same dozen operations.
@@ -55,12 +55,13 @@ fn stacks(t: f64, x: &[f64]) -> Vec<f64> {
 }
 
 /// The derivative of that along `dx`.
-fn stacks_along(t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+fn stacks_directional(t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
     let (mut all, zero) = (Vec::new(), [0.0; INPUTS]);
     for source in sources() {
         let n = source.relative_degree();
         let mut out = Ahead::ZERO;
-        assert!(source.ahead_along(t, [x, dx], [&zero, &zero], 0.0, &mut out));
+        let directional = source.directional().expect("a model");
+        directional.evaluate_directional(t, x, &zero, Direction { x: dx, u: &zero }, &mut out);
         all.extend_from_slice(&out.value[..=n]);
         all.extend_from_slice(&out.gradient[n][..INPUTS]);
     }
@@ -76,9 +77,12 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
         if k % 50 == 7 {
             let (dx, du_ref) = ([0.3, -0.2, 0.5, 1.0], [-0.25, 0.75]);
             let (mut wanted, mut found) = (SampleDerivative::default(), SampleDerivative::default());
-            let unknown = own.differentiate(t, [&x, &dx], [&u_ref, &du_ref], &mut wanted).expect("lengths");
-            let state = [&stacks(t, &x)[..], &stacks_along(t, &x, &dx)];
-            let also = given.differentiate(t, state, [&u_ref, &du_ref], &mut found).expect("lengths");
+            let unknown = own
+                .differentiate(t, &x, &u_ref, Direction { x: &dx, u: &du_ref }, &mut wanted)
+                .expect("lengths");
+            let direction = Direction { x: &stacks_directional(t, &x, &dx), u: &du_ref };
+            let also =
+                given.differentiate(t, &stacks(t, &x), &u_ref, direction, &mut found).expect("lengths");
             assert_eq!(also, unknown);
             // Where bounds choose the rate there is none.
             known += usize::from(unknown.is_none());
@@ -104,7 +108,7 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
         assert!(wanted.status.is_satisfied(), "{:?} at {t}", wanted.status);
         assert!(t < DEADLINE || wanted.barriers[0].h >= 0.0, "outside at {t}");
         filtered += usize::from(wanted.status == Status::Filtered);
-        assert!(sources()[0].predict(&mut x, &u, STEP));
+        sources()[0].predict().expect("a model").flow(&mut x, &u, STEP);
     }
     assert!(filtered > 100 && known > 3, "{filtered} steps were filtered, {known} derivatives compared");
 }

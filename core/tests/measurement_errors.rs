@@ -75,7 +75,8 @@ fn errors_of_zero_are_none() {
         });
         assert_eq!(a, b);
         let u = a.map(f64::from_bits);
-        lie::along(Unicycle, distance_disc(), 2).expect("in range").predict(&mut x, &u, PERIOD);
+        let source = lie::along(Unicycle, distance_disc(), 2).expect("in range");
+        source.predict().expect("a model").flow(&mut x, &u, PERIOD);
     }
 }
 
@@ -83,8 +84,8 @@ fn errors_of_zero_are_none() {
 fn there_is_no_derivative_with_errors() {
     let mut filter = unicycle(&[0.1, 0.1, 0.01, 0.0]);
     let mut out = SampleDerivative::default();
-    let unknown =
-        filter.differentiate(0.0, [&[1.0, 2.0, 0.3, 4.0], &[1.0; 4]], [&[0.0; 2], &[0.0; 2]], &mut out);
+    let direction = lie::Direction { x: &[1.0; 4], u: &[0.0; 2] };
+    let unknown = filter.differentiate(0.0, &[1.0, 2.0, 0.3, 4.0], &[0.0; 2], direction, &mut out);
     assert_eq!(unknown.expect("valid directions"), Some(NoDerivative::MeasurementErrors));
     assert_eq!(NoDerivative::MeasurementErrors.to_string(), "not with measurement errors");
 }
@@ -118,7 +119,10 @@ fn what_is_refused() {
     );
     let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
     let done = builder(root).measurement_errors(&errors).and_then(|b| b.build());
-    refused("goal.measurement_errors: needs the reference profile", done);
+    refused(
+        "goal.measurement_errors: needs a method that allows for errors, such as the reference profile",
+        done,
+    );
     // h and the two parts of its row.
     let done = SafetyFilter::builder(4, 2)
         .source("goal", lie::external(1, 2).expect("in range"), settings())

@@ -43,15 +43,16 @@ where
 #[test]
 fn predictions_follow_the_flow() {
     let source = lie::along(bicycle(), distance_disc(), 2).expect("in range");
+    let model = source.predict().expect("a model");
     let (x, u, period) = ([10.0, 20.0, 0.4, 6.0], [3.0, -0.7], 0.05);
     let mut ahead = Ahead::ZERO;
-    assert!(source.ahead(1.0, &x, &u, period, &mut ahead));
+    model.ahead(1.0, &x, &u, period, &mut ahead);
     let mut exact = SVector::from(x);
     for _ in 0..100 {
         exact = rk4_step(&bicycle(), &exact, &SVector::from(u), period / 100.0);
     }
     let mut predicted = x;
-    assert!(source.predict(&mut predicted, &u, period));
+    model.flow(&mut predicted, &u, period);
     // Two steps of a fourth-order method of 25 ms, rates of order 1/s: 2 · 0.025⁵ ≈ 2e-8 of 50 m.
     assert!((SVector::from(predicted) - exact).norm() < 1e-6);
     let mut there = Derivatives::ZERO;
@@ -65,7 +66,7 @@ fn predictions_follow_the_flow() {
         let at = |d: f64| {
             let (mut moved, mut out) = (u, Ahead::ZERO);
             moved[i] += d;
-            source.ahead(1.0, &x, &moved, period, &mut out);
+            model.ahead(1.0, &x, &moved, period, &mut out);
             out.value
         };
         let (high, low) = (at(step), at(-step));

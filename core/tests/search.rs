@@ -86,7 +86,7 @@ impl Case<'_> {
         let mut worst = f64::NEG_INFINITY;
         let mut ahead = Ahead::ZERO;
         for Asked { source, demand, .. } in &self.rows {
-            assert!(source.ahead(self.t, &self.x, &u, self.period, &mut ahead));
+            source.predict().expect("a model").ahead(self.t, &self.x, &u, self.period, &mut ahead);
             let (mut value, mut terms) = (-demand.floor, demand.floor.abs());
             for k in 0..2 {
                 value += demand.weights[k] * ahead.value[k];
@@ -103,9 +103,10 @@ impl Case<'_> {
         let mut ahead = Ahead::ZERO;
         for Asked { source, floor, .. } in &self.rows {
             let Some((from, floor)) = floor else { continue };
+            let source = source.predict().expect("a model");
             for k in 0..INSTANTS {
                 let at = from + (self.period - from) * k as f64 / INSTANTS as f64;
-                assert!(source.ahead(self.t, &self.x, &u, at, &mut ahead));
+                source.ahead(self.t, &self.x, &u, at, &mut ahead);
                 worst =
                     worst.max((floor - ahead.value[0]) / (floor.abs() + ahead.value[0].abs()).max(1e-300));
             }

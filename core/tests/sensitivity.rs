@@ -10,7 +10,7 @@ use punctual_core::filter::{
     BarrierSettings, FilterBuilder, Infeasible, Method, NoDerivative, Phase, ProfileKind, SafetyFilter,
     SampleDerivative, Sampling, Status, Strictness,
 };
-use punctual_core::lie::{DerivativeSource, Derivatives};
+use punctual_core::lie::{DerivativeSource, Derivatives, Direction};
 use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 /// Step of the differences, in units of x and u of order 1 to 10.
@@ -51,7 +51,7 @@ fn outputs(filter: &mut SafetyFilter, sample: &Sample) -> (Status, Vec<Phase>, V
 fn derivative(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Result<Vec<f64>, NoDerivative> {
     let mut out = SampleDerivative::default();
     let unknown = filter
-        .differentiate(at.t, [&at.x, &direction.x], [&at.u_ref, &direction.u_ref], &mut out)
+        .differentiate(at.t, &at.x, &at.u_ref, Direction { x: &direction.x, u: &direction.u_ref }, &mut out)
         .expect("right lengths");
     let mut values = out.u[..at.u_ref.len()].to_vec();
     for b in &out.barriers {
@@ -341,14 +341,17 @@ fn what_is_not_known_is_said() {
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut out = SampleDerivative::default();
-    let unknown = filter.differentiate(0.0, [&[3.0], &[1.0]], [&[0.0], &[0.0]], &mut out).expect("lengths");
+    let mut differentiate = |x: &[f64], dx: &[f64], du_ref: &[f64]| {
+        filter.differentiate(0.0, x, &[0.0], Direction { x: dx, u: du_ref }, &mut out)
+    };
+    let unknown = differentiate(&[3.0], &[1.0], &[0.0]).expect("lengths");
     assert_eq!(unknown, Some(NoDerivative::Source(0)));
-    let error = filter.differentiate(0.0, [&[3.0], &[1.0]], [&[0.0], &[f64::NAN]], &mut out).unwrap_err();
+    let error = differentiate(&[3.0], &[1.0], &[f64::NAN]).unwrap_err();
     assert_eq!(error.to_string(), "du_ref[1]: is NaN, must be finite");
-    let error = filter.differentiate(0.0, [&[3.0], &[]], [&[0.0], &[0.0]], &mut out).unwrap_err();
+    let error = differentiate(&[3.0], &[], &[0.0]).unwrap_err();
     assert_eq!(error.to_string(), "dx: has 0 components, must have 1");
     // Where the input is a constant nothing needs to be known.
-    let unknown = filter.differentiate(0.0, [&[f64::NAN], &[1.0]], [&[0.0], &[1.0]], &mut out);
+    let unknown = differentiate(&[f64::NAN], &[1.0], &[1.0]);
     assert_eq!((unknown.expect("lengths"), out.u[0]), (None, 0.0));
     // A deadline that the bounds do not allow is given up for one that a search finds.
     let infeasible = Infeasible::Soonest;
@@ -357,8 +360,8 @@ fn what_is_not_known_is_said() {
         .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2]))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let (x, zeros) = ([0.0; 4], [0.0; 4]);
-    let unknown = late.differentiate(0.0, [&x, &zeros], [&[0.0; 2], &[1.0, 0.0]], &mut out).expect("lengths");
+    let (x, direction) = ([0.0; 4], Direction { x: &[0.0; 4], u: &[1.0, 0.0] });
+    let unknown = late.differentiate(0.0, &x, &[0.0; 2], direction, &mut out).expect("lengths");
     assert_eq!(unknown, Some(NoDerivative::Postponed(0)));
 }
 

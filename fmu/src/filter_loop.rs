@@ -4,6 +4,7 @@ use punctual_core::Error;
 use punctual_core::filter::{
     FilterState, IntegratedFilter, NoDerivative, Report, SafetyFilter, SampleDerivative,
 };
+use punctual_core::lie::Direction;
 
 /// The filter of a loop.
 pub enum FilterLoop {
@@ -84,14 +85,16 @@ impl FilterLoop {
     /// As for [`Self::step`]; a direction that is not finite.
     pub fn differentiate(
         &mut self,
-        (t, hold): (f64, f64),
-        x: [&[f64]; 2],
-        u_ref: [&[f64]; 2],
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
         match self {
-            Self::Plain(filter) => filter.differentiate(t, x, u_ref, out),
-            Self::Integrated(integrated) => integrated.differentiate((t, hold), x, u_ref, out),
+            Self::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
+            Self::Integrated(integrated) => integrated.differentiate(t, hold, x, u_ref, direction, out),
         }
     }
 

@@ -6,7 +6,8 @@ use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
-    self, Ahead, Coefficients, DerivativeSource, Derivatives, RelativeDegree, SUBSTEPS,
+    self, Ahead, Coefficients, DerivativeSource, Derivatives, Direction, Directional, Predict,
+    PredictDirectional, RelativeDegree, SUBSTEPS,
 };
 use punctual_core::scalar::Scalar;
 
@@ -317,49 +318,69 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
         }
     }
 
-    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
-        moved(&mut self.work.borrow_mut().flow, x, u, duration, SUBSTEPS);
-        true
+    fn predict(&self) -> Option<&dyn Predict> {
+        Some(self)
     }
 
-    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
+    fn directional(&self) -> Option<&dyn Directional> {
+        Some(self)
+    }
+
+    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        Some(self)
+    }
+}
+
+impl<E: Equations, const M: usize> Predict for Source<E, M> {
+    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
+        moved(&mut self.work.borrow_mut().flow, x, u, duration, SUBSTEPS);
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let along = &mut self.work.borrow_mut().along;
         along.flow.set_state(x.iter().map(|&v| Dual::from(v)));
         along.hold(|i| u.get(i).copied().unwrap_or_default());
         along.ahead(t, duration);
         self.write(out, |k| along.derivative(k));
-        true
     }
+}
 
-    fn ahead_along(
-        &self,
-        t: f64,
-        [x, dx]: [&[f64]; 2],
-        [u, du]: [&[f64]; 2],
-        duration: f64,
-        out: &mut Ahead,
-    ) -> bool {
-        let along = &mut self.work.borrow_mut().along_tangent;
-        let state = x.iter().zip(dx).map(|(&v, &d)| Tangent { value: Dual::from(v), along: Dual::from(d) });
-        along.flow.set_state(state);
-        let input = u.iter().zip(du).enumerate();
-        along
-            .flow
-            .hold(input.map(|(i, (&v, &d))| Tangent { value: Dual::variable(v, i), along: Dual::from(d) }));
-        along.ahead(t, duration);
-        self.write(out, |k| along.derivative(k).along);
-        true
+impl<E: Equations, const M: usize> Directional for Source<E, M> {
+    fn evaluate_directional(&self, t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead) {
+        self.ahead_directional(t, x, u, direction, 0.0, out);
     }
+}
 
-    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
+impl<E: Equations, const M: usize> PredictDirectional for Source<E, M> {
+    fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
         let flow = &mut self.work.borrow_mut().flow_tangent;
-        flow.set_state(x.iter().zip(&*dx).map(|(&value, &along)| Tangent { value, along }));
-        flow.hold(u.iter().map(|&value| Tangent { value, along: 0.0 }));
+        flow.set_state(x.iter().zip(&*dx).map(|(&value, &directional)| Tangent { value, directional }));
+        flow.hold(u.iter().map(|&value| Tangent { value, directional: 0.0 }));
         flow.run(duration, SUBSTEPS);
         for (i, (x, dx)) in x.iter_mut().zip(dx).enumerate() {
-            let Tangent { value, along } = flow.state(i);
-            (*x, *dx) = (value, along);
+            Tangent { value: *x, directional: *dx } = flow.state(i);
         }
-        true
+    }
+
+    fn ahead_directional(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        direction: Direction,
+        duration: f64,
+        out: &mut Ahead,
+    ) {
+        let along = &mut self.work.borrow_mut().along_tangent;
+        let state = x.iter().zip(direction.x);
+        along
+            .flow
+            .set_state(state.map(|(&v, &d)| Tangent { value: Dual::from(v), directional: Dual::from(d) }));
+        let input = u.iter().zip(direction.u).enumerate();
+        along.flow.hold(
+            input.map(|(i, (&v, &d))| Tangent { value: Dual::variable(v, i), directional: Dual::from(d) }),
+        );
+        along.ahead(t, duration);
+        self.write(out, |k| along.derivative(k).directional);
     }
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
-use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, RelativeDegree};
+use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction, RelativeDegree};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
@@ -125,20 +125,27 @@ fn both(found: &dyn DerivativeSource, wanted: &dyn DerivativeSource, x: &[f64], 
     let each = |source: &dyn DerivativeSource| {
         let (mut here, mut ahead) = (Derivatives::ZERO, Ahead::ZERO);
         source.evaluate(T, x, &mut here);
-        assert!(source.ahead(T, x, u, AHEAD, &mut ahead));
+        let model = source.predict().expect("a model");
+        model.ahead(T, x, u, AHEAD, &mut ahead);
         let mut moved = x.to_vec();
-        assert!(source.predict(&mut moved, u, AHEAD));
+        model.flow(&mut moved, u, AHEAD);
         let (dx, du): (Vec<f64>, Vec<f64>) = (
             (1..=x.len()).map(|i| 0.1 * i as f64).collect(),
             (1..=u.len()).map(|i| -0.2 * i as f64).collect(),
         );
-        let mut along = Ahead::ZERO;
-        assert!(source.ahead_along(T, [x, &dx], [u, &du], AHEAD, &mut along));
+        let (mut here_directional, mut ahead_directional) = (Ahead::ZERO, Ahead::ZERO);
+        let direction = Direction { x: &dx, u: &du };
+        let instant = source.directional().expect("a model");
+        instant.evaluate_directional(T, x, u, direction, &mut here_directional);
+        let model = source.predict_directional().expect("a model");
+        model.ahead_directional(T, x, u, direction, AHEAD, &mut ahead_directional);
         let (mut from, mut turned) = (x.to_vec(), dx);
-        assert!(source.predict_along(&mut from, &mut turned, u, AHEAD));
+        model.flow_directional(&mut from, &mut turned, u, AHEAD);
         let mut all = moved;
         all.extend(turned.iter().chain(&from));
-        all.extend(along.value.iter().chain(along.gradient.as_flattened()));
+        for along in [here_directional, ahead_directional] {
+            all.extend(along.value.iter().chain(along.gradient.as_flattened()));
+        }
         all.extend(here.drift.iter().chain(&here.row).chain([&here.lower_sensitivity]));
         all.extend(ahead.value.iter().chain(ahead.gradient.as_flattened()));
         all

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use punctual_core::lie::{Ahead, DerivativeSource, Derivatives};
+use punctual_core::lie::{Ahead, DerivativeSource, Derivatives, Direction};
 use punctual_models::Model;
 use punctual_models::evaluated::{Calculator, Code, CodeModel, Dimensions, LITERAL, Number, OPERATIONS};
 
@@ -121,11 +121,13 @@ fn compare([code, expressions]: [Box<dyn DerivativeSource>; 2]) {
         let mut moved = [[x, dx, x]; 2];
         for (i, source) in [&code, &expressions].into_iter().enumerate() {
             source.evaluate(t, &x, &mut found[i]);
-            assert!(source.ahead(t, &x, u, 0.1, &mut ahead[i][0]));
-            assert!(source.ahead_along(t, [&x, &dx], [u, du], 0.1, &mut ahead[i][1]));
+            let model = source.predict().expect("a model");
+            let directional = source.predict_directional().expect("a model");
+            model.ahead(t, &x, u, 0.1, &mut ahead[i][0]);
+            directional.ahead_directional(t, &x, u, Direction { x: &dx, u: du }, 0.1, &mut ahead[i][1]);
             let [to, change, alone] = &mut moved[i];
-            assert!(source.predict_along(to, change, u, 0.1));
-            assert!(source.predict(alone, u, 0.1));
+            directional.flow_directional(to, change, u, 0.1);
+            model.flow(alone, u, 0.1);
             assert_eq!(to, alone);
         }
         assert_eq!(found[0], found[1]);
@@ -139,11 +141,12 @@ fn compare([code, expressions]: [Box<dyn DerivativeSource>; 2]) {
 fn a_step_allocates_nothing() {
     let [code, _] = sources(disc, DISC, 2);
     let (mut out, mut ahead, mut x) = (Derivatives::ZERO, Ahead::ZERO, STATES[0]);
+    let model = code.predict().expect("a model");
     let found = allocation_counter::measure(|| {
         for at in STATES {
             code.evaluate(0.0, &at, &mut out);
-            code.ahead(0.0, &at, &[1.0, 2.0], 0.1, &mut ahead);
-            code.predict(&mut x, &[1.0, 2.0], 0.1);
+            model.ahead(0.0, &at, &[1.0, 2.0], 0.1, &mut ahead);
+            model.flow(&mut x, &[1.0, 2.0], 0.1);
         }
     });
     assert_eq!(found.count_total, 0);

@@ -254,7 +254,7 @@ mod tests {
     fn derivatives_are_those_of_the_laws() {
         use punctual_core::jet::Tangent;
         let heading = Heading::towards([4.0, -3.0]);
-        let along = [0.3, -0.7, 0.4, 0.9];
+        let direction = [0.3, -0.7, 0.4, 0.9];
         let states = [
             [1.0, 2.0, 0.3, 3.0],
             [9.0, 2.0, -2.5, 1.0],
@@ -265,8 +265,8 @@ mod tests {
         ];
         for (i, x) in states.into_iter().enumerate() {
             let laws = |x: &[f64; 4]| [heading.point_mass(x), heading.unicycle(x), heading.bicycle(x, 2.0)];
-            let moved = |by: f64| std::array::from_fn(|k| x[k] + by * along[k]);
-            let x: [_; 4] = std::array::from_fn(|k| Tangent { value: x[k], along: along[k] });
+            let moved = |by: f64| std::array::from_fn(|k| x[k] + by * direction[k]);
+            let x: [_; 4] = std::array::from_fn(|k| Tangent { value: x[k], directional: direction[k] });
             let found = [heading.point_mass(&x), heading.unicycle(&x), heading.bicycle(&x, 2.0)];
             let step = 1e-6;
             let (plus, minus) = (laws(&moved(step)), laws(&moved(-step)));
@@ -276,7 +276,7 @@ mod tests {
                 for k in 0..2 {
                     let wanted = (plus[law][k] - minus[law][k]) / (2.0 * step);
                     // Round-off of numbers of order 10 over the step.
-                    let error = (found[law][k].along - wanted).abs();
+                    let error = (found[law][k].directional - wanted).abs();
                     assert!(error < 1e-6 * (1.0 + wanted.abs()), "state {i}, law {law}: {found:?} {wanted}");
                 }
             }

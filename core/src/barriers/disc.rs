@@ -4,6 +4,7 @@ use nalgebra::SVector;
 
 use crate::barrier::Barrier;
 use crate::dynamics::Region;
+use crate::elementary;
 use crate::error::{Error, finite, positive};
 use crate::scalar::Scalar;
 
@@ -128,7 +129,7 @@ impl DistanceDisc {
     /// A coordinate that is not finite, a radius or smoothing that is not finite or ≤ 0.
     pub fn new(centre: [f64; 2], radius: f64, smoothing: f64) -> Result<Self, Error> {
         let centre = Centre::at_rest(centre)?;
-        let level = positive("radius", radius)?.hypot(positive("smoothing", smoothing)?);
+        let level = elementary::hypot(positive("radius", radius)?, positive("smoothing", smoothing)?);
         Ok(Self { centre, smoothing, level })
     }
 
@@ -158,6 +159,6 @@ impl<const NX: usize> Barrier<NX> for DistanceDisc {
 
     fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let nearest = self.centre.nearest(time, region)?;
-        Some(self.level - (nearest * nearest + self.smoothing * self.smoothing).sqrt())
+        Some(self.level - elementary::sqrt(nearest * nearest + self.smoothing * self.smoothing))
     }
 }

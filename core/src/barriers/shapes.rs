@@ -1,9 +1,12 @@
 //! Half-planes, ellipses, rectangles, and bounds on states. The first two states are the position.
 
+use core::f64::consts::SQRT_2;
+
 use nalgebra::SVector;
 
 use crate::barrier::Barrier;
 use crate::dynamics::Region;
+use crate::elementary;
 use crate::error::{Error, ErrorKind, finite, positive};
 use crate::scalar::Scalar;
 
@@ -31,7 +34,7 @@ impl HalfPlane {
     /// A component that is not finite; a normal of length 0.
     pub fn new(normal: [f64; 2], through: [f64; 2]) -> Result<Self, Error> {
         let normal = point("normal", normal)?;
-        let length = normal[0].hypot(normal[1]);
+        let length = elementary::hypot(normal[0], normal[1]);
         if length == 0.0 {
             return Err(Error::new(ErrorKind::Range, "normal", "is [0, 0], must have a direction"));
         }
@@ -60,7 +63,7 @@ struct Axes {
 
 impl Axes {
     fn new(centre: [f64; 2], angle: f64) -> Result<Self, Error> {
-        let (sine, cosine) = finite("angle", angle)?.sin_cos();
+        let (sine, cosine) = elementary::sin_cos(finite("angle", angle)?);
         Ok(Self { centre: point("centre", centre)?, direction: [cosine, sine] })
     }
 
@@ -107,12 +110,13 @@ impl<const NX: usize> Barrier<NX> for Ellipse {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_axes;
         let level = (along / a).squared() + (across / b).squared();
-        (-(level + 1.0).sqrt() + std::f64::consts::SQRT_2) * a.min(b)
+        (-(level + 1.0).sqrt() + SQRT_2) * a.min(b)
     }
 
     fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
         let ([along, across], [a, b]) = (self.axes.least(region), self.half_axes);
-        Some((std::f64::consts::SQRT_2 - (along / a).hypot(across / b).hypot(1.0)) * a.min(b))
+        let level = elementary::hypot(elementary::hypot(along / a, across / b), 1.0);
+        Some((SQRT_2 - level) * a.min(b))
     }
 }
 
@@ -140,7 +144,7 @@ impl Rectangle {
 
     /// The same shape, enlarged until it contains the true rectangle.
     pub fn around(self) -> Self {
-        Self { half_sides: self.half_sides.map(|side| side * 2_f64.powf(0.25)), ..self }
+        Self { half_sides: self.half_sides.map(|side| side * elementary::powf(2.0, 0.25)), ..self }
     }
 }
 
@@ -149,13 +153,13 @@ impl<const NX: usize> Barrier<NX> for Rectangle {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_sides;
         let level = (along / a).squared().squared() + (across / b).squared().squared();
-        (-(level + 1.0).sqrt().sqrt() + 2_f64.powf(0.25)) * a.min(b)
+        (-(level + 1.0).sqrt().sqrt() + elementary::powf(2.0, 0.25)) * a.min(b)
     }
 
     fn highest(&self, _time: [f64; 2], region: &Region) -> Option<f64> {
         let ([along, across], [a, b]) = (self.axes.least(region), self.half_sides);
-        let level = (along / a).powi(4) + (across / b).powi(4);
-        Some((2_f64.powf(0.25) - (level + 1.0).powf(0.25)) * a.min(b))
+        let level = elementary::powi(along / a, 4) + elementary::powi(across / b, 4);
+        Some((elementary::powf(2.0, 0.25) - elementary::powf(level + 1.0, 0.25)) * a.min(b))
     }
 }
 
@@ -242,13 +246,16 @@ impl<const NX: usize> Barrier<NX> for NormBound {
         if self.count == 2 {
             square += x[self.first + 1].squared();
         }
-        -(square + smoothing * smoothing).sqrt() + self.limit.hypot(smoothing)
+        -(square + smoothing * smoothing).sqrt() + elementary::hypot(self.limit, smoothing)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::vector;
+
+    use alloc::borrow::ToOwned;
+    use alloc::string::ToString;
 
     use super::*;
 
@@ -260,7 +267,7 @@ mod tests {
     fn the_sets_are_where_they_should_be() {
         let half = HalfPlane::new([3.0, 4.0], [1.0, 1.0]).expect("valid");
         assert!((h(&half, [4.0, 5.0, 0.0, 0.0]) - 5.0).abs() < 1e-15);
-        let turned = std::f64::consts::FRAC_PI_6;
+        let turned = core::f64::consts::FRAC_PI_6;
         let (c, s) = (turned.cos(), turned.sin());
         let ellipse = Ellipse::new([1.0, -2.0], [3.0, 2.0], turned).expect("valid");
         let inner = Rectangle::new([1.0, -2.0], [3.0, 2.0], turned).expect("valid");

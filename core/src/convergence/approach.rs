@@ -1,6 +1,7 @@
 //! The condition in force until the set is reached: one of the methods, or a user's own.
 
-use std::sync::Arc;
+use alloc::borrow::ToOwned;
+use alloc::sync::Arc;
 
 use super::condition::{Abilities, Bound, Condition, Sample};
 use super::first_order::FirstOrder;

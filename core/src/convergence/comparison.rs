@@ -16,6 +16,7 @@
 //! The paper, theorem 1, for n = 2; the general order is this project's.
 
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 
 /// One number per derivative order below n, `[e]`/s^k; zeros from n on.
 pub type Stack = [f64; MAX_RELATIVE_DEGREE];
@@ -86,7 +87,7 @@ pub fn coefficients(rate: f64, e: &[f64]) -> Stack {
 pub fn lower_bound(rate: f64, e: &[f64], elapsed: f64) -> f64 {
     let c = coefficients(rate, e);
     let p = c[..e.len()].iter().rev().fold(0.0, |sum, &ck| sum * elapsed + ck);
-    (-rate * elapsed).exp() * p
+    elementary::exp(-rate * elapsed) * p
 }
 
 #[cfg(test)]

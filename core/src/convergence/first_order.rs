@@ -33,10 +33,13 @@
 //! Control Optim. 38 (2000), doi 10.1137/S0363012997321358, for the comparison argument.
 
 use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Sample};
+use crate::elementary;
 use crate::error::{Error, ErrorKind};
 
 /// The exponent p of (F), dimensionless, in (0, 1). Default 1/2.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "f64"))]
 pub struct Exponent(f64);
 
 /// Equality is an equivalence, as p is never not-a-number.
@@ -45,6 +48,16 @@ impl Eq for Exponent {}
 impl Default for Exponent {
     fn default() -> Self {
         Self(0.5)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<f64> for Exponent {
+    type Error = Error;
+
+    /// [`Self::new`], for what is read from a file.
+    fn try_from(p: f64) -> Result<Self, Error> {
+        Self::new(p)
     }
 }
 
@@ -78,7 +91,7 @@ impl Exponent {
         if e >= 0.0 {
             return 0.0;
         }
-        -self.rate(deadline) * anchor * (e / anchor).powf(self.0)
+        -self.rate(deadline) * anchor * elementary::powf(e / anchor, self.0)
     }
 
     /// The derivatives of [`Self::floor`] by `anchor` and by `e`, in 1/s.
@@ -86,13 +99,13 @@ impl Exponent {
         if e >= 0.0 {
             return [0.0; 2];
         }
-        let (rate, power) = (self.rate(deadline), (e / anchor).powf(self.0));
+        let (rate, power) = (self.rate(deadline), elementary::powf(e / anchor, self.0));
         [-rate * (1.0 - self.0) * power, -rate * self.0 * power * anchor / e]
     }
 
     /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e(0) < 0, `[e]`; 0 from T on.
     pub fn lower_bound(self, anchor: f64, deadline: f64, elapsed: f64) -> f64 {
-        anchor * (1.0 - elapsed / deadline).max(0.0).powf(1.0 / (1.0 - self.0))
+        anchor * elementary::powf((1.0 - elapsed / deadline).max(0.0), 1.0 / (1.0 - self.0))
     }
 }
 
@@ -134,6 +147,8 @@ impl Condition for FirstOrder {
 
 #[cfg(test)]
 mod tests {
+    use alloc::string::ToString;
+
     use super::*;
 
     #[test]

@@ -1,8 +1,8 @@
 //! One barrier's promise over time: anchor, approach, arrival, stay.
 
-use std::array::from_fn;
-use std::fmt;
-use std::sync::Arc;
+use alloc::sync::Arc;
+use core::array::from_fn;
+use core::fmt;
 
 use super::approach::Approach;
 use super::comparison::Stack;
@@ -55,7 +55,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-impl std::error::Error for Refusal {}
+impl core::error::Error for Refusal {}
 
 /// The promise "h ≥ μ within T, and from then on" for a barrier of relative degree n.
 #[derive(Clone)]

@@ -64,7 +64,13 @@ impl Profile for Hermite {
     }
 
     /// Linear in the anchor.
-    fn along(&self, [_, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
+    fn directional(
+        &self,
+        _anchor: &[f64],
+        direction: &[f64],
+        deadline: f64,
+        elapsed: f64,
+    ) -> Option<Derivatives> {
         Some(self.evaluate(direction, deadline, elapsed))
     }
 }

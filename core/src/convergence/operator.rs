@@ -15,12 +15,17 @@
 //! Q. Nguyen and K. Sreenath, *Exponential control barrier functions*, American Control Conference
 //! (2016), doi 10.1109/ACC.2016.7524935, for the cascade with distinct rates.
 
+#[cfg(feature = "serde")]
+use alloc::vec::Vec;
+
 use super::comparison::Stack;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, positive};
 
 /// Π (D + a_i).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Vec<f64>", into = "Vec<f64>"))]
 pub struct Operator {
     n: usize,
     rates: Stack,
@@ -142,9 +147,29 @@ impl Operator {
     }
 }
 
+#[cfg(feature = "serde")]
+impl TryFrom<Vec<f64>> for Operator {
+    type Error = Error;
+
+    /// [`Self::new`], for what is read from a file.
+    fn try_from(rates: Vec<f64>) -> Result<Self, Error> {
+        Self::new(&rates)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Operator> for Vec<f64> {
+    /// The rates.
+    fn from(operator: Operator) -> Self {
+        operator.rates[..operator.n].to_vec()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{comparison, stay};
+    use alloc::string::ToString;
+
     use super::*;
 
     #[test]

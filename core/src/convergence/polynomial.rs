@@ -27,6 +27,7 @@
 //! Gleichung*, Tôhoku Math. J. 10 (1916) 167–171.
 
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 
 /// Largest number of coefficients, one more than the largest degree.
 const LEN: usize = MAX_RELATIVE_DEGREE;
@@ -105,7 +106,7 @@ pub fn real_roots(p: &[f64]) -> Roots {
 fn between(q: &[f64], turns: &Roots) -> Roots {
     let degree = q.len() - 1;
     let bound = (1..=degree)
-        .map(|k| 2.0 * (q[degree - k] / q[degree]).abs().powf(1.0 / k as f64))
+        .map(|k| 2.0 * elementary::powf((q[degree - k] / q[degree]).abs(), 1.0 / k as f64))
         .fold(1.0, f64::max);
     // Half as much again, for the round-off of the bound itself; at least 1, where no power underflows.
     let bound = (1.5 * bound).min(f64::MAX);
@@ -169,6 +170,8 @@ fn from_rank(rank: i64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec::Vec;
+
     use super::*;
 
     /// The coefficients of Π (x − r), p₀ first.

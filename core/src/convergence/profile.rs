@@ -20,10 +20,11 @@
 //! The check samples: a violation narrower than a panel (T/64, until 3T) may pass. Its tolerance is
 //! [`TOLERANCE`] of the largest r⁽ᵏ⁾ met, in units of the panel.
 
-use std::fmt;
+use core::fmt;
 
 pub use super::hermite::Hermite;
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 
 /// r and its derivatives, `[e]`/s^k; entries above the order in use are ignored.
 pub type Derivatives = [f64; MAX_RELATIVE_DEGREE + 1];
@@ -35,9 +36,15 @@ pub trait Profile {
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of [`Self::evaluate`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); for
+    /// The derivative of [`Self::evaluate`] where the anchor moves along `direction`; for
     /// [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not know it.
-    fn along(&self, _anchor: [&[f64]; 2], _deadline: f64, _elapsed: f64) -> Option<Derivatives> {
+    fn directional(
+        &self,
+        _anchor: &[f64],
+        _direction: &[f64],
+        _deadline: f64,
+        _elapsed: f64,
+    ) -> Option<Derivatives> {
         None
     }
 }
@@ -71,7 +78,7 @@ impl Profile for LowPeak {
             [e, de] => {
                 let v = de * deadline;
                 let w = e + v / 2.0;
-                let a = -2.0 * (w + w.hypot(v / 2.0).copysign(w));
+                let a = -2.0 * (w + elementary::hypot(w, v / 2.0).copysign(w));
                 // At a = 0 both pieces are zero.
                 let values = if a != 0.0 && s < 0.5 - v / (2.0 * a) {
                     [e + s * (v + s * a / 2.0), v + s * a, a]
@@ -86,8 +93,14 @@ impl Profile for LowPeak {
     }
 
     /// Linear but for n = 2, where (B) gives K' (2K + 4w) = 2y₁y₁' − 4Kw' with w = y₀ + y₁/2.
-    fn along(&self, [anchor, direction]: [&[f64]; 2], deadline: f64, elapsed: f64) -> Option<Derivatives> {
-        let ([e, de], [e_along, de_along]) = (anchor, direction) else {
+    fn directional(
+        &self,
+        anchor: &[f64],
+        direction: &[f64],
+        deadline: f64,
+        elapsed: f64,
+    ) -> Option<Derivatives> {
+        let ([e, de], [e_directional, de_directional]) = (anchor, direction) else {
             return Some(self.evaluate(direction, deadline, elapsed));
         };
         let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
@@ -95,14 +108,18 @@ impl Profile for LowPeak {
             return Some(r);
         }
         let s = elapsed / deadline;
-        let (v, v_along) = (de * deadline, de_along * deadline);
-        let (w, w_along) = (e + v / 2.0, e_along + v_along / 2.0);
-        let a = -2.0 * (w + w.hypot(v / 2.0).copysign(w));
-        let a_along = (2.0 * v * v_along - 4.0 * a * w_along) / (2.0 * a + 4.0 * w);
+        let (v, v_directional) = (de * deadline, de_directional * deadline);
+        let (w, w_directional) = (e + v / 2.0, e_directional + v_directional / 2.0);
+        let a = -2.0 * (w + elementary::hypot(w, v / 2.0).copysign(w));
+        let a_directional = (2.0 * v * v_directional - 4.0 * a * w_directional) / (2.0 * a + 4.0 * w);
         let values = if a != 0.0 && s < 0.5 - v / (2.0 * a) {
-            [e_along + s * (v_along + s * a_along / 2.0), v_along + s * a_along, a_along]
+            [
+                e_directional + s * (v_directional + s * a_directional / 2.0),
+                v_directional + s * a_directional,
+                a_directional,
+            ]
         } else {
-            [-a_along * (1.0 - s) * (1.0 - s) / 2.0, a_along * (1.0 - s), -a_along]
+            [-a_directional * (1.0 - s) * (1.0 - s) / 2.0, a_directional * (1.0 - s), -a_directional]
         };
         (r[0], r[1], r[2]) = (values[0], values[1] / deadline, values[2] / (deadline * deadline));
         Some(r)
@@ -174,7 +191,7 @@ impl fmt::Display for ProfileError {
     }
 }
 
-impl std::error::Error for ProfileError {}
+impl core::error::Error for ProfileError {}
 
 /// A profile from one anchor.
 struct Anchored<'a> {
@@ -198,12 +215,13 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
     let start = profile.finite(0.0)?;
     // Sizes of r⁽ᵏ⁾ Tᵏ decide what is round-off: a derivative that should vanish has no size of its own.
     let size = |r: &Derivatives| {
-        (0..=n).fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * deadline.powi(k as i32)).abs()))
+        (0..=n)
+            .fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * elementary::powi(deadline, k as i32)).abs()))
     };
     // It leaves from the anchor.
     let mut largest = size(&start);
     for (order, (&found, &wanted)) in start.iter().zip(anchor).enumerate() {
-        if (found - wanted).abs() * deadline.powi(order as i32) > TOLERANCE * largest {
+        if (found - wanted).abs() * elementary::powi(deadline, order as i32) > TOLERANCE * largest {
             return Err(ProfileError::Anchor { order, found, wanted });
         }
     }
@@ -220,7 +238,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
         for order in 1..=n {
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);
-            let round_off = TOLERANCE * largest / (deadline.powi(order as i32 - 1) * (b - a));
+            let round_off = TOLERANCE * largest / (elementary::powi(deadline, order as i32 - 1) * (b - a));
             if (found - wanted).abs() <= 10.0 * (found - whole[order]).abs() + round_off {
                 continue;
             }

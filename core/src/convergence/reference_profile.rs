@@ -3,7 +3,7 @@
 //! The error starts at zero, so h ≥ μ + r for ever (`docs/theory.md#profile`). The profiles themselves are in
 //! [`profile`].
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 use super::comparison::lower_terms;
 use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Rates, Sample};
@@ -172,6 +172,6 @@ impl Condition for ReferenceProfile {
         if !at.has_time() {
             return Some([0.0; MAX_RELATIVE_DEGREE + 1]);
         }
-        self.in_force(at).along([at.anchor, &change.anchor[..at.degree()]], at.deadline, elapsed)
+        self.in_force(at).directional(at.anchor, &change.anchor[..at.degree()], at.deadline, elapsed)
     }
 }

@@ -32,7 +32,7 @@
 //!
 //! The paper, theorem 1 and equation (14), for n = 2; the rest is this project's.
 
-use std::fmt;
+use core::fmt;
 
 use super::comparison::{Stack, coefficients, factorial, lower_bound, lower_terms};
 use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Rates, Sample};
@@ -41,6 +41,7 @@ use super::polynomial::{self, Roots};
 use super::profile::Derivatives;
 use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 
 /// The reason why a repeated root has no admissible rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,7 +94,7 @@ impl fmt::Display for NoAdmissibleRate {
     }
 }
 
-impl std::error::Error for NoAdmissibleRate {}
+impl core::error::Error for NoAdmissibleRate {}
 
 /// Whether a real root of (R) keeps its promise after the deadline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,7 +161,7 @@ pub fn admissibility(rate: f64, e: &[f64], deadline: f64) -> Admissibility {
     // P in s = τ/T, then in z = s − 1 by repeated synthetic division.
     let mut p = [0.0; MAX_RELATIVE_DEGREE];
     for (k, pk) in p[..n].iter_mut().enumerate() {
-        *pk = (0..=k).map(|j| y[j] * s.powi((k - j) as i32) / factorial(k - j)).sum();
+        *pk = (0..=k).map(|j| y[j] * elementary::powi(s, (k - j) as i32) / factorial(k - j)).sum();
     }
     for start in 0..n {
         for k in (start..n - 1).rev() {
@@ -205,7 +206,7 @@ pub fn deadlines(e: &[f64]) -> Deadlines {
 pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
     let (n, s) = (e.len(), rate * deadline);
     let Some(y) = scaled(e, deadline) else { return f64::INFINITY };
-    let power = |x: f64, k: usize| x.powi(k as i32) / factorial(k);
+    let power = |x: f64, k: usize| elementary::powi(x, k as i32) / factorial(k);
     let size: f64 = (0..n).map(|j| y[j].abs() * (0..n - j).map(|i| power(s.abs(), i)).sum::<f64>()).sum();
     // Y_n' = Y_n − c_{n−1} T^{n−1}, and Y_n = 0.
     let slope: f64 = (0..n).map(|j| y[j] * power(s, n - 1 - j)).sum();
@@ -216,8 +217,8 @@ pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
 /// finite at a double root.
 fn rate_change(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
     let (n, s) = (e.len(), rate * deadline);
-    let power = |k: usize| s.powi(k as i32) / factorial(k);
-    let y = |e: &[f64], j: usize| e[j] * deadline.powi(j as i32) / factorial(j);
+    let power = |k: usize| elementary::powi(s, k as i32) / factorial(k);
+    let y = |e: &[f64], j: usize| e[j] * elementary::powi(deadline, j as i32) / factorial(j);
     let change: f64 = (0..n).map(|j| y(direction, j) * (0..n - j).map(power).sum::<f64>()).sum();
     // Y_n' = Y_n − c_{n−1} T^{n−1}, and Y_n = 0.
     let slope: f64 = (0..n).map(|j| y(e, j) * power(n - 1 - j)).sum();
@@ -295,7 +296,7 @@ impl Condition for RepeatedRoot {
 fn scaled(e: &[f64], deadline: f64) -> Option<Stack> {
     let mut y = [0.0; MAX_RELATIVE_DEGREE];
     for (j, yj) in y[..e.len()].iter_mut().enumerate() {
-        *yj = e[j] * deadline.powi(j as i32) / factorial(j);
+        *yj = e[j] * elementary::powi(deadline, j as i32) / factorial(j);
     }
     let largest = y.iter().fold(0.0, |m: f64, v| if v.is_nan() { f64::INFINITY } else { m.max(v.abs()) });
     (largest.is_finite() && largest > 0.0).then(|| y.map(|v| v / largest))
@@ -304,6 +305,8 @@ fn scaled(e: &[f64], deadline: f64) -> Option<Stack> {
 #[cfg(test)]
 mod tests {
     use super::super::comparison::lower_bound;
+    use alloc::string::ToString;
+
     use super::*;
 
     #[test]

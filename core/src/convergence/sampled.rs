@@ -30,6 +30,7 @@ use super::comparison::{Stack, binomial, factorial};
 use super::condition::{AnchorChange, Condition, Rates, Sample};
 use super::operator::Split;
 use super::profile::Profile;
+use crate::elementary;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// (S) for one period: Σ_k `weights[k]` h⁽ᵏ⁾(t + δ) ≥ `floor`, k < n.
@@ -141,7 +142,7 @@ fn steepest(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Steepest {
 fn size(anchor: &[f64], deadline: f64) -> (f64, usize) {
     let mut largest = (0.0, 0);
     for (k, e) in anchor.iter().enumerate() {
-        let size = (e * deadline.powi(k as i32)).abs();
+        let size = (e * elementary::powi(deadline, k as i32)).abs();
         if size > largest.0 {
             largest = (size, k);
         }
@@ -160,10 +161,10 @@ pub(super) fn margin_change(
 ) -> Option<f64> {
     let n = anchor.len();
     let Steepest { panel, slope } = steepest(profile, anchor, deadline);
-    let at = |i: usize| Some(profile.along([anchor, direction], deadline, panel_start(deadline, i))?[n]);
+    let at = |i: usize| Some(profile.directional(anchor, direction, deadline, panel_start(deadline, i))?[n]);
     let slope_change = (at(panel + 1)? - at(panel)?) * slope.signum() / panel_start(deadline, 1);
     let (size, k) = size(anchor, deadline);
-    let size_change = anchor[k].signum() * direction[k] * deadline.powi(k as i32);
+    let size_change = anchor[k].signum() * direction[k] * elementary::powi(deadline, k as i32);
     let per_slope = 2.0 * (period / 2.0 * period / 4.0 / attenuation);
     let capped = slope.abs() * per_slope >= LARGEST_MARGIN * size;
     let held = if capped { LARGEST_MARGIN * size_change } else { slope_change * per_slope };
@@ -180,9 +181,9 @@ pub(super) const ROUND_OFF: f64 = 1e-8;
 pub(super) fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     if rate > 0.0 {
-        rate.powi(order)
+        elementary::powi(rate, order)
     } else {
-        factorial(n - 1) * (rate * time_left).exp() / time_left.powi(order)
+        factorial(n - 1) * elementary::exp(rate * time_left) / elementary::powi(time_left, order)
     }
 }
 
@@ -191,7 +192,7 @@ fn attenuation_change(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     match n {
         1 if rate > 0.0 => 0.0,
-        _ if rate > 0.0 => f64::from(order) * rate.powi(order - 1),
+        _ if rate > 0.0 => f64::from(order) * elementary::powi(rate, order - 1),
         _ => time_left * attenuation(rate, n, time_left),
     }
 }
@@ -214,7 +215,7 @@ impl Cascade {
             Rates::Repeated(rate) => {
                 let mut weights = [0.0; MAX_RELATIVE_DEGREE];
                 for (k, weight) in weights[..n].iter_mut().enumerate() {
-                    *weight = binomial(n - 1, k) * rate.powi((n - 1 - k) as i32);
+                    *weight = binomial(n - 1, k) * elementary::powi(rate, (n - 1 - k) as i32);
                 }
                 Self { weights, last: rate, attenuation: attenuation(rate, n, time_left) }
             }
@@ -222,7 +223,7 @@ impl Cascade {
     }
 
     fn decay(&self, period: f64) -> f64 {
-        (-self.last * period).exp()
+        elementary::exp(-self.last * period)
     }
 }
 
@@ -294,7 +295,7 @@ pub(super) fn over_period_change(
 /// The derivative by a of C(n, j) a^{n−j}, the coefficient of e⁽ʲ⁾ in (D + a)ⁿ e.
 pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
     let power = n - j;
-    if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * rate.powi(power as i32 - 1) }
+    if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * elementary::powi(rate, power as i32 - 1) }
 }
 
 /// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under
@@ -311,7 +312,7 @@ fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
 /// The derivative of [`disturbed`], where `weights` change by `change`.
 fn disturbed_change(weights: &[f64], change: &Stack, bound: f64, period: f64) -> f64 {
     let n = weights.len();
-    let signed: Stack = std::array::from_fn(|k| if k < n { change[k] * weights[k].signum() } else { 0.0 });
+    let signed: Stack = core::array::from_fn(|k| if k < n { change[k] * weights[k].signum() } else { 0.0 });
     let part = |keep: fn(f64) -> f64| disturbed(&signed.map(keep)[..n], bound, period);
     part(|w| w.max(0.0)) - part(|w| w.min(0.0))
 }

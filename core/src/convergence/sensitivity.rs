@@ -41,7 +41,7 @@ impl FixedTime {
     /// it was anchored there, at `h` itself, with a deadline that does not depend on h.
     ///
     /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
-    /// [derivative](super::profile::Profile::along), and under most [conditions](super::condition) of one's own.
+    /// [derivative](super::profile::Profile::directional), and under most [conditions](super::condition) of one's own.
     pub fn differentiate(
         &self,
         state: &FixedTimeState,

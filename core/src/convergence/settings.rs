@@ -1,5 +1,8 @@
 //! The settings of a barrier's promise, with their defaults.
 
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+
 use super::first_order::Exponent;
 use super::operator::Operator;
 use crate::MAX_RELATIVE_DEGREE;
@@ -7,6 +10,8 @@ use crate::error::{Error, ErrorKind, non_negative, positive};
 
 /// The method by which the deadline is met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Method {
     /// The paper's: (D + a)ⁿ (h − μ) ≥ 0 with the rate of [`repeated_root::rate`](super::repeated_root::rate).
@@ -23,6 +28,8 @@ pub enum Method {
 
 /// The profile that [`Method::ReferenceProfile`] follows, where it is not one of one's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ProfileKind {
     /// [`Hermite`](super::hermite::Hermite): the polynomial of least ∫ (r⁽ⁿ⁾)².
     #[default]
@@ -34,6 +41,8 @@ pub enum ProfileKind {
 /// The answer to a deadline that the input bounds certainly do not allow, at the anchor's sample or at any
 /// later one ([`reach`](crate::reach)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Infeasible {
     /// Report it and keep the deadline.
@@ -47,11 +56,16 @@ pub enum Infeasible {
 }
 
 /// Settings of one barrier's promise.
+///
+/// In a file, keys that are left out have their defaults. The [`FilterBuilder`](crate::filter::FilterBuilder) checks all numbers, wherever they come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default = "FixedTimeSettings::keeping", deny_unknown_fields))]
 pub struct FixedTimeSettings {
     /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample for
     /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)), and later
     /// for higher ones. `None`: the set is to be kept from a start inside it; from one outside nothing is promised.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: Option<f64>,
     /// The method by which the deadline is met. Default: [`Method::ReferenceProfile`].
     pub method: Method,
@@ -61,6 +75,7 @@ pub struct FixedTimeSettings {
     pub infeasible: Infeasible,
     /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`]
     /// of the deadline in force and the sampling period.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub rate: Option<f64>,
     /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
     pub rates: Option<Operator>,
@@ -68,17 +83,21 @@ pub struct FixedTimeSettings {
     /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T. Where inputs have bounds and n ≤ 2, it is at
     /// most what braking with half of φ_max allows, (φ_max/2e)^{1/n}; φ_max is the largest h⁽ⁿ⁾ within the bounds.
     /// Without a deadline it is that alone, else 2/s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub stay_rate: Option<f64>,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. The expected cost of held inputs
     /// comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
     /// again: leaving then anchors anew with this deadline. `None`, the default: leaving is reported
     /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub recovery: Option<f64>,
     /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on the part of h⁽ⁿ⁾ that the model lacks, such as L_wL_f^{n−1}h w for a
     /// disturbance w. The constraint asks for as much more, so the promise holds for every disturbance within
     /// the bound. A disturbance must enter h⁽ⁿ⁾ only, and no earlier derivative. Default: 0.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub disturbance: f64,
 }
 

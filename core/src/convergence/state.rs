@@ -6,14 +6,18 @@ use super::phase::Phase;
 
 /// The memory of a promise between samples: plain data, all that a snapshot needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FixedTimeState {
     /// The phase of the promise.
     pub phase: Phase,
     /// Time in s of the sample from which its window counts ([`Begin`](crate::filter::Begin)).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub start_time: Option<f64>,
     /// Time of the anchor, t₀ in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub anchor_time: f64,
     /// T in s, counted from the anchor; infinite where there is none.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: f64,
     /// Number of times that leaving the set has anchored anew
     /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
@@ -22,25 +26,34 @@ pub struct FixedTimeState {
     /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
     pub postponed: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub anchor: Stack,
     /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub rate: f64,
     /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`](super::stay::keep)).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub stay_rate: f64,
     /// The margin of the stay constraint in the unit of h, chosen there too.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub stay_margin: f64,
     /// The part of the floor that leads back from `stay_margin` to `margin`, `[h]`/sⁿ, chosen there too.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub pull: f64,
     /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, and since the arrival where an approach has ended.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
     /// μ in the unit of h, chosen at the anchor: the settings' margin and the expected cost of held inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// The sampling period in s that was accounted for at the anchor, 0 for none.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: f64,
     /// Whether the method could not be used from this anchor and another took its place
     /// ([`FixedTime::refusal`](super::FixedTime::refusal) says why).
     pub fallback: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
     /// Whoever enforces the row clears it where that is not met, or the held input breaks the promise on the way.
@@ -51,12 +64,15 @@ pub struct FixedTimeState {
 
 /// Steps in a row that did not meet a constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Unmet {
     /// Their number, ≥ 1.
     pub steps: u32,
     /// Time in s of the first, or of the last progress since: a rise of h by a hundredth of its size.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub since: f64,
     /// h then, in its own unit.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub h: f64,
 }
 

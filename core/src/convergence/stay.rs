@@ -22,7 +22,7 @@
 //! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, [`affordable_margin`], is the
 //! largest margin with which the condition holds.
 
-use std::array::from_fn;
+use core::array::from_fn;
 
 use super::comparison::{Stack, lower_terms, scaled_coefficient};
 use super::condition::{AnchorChange, Bound, Condition, Rates, Sample};
@@ -31,6 +31,7 @@ use super::profile::Derivatives;
 use super::settings::FixedTimeSettings;
 use super::state::FixedTimeState;
 use crate::MAX_RELATIVE_DEGREE;
+use crate::elementary;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
 /// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
@@ -160,7 +161,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let floor = |rate: f64| -lower_terms(rate, e);
     let possible = means.drift + means.reach;
     // 3. The plant's own pull is left to later where h can hardly be influenced, or comes back by itself.
-    let strength = means.weight.powi(2) * outwards(e, base);
+    let strength = elementary::powi(means.weight, 2) * outwards(e, base);
     let eased = |wanted: f64| {
         let relieved = means.drift.min(0.0) + wanted.max(0.0);
         if wanted > relieved { relieved + strength * (wanted - relieved) } else { wanted }
@@ -176,7 +177,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
         if is_met(limit) { first(gentle, limit, is_met) } else { limit }
     };
     // 4. The gentle rate with all of the margin, as far as that is possible.
-    let back = -lower_terms(base, e) + base.powi(h.len() as i32) * (margin - kept);
+    let back = -lower_terms(base, e) + elementary::powi(base, h.len() as i32) * (margin - kept);
     let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
 }
@@ -252,7 +253,7 @@ impl Stay<'_> {
         let brakes = COMFORTABLE * (means.drift + means.reach);
         let by_brakes = match N <= 2 && brakes.is_finite() && brakes > 0.0 && h[0] > 0.0 {
             true if N == 1 => brakes / h[0],
-            true => (brakes / h[0]).sqrt(),
+            true => elementary::sqrt(brakes / h[0]),
             false if by_time.is_finite() => by_time,
             false => FixedTimeSettings::DEFAULT_KEEP_RATE,
         };

@@ -1,6 +1,9 @@
 //! The relative degree that a barrier turned out to have: the finding that a refusal carries.
 
-use std::fmt;
+use alloc::borrow::ToOwned;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::fmt;
 
 use crate::MAX_RELATIVE_DEGREE;
 

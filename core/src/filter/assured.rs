@@ -1,6 +1,9 @@
 //! A filter whose promise has a witness: decided at the first sample, kept within the bounds whatever u_ref is
 //! (`docs/theory.md#witness`).
 
+use alloc::format;
+use alloc::vec::Vec;
+
 use super::{Begin, End, FilterState, Report, SafetyFilter, Strictness};
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, length, positive};
@@ -129,8 +132,7 @@ impl AssuredFilter {
             if slot.begin != Begin::AtOnce {
                 return refuse("begin", "is later than the first sample").map_err(named);
             }
-            let mut x = vec![0.0; filter.state_dim];
-            if !slot.source.predict(&mut x, &[0.0; MAX_INPUTS][..filter.input_dim], period) {
+            if slot.source.predict().is_none() {
                 let message = "has no model to run ahead";
                 return Err(named(Error::new(ErrorKind::Unsupported, "source", message)));
             }
@@ -239,7 +241,11 @@ impl AssuredFilter {
     }
 
     /// Runs `f` with the planner of the present promises.
-    fn planned<R>(&self, u: &[f64], f: impl FnOnce(&Planner<'_>) -> R) -> R {
+    fn planned<R>(
+        &self,
+        u: &[f64],
+        f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
         let requirements: Vec<Requirement<'_>> = self
             .filter
             .slots
@@ -252,7 +258,8 @@ impl AssuredFilter {
             .collect();
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
         let source = &*self.filter.slots[0].source;
-        f(&Planner::new(source, &self.filter.bounds, &requirements, self.period, size))
+        let planner = Planner::new(source, &self.filter.bounds, &requirements, self.period, size);
+        f(&planner.ok_or(Failure::Singular)?)
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one

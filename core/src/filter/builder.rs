@@ -1,5 +1,10 @@
 //! The builder of a filter. It checks every number, so that no step can fail on one.
 
+use alloc::borrow::ToOwned;
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};
@@ -412,18 +417,16 @@ impl FilterBuilder {
             let message = format!("is {delay}, must be <= sampling_period = {period}");
             return Err(Error::new(ErrorKind::Range, "actuation_delay", message));
         }
-        let mut predicted = vec![0.0; state_dim];
-        let held = vec![0.0; input_dim];
-        for slot in slots.iter().filter(|_| delay > 0.0) {
-            if !slot.source.predict(&mut predicted, &held, delay) {
-                let message = "the barrier's source of derivatives cannot predict the state";
-                return Err(Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&slot.name));
-            }
+        if delay > 0.0
+            && let Some(slot) = slots.iter().find(|slot| slot.source.predict().is_none())
+        {
+            let message = "the barrier's source of derivatives cannot predict the state";
+            return Err(Error::new(ErrorKind::Unsupported, "actuation_delay", message).within(&slot.name));
         }
         // Measurement errors.
         let errors = MeasurementErrors::new(&errors);
         if !errors.is_exact() {
-            errors::check_all(&mut slots, sampling, delay, input_dim)?;
+            errors::check_all(&mut slots, sampling, delay)?;
         }
         for slot in &mut slots {
             slot.now.slopes = vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count()];

@@ -4,11 +4,14 @@
 //! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u,
 //! so the row is no longer affine: it is linearised with the rest.
 
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use super::Sampling;
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::PeriodBound;
 use crate::error::{Error, ErrorKind};
-use crate::lie::{Ahead, DerivativeSource};
+use crate::lie::{Ahead, DerivativeSource, Direction};
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
@@ -61,11 +64,14 @@ impl MeasurementErrors {
         let zeros = [0.0; MAX_INPUTS];
         let zeros = &zeros[..inputs];
         let (mut change, mut sum) = (Ahead::ZERO, [0.0; MAX_RELATIVE_DEGREE]);
+        let known = source.directional();
         for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
             // Derivatives of order below n contain no input.
-            let known = source.ahead_along(t, [x, direction], [zeros, zeros], 0.0, &mut change);
+            if let Some(source) = known {
+                source.evaluate_directional(t, x, zeros, Direction { x: direction, u: zeros }, &mut change);
+            }
             for k in 0..source.relative_degree() {
-                slopes[k] = if known { change.value[k] } else { f64::INFINITY };
+                slopes[k] = if known.is_some() { change.value[k] } else { f64::INFINITY };
                 sum[k] += slopes[k].abs();
             }
         }
@@ -81,24 +87,24 @@ impl MeasurementErrors {
         (bound, divisor): (&PeriodBound, f64),
         slopes: &[ErrorSlopes],
     ) -> Option<Uncertainty> {
-        let zeros = [0.0; MAX_INPUTS];
+        let zeros = &[0.0; MAX_INPUTS][..u.len()];
+        let directional = source.predict_directional()?;
         let mut change = Ahead::ZERO;
         let mut sum = Uncertainty { size: 0.0, gradient: [0.0; MAX_INPUTS] };
         for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
-            if !source.ahead_along(t, [x, direction], [u, &zeros[..u.len()]], period, &mut change) {
-                return None;
-            }
-            let (mut along, mut gradient) = (0.0, [0.0; MAX_INPUTS]);
+            let direction = Direction { x: direction, u: zeros };
+            directional.ahead_directional(t, x, u, direction, period, &mut change);
+            let (mut error, mut gradient) = (0.0, [0.0; MAX_INPUTS]);
             for k in 0..source.relative_degree() {
                 let weight = bound.weights[k] / divisor;
-                along += weight * (change.value[k] - bound.decay * slopes[k]);
+                error += weight * (change.value[k] - bound.decay * slopes[k]);
                 for (g, d) in gradient.iter_mut().zip(&change.gradient[k]) {
                     *g += weight * d;
                 }
             }
-            sum.size += along.abs();
+            sum.size += error.abs();
             for (s, g) in sum.gradient.iter_mut().zip(&gradient) {
-                *s += along.signum() * g;
+                *s += error.signum() * g;
             }
         }
         (sum.size.is_finite() && all_finite(&sum.gradient)).then_some(sum)
@@ -106,11 +112,8 @@ impl MeasurementErrors {
 }
 
 /// Whether `source` gives derivatives along a direction, a moment ahead too.
-pub(super) fn check(source: &dyn DerivativeSource, inputs: usize) -> Result<(), Error> {
-    let zeros = vec![0.0; source.state_dim()];
-    let u = [0.0; MAX_INPUTS];
-    let (u, mut change) = (&u[..inputs], Ahead::ZERO);
-    if source.ahead_along(0.0, [&zeros, &zeros], [u, u], 1e-3, &mut change) {
+pub(super) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
+    if source.directional().is_some() && source.predict_directional().is_some() {
         return Ok(());
     }
     let message = "the barrier's source gives no derivatives along a direction";
@@ -118,12 +121,7 @@ pub(super) fn check(source: &dyn DerivativeSource, inputs: usize) -> Result<(), 
 }
 
 /// Whether a filter with these barriers can allow for errors, and tells the barriers.
-pub(super) fn check_all(
-    slots: &mut [BarrierSlot],
-    sampling: Sampling,
-    delay: f64,
-    inputs: usize,
-) -> Result<(), Error> {
+pub(super) fn check_all(slots: &mut [BarrierSlot], sampling: Sampling, delay: f64) -> Result<(), Error> {
     let refuse = |message: String| Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message));
     if sampling == Sampling::Pointwise {
         return refuse("needs the prediction over the period, the sampling is pointwise".into());
@@ -137,7 +135,7 @@ pub(super) fn check_all(
             return refuse("needs a method that allows for errors, such as the reference profile".into())
                 .map_err(named);
         }
-        check(&*slot.source, inputs).map_err(named)?;
+        check(&*slot.source).map_err(named)?;
         slot.exact = false;
     }
     Ok(())

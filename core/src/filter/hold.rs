@@ -10,7 +10,8 @@
 //! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
 
 use crate::MAX_RELATIVE_DEGREE;
-use crate::lie::{Ahead, DerivativeSource};
+use crate::elementary;
+use crate::lie::{Ahead, Predict};
 
 /// Parts of the first walk.
 const FEWEST: usize = 4;
@@ -53,7 +54,8 @@ impl Lowest {
 
 /// The path of h under one held input.
 pub(super) struct Hold<'a> {
-    pub(super) source: &'a dyn DerivativeSource,
+    /// `None` where the source cannot predict.
+    pub(super) source: Option<&'a dyn Predict>,
     pub(super) t: f64,
     pub(super) x: &'a [f64],
     pub(super) u: &'a [f64],
@@ -65,9 +67,10 @@ impl Hold<'_> {
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
         let (mut coarse, mut fine) = ([Node::ZERO; MOST + 1], [Node::ZERO; MOST + 1]);
         let mut parts = FEWEST;
-        self.walk([from, to], scratch, &mut coarse[..=parts])?;
+        let source = self.source?;
+        self.walk(source, [from, to], scratch, &mut coarse[..=parts]);
         loop {
-            self.walk([from, to], scratch, &mut fine[..=2 * parts])?;
+            self.walk(source, [from, to], scratch, &mut fine[..=2 * parts]);
             let mut differ = 0.0;
             for (a, b) in coarse[..=parts].iter().zip(fine.iter().step_by(2)) {
                 // Not `max`, which would drop not-a-number.
@@ -85,46 +88,47 @@ impl Hold<'_> {
             if sure.h >= 0.0 || seen.h < 0.0 || parts == MOST {
                 return Some(sure);
             }
-            std::mem::swap(&mut coarse, &mut fine);
+            core::mem::swap(&mut coarse, &mut fine);
         }
     }
 
     /// h⁽⁰⁾ … h⁽ⁿ⁾ at an instant (s after the sample); `None` where the source cannot predict.
     pub(super) fn derivatives(&self, at: f64) -> Option<[f64; MAX_RELATIVE_DEGREE + 1]> {
-        self.ahead(self.x, 0.0, at).map(|ahead| ahead.value)
+        self.source.map(|source| self.ahead(source, self.x, 0.0, at).value)
     }
 
     /// Reads η and η̇ at `from`, `to` and between them.
-    fn walk(&self, [from, to]: [f64; 2], x: &mut [f64], nodes: &mut [Node]) -> Option<()> {
+    fn walk(&self, source: &dyn Predict, [from, to]: [f64; 2], x: &mut [f64], nodes: &mut [Node]) {
         x.copy_from_slice(self.x);
         let parts = nodes.len() - 1;
         let mut at = 0.0;
         if from > 0.0 {
             for k in 1..=parts {
                 let next = instant([0.0, from], k, parts);
-                self.source.predict(x, self.u, next - at).then_some(())?;
+                source.flow(x, self.u, next - at);
                 at = next;
             }
         }
-        nodes[0] = self.node(x, at)?;
+        nodes[0] = self.node(source, x, at);
         for (k, node) in nodes.iter_mut().enumerate().skip(1) {
             let next = instant([from, to], k, parts);
-            self.source.predict(x, self.u, next - at).then_some(())?;
+            source.flow(x, self.u, next - at);
             at = next;
-            *node = self.node(x, at)?;
+            *node = self.node(source, x, at);
         }
-        Some(())
     }
 
     /// η and η̇ at the instant `at`, at which the state is `x`.
-    fn node(&self, x: &[f64], at: f64) -> Option<Node> {
-        self.ahead(x, at, 0.0).map(|ahead| Node { at, h: ahead.value[0], slope: ahead.value[1] })
+    fn node(&self, source: &dyn Predict, x: &[f64], at: f64) -> Node {
+        let ahead = self.ahead(source, x, at, 0.0);
+        Node { at, h: ahead.value[0], slope: ahead.value[1] }
     }
 
     /// Derivatives of h `later` s after the instant `at`, at which the state is `x`.
-    fn ahead(&self, x: &[f64], at: f64, later: f64) -> Option<Ahead> {
+    fn ahead(&self, source: &dyn Predict, x: &[f64], at: f64, later: f64) -> Ahead {
         let mut ahead = Ahead::ZERO;
-        self.source.ahead(self.t + at, x, self.u, later, &mut ahead).then_some(ahead)
+        source.ahead(self.t + at, x, self.u, later, &mut ahead);
+        ahead
     }
 }
 
@@ -161,7 +165,7 @@ fn dip(a: Node, b: Node) -> Lowest {
     // a.h + left s + c s² + d s³ for s in [0, 1].
     let (c, d) = (3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise);
     let mut lowest = Lowest { h: a.h, at: a.at }.or(Lowest { h: b.h, at: b.at });
-    let root = (c * c - 3.0 * d * left).max(0.0).sqrt();
+    let root = elementary::sqrt((c * c - 3.0 * d * left).max(0.0));
     // The two zeros of the slope, in the form that does not cancel.
     let sum = -(c + root.copysign(c));
     for s in [sum / (3.0 * d), left / sum] {

@@ -1,8 +1,11 @@
 //! Dynamic extension inside the filter: an integrator whose state is commanded and not measured.
 
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
 use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::DerivativeSource;
+use crate::lie::{DerivativeSource, Direction};
 use crate::qp::Bounds;
 
 /// A filter with an integrator between it and its plant. The filter inside is one of a plant whose state
@@ -45,6 +48,7 @@ pub struct IntegratedFilter {
 
 /// The input that an [`IntegratedFilter`] integrates.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Integration {
     /// The number of the filter's state that is integrated, counted from 0.
     pub state: usize,
@@ -52,8 +56,10 @@ pub struct Integration {
     pub input: usize,
     /// Least and largest value of the state, in its unit; ±infinity where there is none. The value begins with the number
     /// nearest 0 within them.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub limits: [f64; 2],
     /// How fast the value follows the wish for it, 1/s, finite, > 0.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
 }
 
@@ -194,20 +200,22 @@ impl IntegratedFilter {
     /// As for [`Self::step`]; a direction that is not finite.
     pub fn differentiate(
         &mut self,
-        (t, hold): (f64, f64),
-        [x, dx]: [&[f64]; 2],
-        [u_ref, du_ref]: [&[f64]; 2],
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
         self.begin(hold, x, u_ref)?;
-        length("dx", dx.len(), x.len())?;
-        length("du_ref", du_ref.len(), u_ref.len())?;
+        length("dx", direction.x.len(), x.len())?;
+        length("du_ref", direction.u.len(), u_ref.len())?;
         let Integration { state, input, gain, .. } = self.of;
-        insert(&mut self.x[1], dx, state, 0.0);
-        self.u_ref[1].copy_from_slice(du_ref);
+        insert(&mut self.x[1], direction.x, state, 0.0);
+        self.u_ref[1].copy_from_slice(direction.u);
         self.u_ref[1][input] *= gain.min(1.0 / hold);
         let ([x, dx], [u_ref, du_ref]) = (&self.x, &self.u_ref);
-        let unknown = self.filter.differentiate(t, [x, dx], [u_ref, du_ref], out)?;
+        let unknown = self.filter.differentiate(t, x, u_ref, Direction { x: dx, u: du_ref }, out)?;
         out.u[input] *= hold / 2.0;
         Ok(unknown)
     }

@@ -31,6 +31,9 @@ pub use sampling::Sampling;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 pub use slot::{Begin, End, Strictness};
 
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 use crate::error::{Error, ErrorKind, length, positive};
@@ -41,15 +44,22 @@ use search::Requirement;
 use slot::BarrierSlot;
 
 /// The memory of a filter between samples: one promise per barrier, and the times that [`Sampling`] needs.
+///
+/// With the feature `serde` it can be written to a file, bit for bit (serde_json needs its feature `float_roundtrip` for
+/// that). Infinities are words in formats for people, as JSON has none. [`SafetyFilter::restore`] checks what is read.
 #[derive(Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FilterState {
     /// Promises, in the order of the barriers.
     pub barriers: Vec<FixedTimeState>,
     /// Time of the last sample with valid inputs, in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time: Option<f64>,
     /// The measured sampling period in s, under [`Sampling::Measured`] from the second sample on.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: Option<f64>,
     /// The input handed out at [`Self::time`]; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub input: [f64; MAX_INPUTS],
 }
 
@@ -151,7 +161,7 @@ impl SafetyFilter {
     /// ```
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        std::mem::swap(&mut self.state, &mut self.workspace.next);
+        core::mem::swap(&mut self.state, &mut self.workspace.next);
         Ok(&self.workspace.report)
     }
 
@@ -177,7 +187,8 @@ impl SafetyFilter {
         &self.state
     }
 
-    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then.
+    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then. The numbers of a
+    /// state from elsewhere are taken as they are. Wrong ones break promises; the input stays finite and within its bounds.
     ///
     /// # Errors
     ///
@@ -248,11 +259,11 @@ impl SafetyFilter {
     /// No such barrier; a source of other dimensions or another relative degree.
     pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
         let dims = (self.state_dim, self.input_dim);
-        let (exact, count) = (self.errors.is_exact(), dims.1);
+        let exact = self.errors.is_exact();
         let slot = self.slot(index)?;
         let named = |e: Error| e.within(&slot.name);
         if !exact {
-            errors::check(&*source, count).map_err(named)?;
+            errors::check(&*source).map_err(named)?;
         }
         length("x", source.state_dim(), dims.0).map_err(named)?;
         length("u", source.input_dim(), dims.1).map_err(named)?;

@@ -5,7 +5,8 @@ use super::hold::{Hold, Lowest};
 use super::search::Requirement;
 use super::{FixedTimeState, Phase, SAME_PERIOD};
 use crate::convergence::sampled::PeriodBound;
-use crate::qp::{self, Row};
+use crate::qp::Row;
+use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// The course of h until the next sample, as the derivatives at a sample foresee it.
@@ -61,7 +62,7 @@ impl Outlook<'_> {
             _ => return None,
         };
         let h = self.drift[0];
-        let highest = self.drift[self.n] + qp::dot(normal, held.u);
+        let highest = self.drift[self.n] + dot(normal, held.u);
         // Far enough from the edge the model need not be asked. With n = 1 a set that moves faster than the samples
         // shows in no derivative that is known here; a turn by radians shows where the hold ends.
         let is_clear = || {

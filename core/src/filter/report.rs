@@ -1,7 +1,11 @@
 //! The report of a step.
 
+use alloc::vec::Vec;
+
 use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
-use crate::qp::{Active, Constraint, Row, Solver, dot};
+use crate::elementary;
+use crate::qp::{Active, Constraint, Row, Solver};
+use crate::scalar::dot;
 
 /// Part of the deadline without progress in [`BarrierReport::deadlocked`].
 const DEADLOCK_TIME: f64 = 0.1;
@@ -9,6 +13,8 @@ const DEADLOCK_TIME: f64 = 0.1;
 /// The end of a step, and so the meaning of the returned input. The numbers are stable: they leave the
 /// library as the FMU's `status`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 #[repr(u8)]
 pub enum Status {
@@ -82,24 +88,30 @@ impl Status {
 
 /// One barrier's part of a [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct BarrierReport {
     /// h now, in its own unit; not a number where the state is not.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub h: f64,
     /// The phase of the barrier's promise.
     pub phase: Phase,
     /// The lower bound on h that the constraint promises at this time, in the unit of h.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub profile: f64,
     /// Time to the deadline in s, 0 from the deadline on.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time_left: f64,
     /// Whether h ≥ 0 has been reached since the anchor.
     pub arrived: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival_time: Option<f64>,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
     /// phase, and every step since then was satisfied.
     pub guaranteed: bool,
     /// μ in force since the anchor, `[h]`: the settings' margin and the expected cost of held inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Whether the configured method could not be used from the anchor and another took its place
     /// ([`SafetyFilter::refusal`](super::SafetyFilter::refusal) says why).
@@ -116,6 +128,7 @@ pub struct BarrierReport {
     /// ([`Report::predicted`]), its linearisation at the returned u.
     pub row: Row,
     /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
     /// Steps in a row that have not met the constraint, this one included.
     pub unmet_steps: u32,
@@ -131,6 +144,7 @@ pub struct BarrierReport {
     /// Expected fall of h below its promise within the period because the input is held, `[h]`: the loss that
     /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not look
     /// over the period.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub sampling_loss: f64,
 }
 
@@ -197,9 +211,11 @@ impl BarrierReport {
 
 /// The report of a step.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Report {
     /// Time of the sample in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time: f64,
     /// The end of the step.
     pub status: Status,
@@ -209,6 +225,7 @@ pub struct Report {
     /// the filter's state: a step is faster where the same rows and bounds are active as in the one before.
     pub iterations: u32,
     /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: f64,
     /// Whether the constraint was enforced over the period, with the state at its end predicted by the
     /// model; false also where a source cannot predict.
@@ -251,7 +268,8 @@ impl Report {
                 let Constraint::Row(row) = active.constraint else { continue };
                 let j = barrier(row);
                 let other = &self.barriers[j].row.normal;
-                let cosine = dot(&normal, other) / (dot(&normal, &normal) * dot(other, other)).sqrt();
+                let cosine =
+                    dot(&normal, other) / elementary::sqrt(dot(&normal, &normal) * dot(other, other));
                 if j != i && cosine < worst {
                     (worst, blocked_by) = (cosine, Some(j));
                 }

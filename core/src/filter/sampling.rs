@@ -8,6 +8,8 @@ use crate::error::{Error, positive};
 
 /// The account that a filter takes of inputs held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Sampling {
     /// None: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs,

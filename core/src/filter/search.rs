@@ -31,6 +31,7 @@ mod wide;
 use super::errors::{MeasurementErrors, Uncertainty};
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::{PeriodBound, Weighted};
+use crate::elementary;
 use crate::lie::Ahead;
 use crate::qp::{
     Bounds, Constraint, Enforcement, Outcome, Problem, Row, RowSet, Solution, Solver, Workspace,
@@ -250,7 +251,7 @@ impl PeriodProblem<'_> {
     }
 
     fn distance(&self, u: &[f64]) -> f64 {
-        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r))
+        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r))
     }
 
     /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
@@ -277,8 +278,8 @@ impl PeriodProblem<'_> {
     fn linearised(&self, requirement: &Requirement, u: &[f64]) -> Option<(Row, f64)> {
         let (slot, mut ahead) = (&self.slots[requirement.barrier], Ahead::ZERO);
         let x = &slot.now.from[..];
-        let known = slot.source.ahead(self.t, x, u, requirement.ahead, &mut ahead);
-        if !known || !ahead.is_finite() {
+        slot.source.predict()?.ahead(self.t, x, u, requirement.ahead, &mut ahead);
+        if !ahead.is_finite() {
             return None;
         }
         // A row on h⁽ⁿ⁾, as the pointwise one.
@@ -334,9 +335,7 @@ impl PeriodProblem<'_> {
         let slot = &self.slots[requirement.barrier];
         let x = &slot.now.from;
         let states = x.len();
-        if states > STATES {
-            return 0.0;
-        }
+        let Some(source) = slot.source.predict().filter(|_| states <= STATES) else { return 0.0 };
         let mut moved = [0.0; STATES];
         for (i, (moved, x)) in moved.iter_mut().zip(x).enumerate() {
             let part = if i % 2 == 0 { PART } else { -PART };
@@ -345,12 +344,12 @@ impl PeriodProblem<'_> {
         let mut ahead = [Ahead::ZERO; 2];
         let [here, there] = &mut ahead;
         let (later, duration) = (self.t * (1.0 + 0.7 * PART), requirement.ahead);
-        let known = slot.source.ahead(self.t, x, u, duration, here)
-            && slot.source.ahead(later, &moved[..states], u, duration, there);
+        source.ahead(self.t, x, u, duration, here);
+        source.ahead(later, &moved[..states], u, duration, there);
         let (n, weights) = (slot.degree(), &requirement.bound.weights);
         let change = |k: usize| (weights[k] * (there.value[k] - here.value[k])).abs() / PART;
         let size = (0..n).map(change).sum::<f64>() / requirement.divisor(n);
-        if known && size.is_finite() { size } else { 0.0 }
+        if size.is_finite() { size } else { 0.0 }
     }
 
     /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.
@@ -364,20 +363,20 @@ impl PeriodProblem<'_> {
         for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
             // The axis without its part along u − u_ref.
             let along = (u[axis] - self.u_ref[axis]) / far;
-            let mut aside: [f64; MAX_INPUTS] = std::array::from_fn(|j| {
+            let mut aside: [f64; MAX_INPUTS] = core::array::from_fn(|j| {
                 if j < m {
                     f64::from(u8::from(j == axis)) - along * (u[j] - self.u_ref[j]) / far
                 } else {
                     0.0
                 }
             });
-            let size = aside.iter().fold(0.0, |s: f64, v| s.hypot(*v));
+            let size = aside.iter().fold(0.0, |s: f64, v| elementary::hypot(s, *v));
             for (j, v) in aside[..m].iter_mut().enumerate() {
                 *v = self.bounds.clamp(j, u[j] + sign * ASIDE * far * *v / size);
             }
             let aside = &aside[..m];
             if self.linearise(aside, RowSet::of(i), at).is_some() {
-                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| s.hypot(*a));
+                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| elementary::hypot(s, *a));
                 found |= at.rows[i].slack(aside) > (self.distance(aside) - far) * normal;
             }
         }
@@ -462,7 +461,7 @@ impl PeriodProblem<'_> {
         found: &mut Candidate,
     ) -> bool {
         let m = u.len();
-        let from: [f64; MAX_INPUTS] = std::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
+        let from: [f64; MAX_INPUTS] = core::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
         let (violation, mut part) = (found.violation, 1.0);
         for _ in 0..=HALVINGS {
             for i in 0..m {

@@ -11,7 +11,7 @@
 //!
 //! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft
 //! row at its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with
-//! one more direction ([`ahead_along`](crate::lie::DerivativeSource::ahead_along)) and the derivative of the promise
+//! one more direction ([`Directional`](crate::lie::Directional)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
 //!
 //! # References
@@ -19,40 +19,52 @@
 //! A. V. Fiacco, *Introduction to Sensitivity and Stability Analysis in Nonlinear Programming*, Academic
 //! Press 1983, theorem 3.2.2.
 
-use std::fmt;
+use alloc::vec::Vec;
+use core::fmt;
 
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
 use crate::convergence::BoundDerivative;
 use crate::convergence::sampled::{PeriodBound, Weighted};
+use crate::elementary;
 use crate::error::{Error, finite, length};
-use crate::lie::{Ahead, Derivatives};
+use crate::lie::{Ahead, Derivatives, Direction};
 use crate::qp::sensitivity::Equations;
-use crate::qp::{self, Constraint, Enforcement, Problem, Solver, dot};
+use crate::qp::{self, Constraint, Enforcement, Problem, Solver};
+use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SampleDerivative {
     /// Derivative of the returned input, unit of u over that of the direction; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub u: [f64; MAX_INPUTS],
     /// Derivatives of the reports, in the order of the barriers.
     pub barriers: Vec<BarrierDerivative>,
     /// State, direction and zeros.
+    #[cfg_attr(feature = "serde", serde(skip))]
     scratch: [Vec<f64>; 3],
 }
 
 /// The derivative of those numbers of a [`BarrierReport`](super::BarrierReport) that vary continuously with the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BarrierDerivative {
     /// Derivative of [`BarrierReport::h`](super::BarrierReport::h).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub h: f64,
     /// Derivative of [`BarrierReport::profile`](super::BarrierReport::profile).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub profile: f64,
     /// Derivative of [`BarrierReport::margin`](super::BarrierReport::margin).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Derivative of [`BarrierReport::slack`](super::BarrierReport::slack).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
     /// Derivative of [`BarrierReport::sampling_loss`](super::BarrierReport::sampling_loss).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub sampling_loss: f64,
 }
 
@@ -63,7 +75,7 @@ pub enum NoDerivative {
     /// Its [`DerivativeSource`](crate::lie::DerivativeSource) does not give derivatives along a direction.
     Source(usize),
     /// Its promise is anchored at this sample along a profile of one's own that does not give its
-    /// [derivative](crate::convergence::profile::Profile::along).
+    /// [derivative](crate::convergence::profile::Profile::directional).
     Profile(usize),
     /// Its constraint is one of one's own ([`Condition`](crate::convergence::condition::Condition)).
     Condition(usize),
@@ -100,7 +112,7 @@ impl fmt::Display for NoDerivative {
     }
 }
 
-impl std::error::Error for NoDerivative {}
+impl core::error::Error for NoDerivative {}
 
 /// The derivative of one row along the direction.
 #[derive(Clone, Copy)]
@@ -138,8 +150,8 @@ const SAME_INPUT_UNMET: f64 = 1e-6;
 const SATURATED: f64 = 1.0 - 1e-9;
 
 impl SafetyFilter {
-    /// Computes the derivative of what [`Self::peek`] returns along a direction: `state` is x and its direction,
-    /// `reference` is u_ref and its direction. Remembers nothing; the report is that of the sample.
+    /// Computes the derivative of what [`Self::peek`] returns where x and u_ref move along `direction`. Remembers
+    /// nothing; the report is that of the sample.
     ///
     /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
     /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
@@ -162,16 +174,17 @@ impl SafetyFilter {
     /// A slice of the wrong length; a direction that is not finite.
     ///
     /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
     /// # use punctual_reference::plants::PointMass;
     /// let mut filter = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
     /// let mut derivative = SampleDerivative::default();
     /// // Wanted sideways: the row, which is on the x axis, lets it pass. Wanted forwards: it makes up for it.
-    /// for (direction, wanted) in [([0.0, 1.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.0])] {
+    /// for (du_ref, wanted) in [([0.0, 1.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.0])] {
+    ///     let direction = Direction { x: &[0.0; 4], u: &du_ref };
     ///     let unknown =
-    ///         filter.differentiate(0.0, [&[0.0; 4], &[0.0; 4]], [&[0.0; 2], &direction], &mut derivative)?;
+    ///         filter.differentiate(0.0, &[0.0; 4], &[0.0; 2], direction, &mut derivative)?;
     ///     assert_eq!(unknown, None);
     ///     // Over the period of a tenth of a second the disc is a little round.
     ///     assert!((0..2).all(|i| (derivative.u[i] - wanted[i]).abs() < 1e-3), "{:?}", derivative.u);
@@ -181,14 +194,17 @@ impl SafetyFilter {
     pub fn differentiate(
         &mut self,
         t: f64,
-        [x, dx]: [&[f64]; 2],
-        [u_ref, du_ref]: [&[f64]; 2],
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
-        for (name, direction, len) in [("dx", dx, self.state_dim), ("du_ref", du_ref, self.input_dim)] {
-            length(name, direction.len(), len)?;
-            if let Some(i) = direction.iter().position(|v| !v.is_finite()) {
-                finite(&format!("{name}[{}]", i + 1), direction[i])?;
+        for (name, part, len) in
+            [("dx", direction.x, self.state_dim), ("du_ref", direction.u, self.input_dim)]
+        {
+            length(name, part.len(), len)?;
+            if let Some(i) = part.iter().position(|v| !v.is_finite()) {
+                finite(&format!("{name}[{}]", i + 1), part[i])?;
             }
         }
         let mut u = [0.0; MAX_INPUTS];
@@ -204,15 +220,16 @@ impl SafetyFilter {
         if !self.errors.is_exact() {
             return Ok(Some(NoDerivative::MeasurementErrors));
         }
-        Ok(self.along(t, [x, dx], [u_ref, du_ref], u, out).err())
+        Ok(self.directional(t, x, u_ref, u, direction, out).err())
     }
 
-    fn along(
+    fn directional(
         &self,
         t: f64,
-        state: [&[f64]; 2],
-        [u_ref, du_ref]: [&[f64]; 2],
+        x: &[f64],
+        u_ref: &[f64],
         u: &[f64],
+        direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<(), NoDerivative> {
         let SampleDerivative { u: du, barriers, scratch } = out;
@@ -225,7 +242,7 @@ impl SafetyFilter {
         // The derivative of every row at a fixed u.
         let mut row_derivatives = [RowDerivative::NONE; MAX_ROWS];
         for (i, row_derivative) in row_derivatives[..self.slots.len()].iter_mut().enumerate() {
-            (*row_derivative, barriers[i]) = self.row_derivative(i, t, state, u, scratch)?;
+            (*row_derivative, barriers[i]) = self.row_derivative(i, t, x, direction.x, u, scratch)?;
         }
 
         // The active rows of the sample, whichever method found it.
@@ -251,7 +268,7 @@ impl SafetyFilter {
         // The derivative of u: (8) with the active rows, else the direction of u_ref but at bounds.
         let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
-            let mut equations = Equations::new(du_ref);
+            let mut equations = Equations::new(direction.u);
             for active in active {
                 let mut normal = [0.0; MAX_INPUTS];
                 let held = match active.constraint {
@@ -261,7 +278,7 @@ impl SafetyFilter {
                     }
                     Constraint::Row(k) => {
                         let row_derivative = &row_derivatives[k];
-                        let curvature = self.curvature(k, t, state[0], u, scratch)?;
+                        let curvature = self.curvature(k, t, x, u, scratch)?;
                         let row = &rows[k].normal;
                         match enforcement[k] {
                             Enforcement::Soft { penalty }
@@ -288,7 +305,7 @@ impl SafetyFilter {
             }
         } else {
             for i in 0..du.len() {
-                du[i] = if again[i] == u_ref[i] { du_ref[i] } else { 0.0 };
+                du[i] = if again[i] == u_ref[i] { direction.u[i] } else { 0.0 };
             }
         }
 
@@ -307,16 +324,23 @@ impl SafetyFilter {
     }
 
     /// Writes the state from which barrier `i` is held, and its direction, to `scratch`.
-    fn begin(&self, i: usize, [x, dx]: [&[f64]; 2], scratch: &mut [Vec<f64>; 3]) -> Result<(), NoDerivative> {
-        let [from, along, _] = scratch;
+    fn begin(
+        &self,
+        i: usize,
+        x: &[f64],
+        dx: &[f64],
+        scratch: &mut [Vec<f64>; 3],
+    ) -> Result<(), NoDerivative> {
+        let [from, moving, _] = scratch;
         from.clear();
         from.extend_from_slice(x);
-        along.clear();
-        along.extend_from_slice(dx);
-        let acting = self.acting();
-        let known = self.delay <= 0.0
-            || self.slots[i].source.predict_along(from, along, &acting[..self.input_dim], self.delay);
-        if known { Ok(()) } else { Err(NoDerivative::Source(i)) }
+        moving.clear();
+        moving.extend_from_slice(dx);
+        if self.delay > 0.0 {
+            let source = self.slots[i].source.predict_directional().ok_or(NoDerivative::Source(i))?;
+            source.flow_directional(from, moving, &self.acting()[..self.input_dim], self.delay);
+        }
+        Ok(())
     }
 
     /// The derivative of row `i` and of its barrier's report at the fixed input `u`.
@@ -324,16 +348,17 @@ impl SafetyFilter {
         &self,
         i: usize,
         t: f64,
-        state: [&[f64]; 2],
+        x: &[f64],
+        dx: &[f64],
         u: &[f64],
         scratch: &mut [Vec<f64>; 3],
     ) -> Result<(RowDerivative, BarrierDerivative), NoDerivative> {
         let (slot, workspace) = (&self.slots[i], &self.workspace);
-        let held = [u, &[0.0; MAX_INPUTS][..u.len()]];
+        let held = &[0.0; MAX_INPUTS][..u.len()];
         let mut change = Ahead::ZERO;
-        if !slot.source.ahead_along(t, state, held, 0.0, &mut change) {
-            return Err(NoDerivative::Source(i));
-        }
+        let unknown = NoDerivative::Source(i);
+        let source = slot.source.directional().ok_or(unknown)?;
+        source.evaluate_directional(t, x, u, Direction { x: dx, u: held }, &mut change);
         // h, and whether the promise has a derivative at this sample.
         let mut derivative = BarrierDerivative { h: change.value[0], ..BarrierDerivative::default() };
         let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
@@ -348,10 +373,11 @@ impl SafetyFilter {
         }
         // h and its derivatives where the input begins to act.
         let begin = t + self.delay;
-        self.begin(i, state, scratch)?;
-        let [from, along, _] = &*scratch;
-        if self.delay > 0.0 && !slot.source.ahead_along(begin, [from, along], held, 0.0, &mut change) {
-            return Err(NoDerivative::Source(i));
+        self.begin(i, x, dx, scratch)?;
+        let [from, moving, _] = &*scratch;
+        let direction = Direction { x: moving, u: held };
+        if self.delay > 0.0 {
+            source.evaluate_directional(begin, from, u, direction, &mut change);
         }
         let n = slot.source.relative_degree();
         let mut now = Derivatives::ZERO;
@@ -380,16 +406,14 @@ impl SafetyFilter {
         // The row over the period.
         if let Some(period) = period {
             let mut ahead = Ahead::ZERO;
-            let known = slot.source.ahead(begin, from, u, period, &mut ahead)
-                && slot.source.ahead_along(begin, [from, along], held, period, &mut change);
-            if !known {
-                return Err(NoDerivative::Source(i));
-            }
+            slot.source.predict().ok_or(unknown)?.ahead(begin, from, u, period, &mut ahead);
+            let source = slot.source.predict_directional().ok_or(unknown)?;
+            source.ahead_directional(begin, from, u, direction, period, &mut change);
             let bound = &self.slots[i].now.period_bound;
             let moved = weighted(bound, &change, n, u.len(), period);
             let by_weights = sampled.weighted(&ahead.value[..n], &ahead.gradient, u.len(), period);
             row_derivative.slack = moved.value + by_weights.value;
-            row_derivative.normal = std::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
+            row_derivative.normal = core::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
         }
         Ok((row_derivative, derivative))
     }
@@ -412,17 +436,18 @@ impl SafetyFilter {
         let [from, _, zeros] = scratch;
         from.clear();
         from.extend_from_slice(x);
-        if self.delay > 0.0 {
-            source.predict(from, &self.acting()[..u.len()], self.delay);
+        if self.delay > 0.0
+            && let Some(source) = source.predict()
+        {
+            source.flow(from, &self.acting()[..u.len()], self.delay);
         }
+        let directional = source.predict_directional().ok_or(NoDerivative::Source(k))?;
         let mut change = Ahead::ZERO;
         for j in 0..u.len() {
-            let mut direction = [0.0; MAX_INPUTS];
-            direction[j] = 1.0;
-            let held = [u, &direction[..u.len()]];
-            if !source.ahead_along(t + self.delay, [from, zeros], held, report.period, &mut change) {
-                return Err(NoDerivative::Source(k));
-            }
+            let mut axis = [0.0; MAX_INPUTS];
+            axis[j] = 1.0;
+            let direction = Direction { x: zeros, u: &axis[..u.len()] };
+            directional.ahead_directional(t + self.delay, from, u, direction, report.period, &mut change);
             let moved = weighted(bound, &change, source.relative_degree(), u.len(), report.period);
             for i in 0..u.len() {
                 curvature[i][j] = moved.normal[i];
@@ -439,7 +464,7 @@ fn is_anchored(before: &FixedTimeState, after: &FixedTimeState, begin: f64) -> b
 
 /// Whether a soft row has its largest multiplier.
 fn is_saturated(normal: &[f64; MAX_INPUTS], multiplier: f64, penalty: f64) -> bool {
-    multiplier * dot(normal, normal).sqrt() >= SATURATED * penalty
+    multiplier * elementary::sqrt(dot(normal, normal)) >= SATURATED * penalty
 }
 
 /// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖ where
@@ -452,14 +477,14 @@ fn pull_saturated(
     curvature: &[[f64; MAX_INPUTS]; MAX_INPUTS],
 ) {
     let square = dot(row, row);
-    let by = penalty / square.sqrt();
+    let by = penalty / elementary::sqrt(square);
     let turned = |a: &[f64; MAX_INPUTS]| {
         let inside = dot(row, a) / square;
-        std::array::from_fn(|i| by * (a[i] - inside * row[i]))
+        core::array::from_fn(|i| by * (a[i] - inside * row[i]))
     };
     let mut pull = [[0.0; MAX_INPUTS]; MAX_INPUTS];
     for j in 0..MAX_INPUTS {
-        let column: [f64; MAX_INPUTS] = turned(&std::array::from_fn(|i| curvature[i][j]));
+        let column: [f64; MAX_INPUTS] = turned(&core::array::from_fn(|i| curvature[i][j]));
         for i in 0..MAX_INPUTS {
             pull[i][j] = column[i];
         }

@@ -1,5 +1,10 @@
 //! One barrier of a filter: its derivatives, its promise, when that is in force, and the result of a sample for it.
 
+use alloc::borrow::ToOwned;
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use super::errors::{ErrorSlopes, MeasurementErrors};
 use super::hold::Lowest;
 use super::outlook::Outlook;
@@ -9,6 +14,7 @@ use crate::convergence::comparison::Stack;
 use crate::convergence::sampled::PeriodBound;
 use crate::convergence::stay::Means;
 use crate::convergence::{DerivativeBound, FixedTime};
+use crate::elementary;
 use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{Bounds, Enforcement, Row};
 use crate::{MAX_RELATIVE_DEGREE, reach};
@@ -16,6 +22,8 @@ use crate::{MAX_RELATIVE_DEGREE, reach};
 /// The time from which a barrier is enforced. Its deadline counts from the filter's first sample in any case: "be
 /// in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Begin {
     /// From the first sample.
     #[default]
@@ -28,6 +36,8 @@ pub enum Begin {
 
 /// The time until which a barrier is enforced ([`Phase::Released`] from then on).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum End {
     /// For ever.
     #[default]
@@ -40,6 +50,8 @@ pub enum End {
 
 /// The standing of a barrier's constraint where not all can be met within the input bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Strictness {
     /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: keeping safe sets goes before reaching
     /// promised ones.
@@ -135,7 +147,9 @@ impl BarrierSlot {
         let h = now.derivatives.drift[0];
         now.from.copy_from_slice(moment.x);
         if moment.delay > 0.0 {
-            source.predict(&mut now.from, acting, moment.delay);
+            if let Some(source) = source.predict() {
+                source.flow(&mut now.from, acting, moment.delay);
+            }
             source.evaluate(moment.begin, &now.from, &mut now.derivatives);
         }
         h
@@ -169,7 +183,7 @@ impl BarrierSlot {
         let (promise, n) = (&mut promises[index], self.degree());
         let unsure = self.unsure(moment, errors);
         let drift = self.now.derivatives.drift;
-        let lowest: Stack = std::array::from_fn(|k| drift[k] - unsure[k]);
+        let lowest: Stack = core::array::from_fn(|k| drift[k] - unsure[k]);
         let lowest = &lowest[..n];
         self.anchor(promise, moment, lowest);
         let means = self.means(promise, moment, bounds);
@@ -242,7 +256,7 @@ impl BarrierSlot {
                 reach += f64::max(a * bounds.min[i], a * bounds.max[i]);
             }
         }
-        let size = square.sqrt();
+        let size = elementary::sqrt(square);
         promise.gain = promise.gain.max(size);
         let weight = if promise.gain > 0.0 { size / promise.gain } else { 1.0 };
         Means { drift: drift[self.degree()], reach, weight, hold: moment.hold }
@@ -346,7 +360,7 @@ impl BarrierSlot {
         let configured = self.promise.deadline();
         let now = (moment.begin, &*self.now.from);
         let soonest = reach::soonest(&*self.source, now, bounds, HORIZON * configured);
-        let factor = FACTOR * GROWTH.powi(promise.postponed.min(16) as i32);
+        let factor = FACTOR * elementary::powi(GROWTH, promise.postponed.min(16) as i32);
         // Near the set the soonest time tends to zero: never shorter than ten samples.
         let deadline = match soonest {
             Some(soonest) if soonest > 0.0 => (factor * soonest).max(10.0 * moment.period.unwrap_or(0.0)),

@@ -4,6 +4,7 @@ use super::hold::Hold;
 use super::search::{PeriodProblem, Requirement};
 use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace};
 use crate::convergence::{FixedTimeState, Unmet};
+use crate::elementary;
 use crate::error::{Error, length};
 use crate::qp::{Enforcement, Outcome, Problem, Solution};
 use crate::scalar::all_finite;
@@ -163,7 +164,7 @@ impl SafetyFilter {
             self.look(moment, u);
             // An answer that is too far out does not count: an input that turns the plant by many radians makes any
             // prediction true.
-            let distance = u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| d.hypot(v - r));
+            let distance = u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r));
             let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
             if self.workspace.requirements.len() > listed && !met {
                 // That instant cannot be had as well: solve without it, and the report says so.
@@ -233,7 +234,7 @@ impl SafetyFilter {
     fn look(&mut self, moment: &Moment, u: &[f64]) {
         let Workspace { next, scratch, .. } = &mut self.workspace;
         for (slot, promise) in self.slots.iter_mut().zip(&next.barriers) {
-            let held = Hold { source: &*slot.source, t: moment.begin, x: &slot.now.from, u };
+            let held = Hold { source: slot.source.predict(), t: moment.begin, x: &slot.now.from, u };
             let holds = [moment.hold, moment.long];
             slot.now.lowest = match slot.now.in_force {
                 true => slot.outlook().look(promise, &held, &slot.now.row.normal, holds, scratch),
@@ -315,7 +316,7 @@ impl SafetyFilter {
     pub(super) fn acting(&self) -> [f64; MAX_INPUTS] {
         match self.state.time {
             Some(_) => self.state.input,
-            None => std::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
+            None => core::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
         }
     }
 }

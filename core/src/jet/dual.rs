@@ -1,9 +1,10 @@
 //! Dual numbers: a value and its first derivatives along `M` directions.
 
-use std::array::from_fn;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::array::from_fn;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
+use crate::elementary;
 use crate::scalar::Scalar;
 
 /// `v + Σ d_m ε_m` with `ε_i ε_j = 0`: a value and its gradient.
@@ -127,34 +128,37 @@ impl<const M: usize> Scalar for Dual<M> {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        let root = self.value.sqrt();
+        let root = elementary::sqrt(self.value);
         self.chain(root, 0.5 / root)
     }
     #[inline]
     fn exp(self) -> Self {
-        let value = self.value.exp();
+        let value = elementary::exp(self.value);
         self.chain(value, value)
     }
     #[inline]
     fn ln(self) -> Self {
-        self.chain(self.value.ln(), 1.0 / self.value)
+        self.chain(elementary::ln(self.value), 1.0 / self.value)
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = self.value.sin_cos();
+        let (sin, cos) = elementary::sin_cos(self.value);
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
     #[inline]
     fn atan(self) -> Self {
-        self.chain(self.value.atan(), 1.0 / (1.0 + self.value * self.value))
+        self.chain(elementary::atan(self.value), 1.0 / (1.0 + self.value * self.value))
     }
     #[inline]
     fn tanh(self) -> Self {
-        let value = self.value.tanh();
+        let value = elementary::tanh(self.value);
         self.chain(value, 1.0 - value * value)
     }
     #[inline]
     fn powf(self, exponent: f64) -> Self {
-        self.chain(self.value.powf(exponent), exponent * self.value.powf(exponent - 1.0))
+        self.chain(
+            elementary::powf(self.value, exponent),
+            exponent * elementary::powf(self.value, exponent - 1.0),
+        )
     }
 }

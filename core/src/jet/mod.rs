@@ -18,19 +18,19 @@ pub use taylor::Taylor;
 /// The arithmetic that follows from `+ − × ÷` on two values and their `f64` mixtures.
 macro_rules! derived_operators {
     ([$($generics:tt)*] $type:ty) => {
-        impl<$($generics)*> std::ops::AddAssign for $type {
+        impl<$($generics)*> core::ops::AddAssign for $type {
             #[inline]
             fn add_assign(&mut self, other: Self) { *self = *self + other; }
         }
-        impl<$($generics)*> std::ops::SubAssign for $type {
+        impl<$($generics)*> core::ops::SubAssign for $type {
             #[inline]
             fn sub_assign(&mut self, other: Self) { *self = *self - other; }
         }
-        impl<$($generics)*> std::ops::MulAssign for $type {
+        impl<$($generics)*> core::ops::MulAssign for $type {
             #[inline]
             fn mul_assign(&mut self, other: Self) { *self = *self * other; }
         }
-        impl<$($generics)*> std::ops::DivAssign for $type {
+        impl<$($generics)*> core::ops::DivAssign for $type {
             #[inline]
             fn div_assign(&mut self, other: Self) { *self = *self / other; }
         }

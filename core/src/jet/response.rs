@@ -13,8 +13,8 @@
 //! gradient needs the coefficients below k of the other series only. The same numbers as
 //! `Taylor<Dual<M>, K>` with a constant first coefficient, without computing the zeros.
 
-use std::array::from_fn;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::array::from_fn;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::{Taylor, derived_operators};
 use crate::scalar::Scalar;

@@ -1,6 +1,6 @@
 //! Numbers of any kind with their derivative along one direction.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
 use crate::scalar::Scalar;
@@ -12,21 +12,21 @@ pub struct Tangent<C> {
     /// The value.
     pub value: C,
     /// Its derivative along the direction.
-    pub along: C,
+    pub directional: C,
 }
 
 impl<C: Scalar> Tangent<C> {
     /// `φ(self)` from `φ`'s value and slope at `self.value` (the chain rule).
     #[inline]
     fn chain(self, value: C, slope: C) -> Self {
-        Self { value, along: self.along * slope }
+        Self { value, directional: self.directional * slope }
     }
 }
 
 impl<C: Scalar> From<f64> for Tangent<C> {
     #[inline]
     fn from(value: f64) -> Self {
-        Self { value: C::from(value), along: C::zero() }
+        Self { value: C::from(value), directional: C::zero() }
     }
 }
 
@@ -34,7 +34,7 @@ impl<C: Scalar> Neg for Tangent<C> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        Self { value: -self.value, along: -self.along }
+        Self { value: -self.value, directional: -self.directional }
     }
 }
 
@@ -42,7 +42,7 @@ impl<C: Scalar> Add for Tangent<C> {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        Self { value: self.value + other.value, along: self.along + other.along }
+        Self { value: self.value + other.value, directional: self.directional + other.directional }
     }
 }
 
@@ -50,7 +50,7 @@ impl<C: Scalar> Sub for Tangent<C> {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
-        Self { value: self.value - other.value, along: self.along - other.along }
+        Self { value: self.value - other.value, directional: self.directional - other.directional }
     }
 }
 
@@ -58,7 +58,10 @@ impl<C: Scalar> Mul for Tangent<C> {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
-        Self { value: self.value * other.value, along: self.along * other.value + self.value * other.along }
+        Self {
+            value: self.value * other.value,
+            directional: self.directional * other.value + self.value * other.directional,
+        }
     }
 }
 
@@ -67,7 +70,7 @@ impl<C: Scalar> Div for Tangent<C> {
     #[inline]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
-        Self { value, along: (self.along - value * other.along) / other.value }
+        Self { value, directional: (self.directional - value * other.directional) / other.value }
     }
 }
 
@@ -91,7 +94,7 @@ impl<C: Scalar> Mul<f64> for Tangent<C> {
     type Output = Self;
     #[inline]
     fn mul(self, other: f64) -> Self {
-        Self { value: self.value * other, along: self.along * other }
+        Self { value: self.value * other, directional: self.directional * other }
     }
 }
 
@@ -99,7 +102,7 @@ impl<C: Scalar> Div<f64> for Tangent<C> {
     type Output = Self;
     #[inline]
     fn div(self, other: f64) -> Self {
-        Self { value: self.value / other, along: self.along / other }
+        Self { value: self.value / other, directional: self.directional / other }
     }
 }
 
@@ -173,23 +176,23 @@ mod tests {
     #[test]
     fn first_derivatives_agree_and_second_ones_are_symmetric() {
         let (a, b) = (0.7, 1.3);
-        let plain = |value, along| Tangent { value, along };
+        let plain = |value, directional| Tangent { value, directional };
         let dual = |value, along| Dual { value, gradient: [along] };
         let found = operations(plain(a, 0.4), plain(b, -0.2));
         let wanted = operations(dual(a, 0.4), dual(b, -0.2));
         for (i, (found, wanted)) in found.iter().zip(wanted).enumerate() {
             assert_eq!(found.value, wanted.value, "operation {i}");
             // Of order 1, computed in another order.
-            assert!((found.along - wanted.gradient[0]).abs() < 1e-14, "operation {i}");
+            assert!((found.directional - wanted.gradient[0]).abs() < 1e-14, "operation {i}");
         }
         // The directions p and q, each inside and outside.
         let (p, q) = ([0.4, -0.2], [0.1, 0.6]);
         let both = |inner: [f64; 2], outer: [f64; 2]| {
             let number = |v: f64, i: usize| Tangent {
                 value: Dual { value: v, gradient: [inner[i]] },
-                along: Dual { value: outer[i], gradient: [0.0] },
+                directional: Dual { value: outer[i], gradient: [0.0] },
             };
-            operations(number(a, 0), number(b, 1)).map(|s| s.along.gradient[0])
+            operations(number(a, 0), number(b, 1)).map(|s| s.directional.gradient[0])
         };
         for (i, (pq, qp)) in both(p, q).into_iter().zip(both(q, p)).enumerate() {
             assert!((pq - qp).abs() < 1e-13 && pq.is_finite(), "operation {i}: {pq} {qp}");

@@ -15,8 +15,8 @@
 //! A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, chapter 13
 //! (doi:10.1137/1.9780898717761).
 
-use std::array::from_fn;
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use core::array::from_fn;
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
 use crate::scalar::Scalar;

@@ -14,8 +14,9 @@
 
 use nalgebra::SVector;
 
+use super::Direction;
 use crate::barrier::Barrier;
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, rk4};
 use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
@@ -69,15 +70,9 @@ where
     S: Scalar,
 {
     let dt = duration / steps as f64;
-    let moved =
-        |x: &SVector<S, NX>, k: &SVector<S, NX>, s: f64| SVector::<S, NX>::from_fn(|i, _| x[i] + k[i] * s);
     let mut x = *x;
     for _ in 0..steps {
-        let k1 = plant.derivative(&x, u);
-        let k2 = plant.derivative(&moved(&x, &k1, dt / 2.0), u);
-        let k3 = plant.derivative(&moved(&x, &k2, dt / 2.0), u);
-        let k4 = plant.derivative(&moved(&x, &k3, dt), u);
-        x = SVector::from_fn(|i, _| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0));
+        x = rk4(|x| plant.derivative(x, u), &x, dt);
     }
     x
 }
@@ -126,32 +121,34 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     out.write((0..K).map(|k| h.derivative(k)));
 }
 
-/// Writes the derivative of what [`evaluate`] writes, along the direction (`dx`, `du`) of state and input.
+/// Writes the derivative of what [`evaluate`] writes, along `direction`.
 pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),
     time: (f64, f64),
-    [x, dx]: [&[f64]; 2],
-    [u, du]: [&[f64]; 2],
+    x: &[f64],
+    u: &[f64],
+    direction: Direction,
     out: &mut Ahead,
 ) where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
+    let Direction { x: dx, u: du } = direction;
     type Second<const NU: usize> = Tangent<Dual<NU>>;
     let u = SVector::<Second<NU>, NU>::from_fn(|i, _| Tangent {
         value: Dual::variable(u[i], i),
-        along: Dual::from(du[i]),
+        directional: Dual::from(du[i]),
     });
     let x = SVector::<Second<NU>, NX>::from_fn(|i, _| Tangent {
         value: Dual::from(x[i]),
-        along: Dual::from(dx[i]),
+        directional: Dual::from(dx[i]),
     });
     let h: Taylor<_, K> = series((plant, barrier), time, &x, &u);
-    out.write((0..K).map(|k| h.derivative(k).along));
+    out.write((0..K).map(|k| h.derivative(k).directional));
 }
 
 /// Moves `x` by `duration` ≥ 0 seconds under the held input `u`, and the direction `dx` with it.
-pub(super) fn predict_along<P, const NX: usize, const NU: usize>(
+pub(super) fn flow_directional<P, const NX: usize, const NU: usize>(
     plant: &P,
     x: &mut [f64],
     dx: &mut [f64],
@@ -160,10 +157,10 @@ pub(super) fn predict_along<P, const NX: usize, const NU: usize>(
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let from = SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], along: dx[i] });
+    let from = SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], directional: dx[i] });
     let held = SVector::<Tangent<f64>, NU>::from_fn(|i, _| Tangent::from(u[i]));
     let to = flow(plant, &from, &held, duration, SUBSTEPS);
     for i in 0..NX {
-        (x[i], dx[i]) = (to[i].value, to[i].along);
+        (x[i], dx[i]) = (to[i].value, to[i].directional);
     }
 }

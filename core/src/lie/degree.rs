@@ -9,13 +9,15 @@
 //! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of
 //! the sample are asked as well.
 
-use std::array::from_fn;
+use alloc::vec::Vec;
+use core::array::from_fn;
 
 use nalgebra::SVector;
 
 use super::barrier_series;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
+use crate::elementary;
 use crate::error::{Error, ErrorKind, RelativeDegree};
 use crate::jet::Response;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
@@ -227,10 +229,10 @@ fn orders(c: &Coefficients) -> Option<Orders> {
     // Gradients of different orders have different units; the time in which the changes of h along the
     // drift change themselves makes them comparable. (Not h itself: it may have any offset.)
     let changes = || (1..K).filter(|&k| c[k].0 != 0.0);
-    let ratio = |j: usize, k: usize| (c[j].0 / c[k].0).abs().powf(1.0 / (k - j) as f64);
+    let ratio = |j: usize, k: usize| elementary::powf((c[j].0 / c[k].0).abs(), 1.0 / (k - j) as f64);
     let time = changes().next().and_then(|j| changes().skip(1).map(|k| ratio(j, k)).reduce(f64::min));
     let time = time.map_or(1.0, |time| time.clamp(1e-6, 1e6));
-    let scaled = |k: usize, i: usize| c[k].1[i].abs() * time.powi(k as i32);
+    let scaled = |k: usize, i: usize| c[k].1[i].abs() * elementary::powi(time, k as i32);
     let mut found = [None; MAX_INPUTS];
     for (i, found) in found.iter_mut().enumerate() {
         let largest = (0..K).map(|k| scaled(k, i)).fold(0.0, f64::max);
@@ -245,7 +247,7 @@ struct Numbers(u64);
 impl Numbers {
     /// Between 0.01 and 100.
     fn size(&mut self) -> f64 {
-        10_f64.powf(4.0 * self.unit() - 2.0)
+        elementary::powf(10.0, 4.0 * self.unit() - 2.0)
     }
 
     fn unit(&mut self) -> f64 {

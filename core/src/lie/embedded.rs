@@ -1,6 +1,9 @@
 //! A source of derivatives that knows some of the filter's states.
 
-use super::{Ahead, DerivativeSource, Derivatives};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, Predict, PredictDirectional};
 use crate::error::{Error, ErrorKind, length};
 
 /// Most states that a picked source may have.
@@ -13,9 +16,19 @@ struct Embedded {
 }
 
 impl Embedded {
-    fn picked(&self, x: &[f64], buffer: &mut [f64; MAX_PICKED]) {
-        for (slot, &pick) in buffer.iter_mut().zip(&self.picks) {
+    /// The source's own states of all, and zeros after them.
+    fn picked(&self, x: &[f64]) -> [f64; MAX_PICKED] {
+        let mut own = [0.0; MAX_PICKED];
+        for (slot, &pick) in own.iter_mut().zip(&self.picks) {
             *slot = x[pick];
+        }
+        own
+    }
+
+    /// Writes the source's own states into all.
+    fn put_back(&self, own: &[f64; MAX_PICKED], x: &mut [f64]) {
+        for (&pick, value) in self.picks.iter().zip(own) {
+            x[pick] = *value;
         }
     }
 }
@@ -34,61 +47,69 @@ impl DerivativeSource for Embedded {
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        let mut own = [0.0; MAX_PICKED];
-        self.picked(x, &mut own);
-        self.source.evaluate(t, &own[..self.picks.len()], out);
+        self.source.evaluate(t, &self.picked(x)[..self.picks.len()], out);
     }
 
-    fn predict(&self, x: &mut [f64], u: &[f64], duration: f64) -> bool {
-        let mut own = [0.0; MAX_PICKED];
-        self.picked(x, &mut own);
-        let known = self.source.predict(&mut own[..self.picks.len()], u, duration);
-        for (&pick, value) in self.picks.iter().zip(own) {
-            x[pick] = value;
-        }
-        known
+    fn predict(&self) -> Option<&dyn Predict> {
+        self.source.predict().map(|_| self as _)
     }
 
-    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
-        let mut own = [0.0; MAX_PICKED];
-        self.picked(x, &mut own);
-        self.source.ahead(t, &own[..self.picks.len()], u, duration, out)
+    fn directional(&self) -> Option<&dyn Directional> {
+        self.source.directional().map(|_| self as _)
     }
 
-    fn ahead_along(
-        &self,
-        t: f64,
-        state: [&[f64]; 2],
-        input: [&[f64]; 2],
-        duration: f64,
-        out: &mut Ahead,
-    ) -> bool {
-        let mut own = [[0.0; MAX_PICKED]; 2];
-        for (own, all) in own.iter_mut().zip(state) {
-            self.picked(all, own);
-        }
-        let own = own.each_ref().map(|own| &own[..self.picks.len()]);
-        self.source.ahead_along(t, own, input, duration, out)
-    }
-
-    fn predict_along(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) -> bool {
-        let mut own = [[0.0; MAX_PICKED]; 2];
-        for (own, all) in own.iter_mut().zip([&*x, &*dx]) {
-            self.picked(all, own);
-        }
-        let [own_x, own_dx] = &mut own;
-        let n = self.picks.len();
-        let known = self.source.predict_along(&mut own_x[..n], &mut own_dx[..n], u, duration);
-        for (i, &pick) in self.picks.iter().enumerate() {
-            (x[pick], dx[pick]) = (own_x[i], own_dx[i]);
-        }
-        known
+    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        self.source.predict_directional().map(|_| self as _)
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
-        let mut own = [0.0; MAX_PICKED];
-        self.picked(x, &mut own);
-        self.source.highest(t, &own[..self.picks.len()], bounds, time)
+        self.source.highest(t, &self.picked(x)[..self.picks.len()], bounds, time)
+    }
+}
+
+impl Predict for Embedded {
+    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
+        let Some(source) = self.source.predict() else { return };
+        let mut own = self.picked(x);
+        source.flow(&mut own[..self.picks.len()], u, duration);
+        self.put_back(&own, x);
+    }
+
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        let Some(source) = self.source.predict() else { return };
+        source.ahead(t, &self.picked(x)[..self.picks.len()], u, duration, out);
+    }
+}
+
+impl Directional for Embedded {
+    fn evaluate_directional(&self, t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead) {
+        let Some(source) = self.source.directional() else { return };
+        let (n, [x, dx]) = (self.picks.len(), [x, direction.x].map(|all| self.picked(all)));
+        source.evaluate_directional(t, &x[..n], u, Direction { x: &dx[..n], ..direction }, out);
+    }
+}
+
+impl PredictDirectional for Embedded {
+    fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
+        let Some(source) = self.source.predict_directional() else { return };
+        let (n, [mut own, mut own_dx]) = (self.picks.len(), [&*x, &*dx].map(|all| self.picked(all)));
+        source.flow_directional(&mut own[..n], &mut own_dx[..n], u, duration);
+        self.put_back(&own, x);
+        self.put_back(&own_dx, dx);
+    }
+
+    fn ahead_directional(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        direction: Direction,
+        duration: f64,
+        out: &mut Ahead,
+    ) {
+        let Some(source) = self.source.predict_directional() else { return };
+        let (n, [x, dx]) = (self.picks.len(), [x, direction.x].map(|all| self.picked(all)));
+        source.ahead_directional(t, &x[..n], u, Direction { x: &dx[..n], ..direction }, duration, out);
     }
 }
 

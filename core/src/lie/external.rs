@@ -1,7 +1,10 @@
 //! Derivatives that somebody else computes, such as a simulator: the state is the derivatives themselves.
 
-use super::{Ahead, DerivativeSource, Derivatives, checked_degree, checked_inputs};
+use alloc::boxed::Box;
+
+use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, checked_degree, checked_inputs};
 use crate::error::Error;
+use crate::scalar::dot;
 
 /// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h, the last with one number for each input.
 struct External {
@@ -29,33 +32,21 @@ impl DerivativeSource for External {
         out.row[..self.inputs].copy_from_slice(row);
     }
 
-    /// Knows the present only: a `duration` of 0.
-    fn ahead(&self, _t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) -> bool {
-        let (drift, row) = x.split_at(self.n + 1);
-        *out = Ahead::ZERO;
-        out.value[..=self.n].copy_from_slice(drift);
-        out.value[self.n] += dot(row, u);
-        out.gradient[self.n][..self.inputs].copy_from_slice(row);
-        duration == 0.0
-    }
-
-    /// Knows the present only: h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
-    fn ahead_along(
-        &self,
-        t: f64,
-        [x, dx]: [&[f64]; 2],
-        [u, du]: [&[f64]; 2],
-        duration: f64,
-        out: &mut Ahead,
-    ) -> bool {
-        let known = self.ahead(t, dx, u, duration, out);
-        out.value[self.n] += dot(&x[self.n + 1..], du);
-        known
+    fn directional(&self) -> Option<&dyn Directional> {
+        Some(self)
     }
 }
 
-fn dot(row: &[f64], u: &[f64]) -> f64 {
-    row.iter().zip(u).map(|(a, v)| a * v).sum()
+impl Directional for External {
+    /// h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
+    fn evaluate_directional(&self, _t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead) {
+        let (drift, row) = direction.x.split_at(self.n + 1);
+        *out = Ahead::ZERO;
+        out.value[..=self.n].copy_from_slice(drift);
+        out.value[self.n] += dot(row, u);
+        out.value[self.n] += dot(&x[self.n + 1..], direction.u);
+        out.gradient[self.n][..self.inputs].copy_from_slice(row);
+    }
 }
 
 /// Derivatives of one barrier of relative degree `n` that are computed elsewhere and handed over at every step
@@ -93,6 +84,8 @@ pub fn external(n: usize, input_dim: usize) -> Result<Box<dyn DerivativeSource>,
 
 #[cfg(test)]
 mod tests {
+    use alloc::string::ToString;
+
     use super::*;
     use crate::MAX_INPUTS;
 
@@ -106,22 +99,12 @@ mod tests {
         source.evaluate(7.0, &X, &mut out);
         assert_eq!((&out.drift[..4], &out.row[..3]), (&[3.0, -2.0, 0.5, 0.0][..], &[4.0, -1.5, 0.0][..]));
         assert_eq!(out.lower_sensitivity, 0.0);
-        let mut ahead = Ahead::ZERO;
-        assert!(source.ahead(7.0, &X, &[1.0, 2.0], 0.0, &mut ahead));
-        assert_eq!(&ahead.value[..3], &[3.0, -2.0, 1.5]);
-        assert_eq!(&ahead.gradient[2][..2], &[4.0, -1.5]);
-        assert_eq!(ahead.gradient[1], [0.0; MAX_INPUTS]);
     }
 
     #[test]
     fn nothing_is_foretold() {
         let source = external(2, 2).expect("in range");
-        let (mut x, mut dx, mut ahead) = (X, X, Ahead::ZERO);
-        assert!(!source.predict(&mut x, &[1.0, 2.0], 0.1));
-        assert!(!source.predict_along(&mut x, &mut dx, &[1.0, 2.0], 0.1));
-        assert!(!source.ahead(0.0, &X, &[1.0, 2.0], 0.1, &mut ahead));
-        assert!(!source.ahead_along(0.0, [&X, &X], [&[1.0, 2.0], &[0.0, 1.0]], 0.1, &mut ahead));
-        assert_eq!((x, dx), (X, X));
+        assert!(source.predict().is_none() && source.predict_directional().is_none());
         assert!(source.highest(0.0, &X, [&[-1.0; 2], &[1.0; 2]], [0.0, 1.0]).is_none());
     }
 
@@ -131,21 +114,24 @@ mod tests {
         let source = external(2, 2).expect("in range");
         let (dx, u, du) = ([1.0, 0.5, -2.0, 0.25, 3.0], [1.0, 2.0], [-0.5, 4.0]);
         let at = |by: f64| {
-            let x: [f64; 5] = std::array::from_fn(|i| X[i] + by * dx[i]);
-            let u: [f64; 2] = std::array::from_fn(|i| u[i] + by * du[i]);
-            let mut out = Ahead::ZERO;
-            assert!(source.ahead(0.0, &x, &u, 0.0, &mut out));
+            let x: [f64; 5] = core::array::from_fn(|i| X[i] + by * dx[i]);
+            let u: [f64; 2] = core::array::from_fn(|i| u[i] + by * du[i]);
+            let mut out = Derivatives::ZERO;
+            source.evaluate(0.0, &x, &mut out);
+            out.drift[2] += dot(&out.row, &u);
             out
         };
         let (plus, minus) = (at(0.5), at(-0.5));
         let mut found = Ahead::ZERO;
-        assert!(source.ahead_along(0.0, [&X, &dx], [&u, &du], 0.0, &mut found));
+        let directional = source.directional().expect("it is known");
+        directional.evaluate_directional(0.0, &X, &u, Direction { x: &dx, u: &du }, &mut found);
         for k in 0..3 {
-            assert_eq!(found.value[k], plus.value[k] - minus.value[k], "order {k}");
-            for j in 0..2 {
-                assert_eq!(found.gradient[k][j], plus.gradient[k][j] - minus.gradient[k][j], "{k}, {j}");
-            }
+            assert_eq!(found.value[k], plus.drift[k] - minus.drift[k], "order {k}");
         }
+        for j in 0..2 {
+            assert_eq!(found.gradient[2][j], plus.row[j] - minus.row[j], "{j}");
+        }
+        assert_eq!(found.gradient[..2], [[0.0; MAX_INPUTS]; 2]);
     }
 
     #[test]

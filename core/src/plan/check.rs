@@ -6,6 +6,9 @@
 //! the second derivative changes no faster between two nodes than the nodes show. That is what the step of the model is
 //! chosen for.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use super::Requirement;
 use super::law::{Brake, Reference};
 use super::model::Model;
@@ -157,7 +160,7 @@ impl<'a> Walk<'a> {
     fn advance(&mut self, u: &[f64], time: f64) -> Result<(), Failure> {
         let (from, dt) = (self.t, time - self.t);
         self.before.copy_from_slice(&self.x);
-        self.model.source.predict(&mut self.x, u, dt);
+        self.model.plant.flow(&mut self.x, u, dt);
         if !all_finite(&self.x) {
             return Err(Failure::Singular);
         }
@@ -210,7 +213,7 @@ impl<'a> Walk<'a> {
             return bound;
         }
         let mut middle = (x.to_vec(), Derivatives::ZERO);
-        source.predict(&mut middle.0, u, dt / 2.0);
+        self.model.plant.flow(&mut middle.0, u, dt / 2.0);
         source.evaluate(from + dt / 2.0, &middle.0, &mut middle.1);
         if !middle.1.is_finite() {
             return f64::NEG_INFINITY;

@@ -1,5 +1,8 @@
 //! Two laws of feedback: one stops the plant, the other follows a reference.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::model::{Linear, Model};
@@ -95,10 +98,12 @@ impl Reference {
             high - low
         };
         let largest = (0..nx).map(span).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
-        let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| span(i).max(0.01 * largest).powi(-2)));
+        let q =
+            DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / span(i).max(0.01 * largest))));
         let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
-        let r =
-            DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| 0.01 * model.reach(i, reached(i)).powi(-2)));
+        let r = DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| {
+            0.01 * square(1.0 / model.reach(i, reached(i)))
+        }));
         let mut p = &q * 10.0;
         let mut gains = Vec::with_capacity(inputs.len());
         for (u, x) in inputs.iter().zip(&states).rev() {
@@ -115,7 +120,7 @@ impl Reference {
     /// The number of the hold that `t` lies in, if one is left.
     pub(super) fn hold_at(&self, t: f64) -> Option<usize> {
         // A time that is a sum of steps counts as the instant it is meant to be.
-        let k = ((t - self.start) / self.hold + 1e-6).floor().max(0.0) as usize;
+        let k = ((t - self.start) / self.hold + 1e-6).max(0.0) as usize;
         (k < self.inputs.len()).then_some(k)
     }
 
@@ -149,4 +154,8 @@ fn riccati(
     // Symmetric but for round-off, which would grow.
     let next = (&next + next.transpose()) * 0.5;
     Some((next, gain))
+}
+
+fn square(x: f64) -> f64 {
+    x * x
 }

@@ -24,7 +24,7 @@ mod search;
 pub use check::{Failure, Witness};
 pub use planner::Planner;
 
-use std::sync::Arc;
+use alloc::sync::Arc;
 
 use crate::lie::DerivativeSource;
 use law::{Brake, Reference};
@@ -57,4 +57,10 @@ pub struct Plan {
     pub witness: Witness,
     /// The longest step in s in which the model is run ahead.
     step: f64,
+}
+
+/// The least whole number that is not below `x`.
+fn whole(x: f64) -> usize {
+    let below = x.max(0.0) as usize;
+    below + usize::from((below as f64) < x)
 }

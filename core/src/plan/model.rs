@@ -1,8 +1,12 @@
 //! The plant of a plan, run ahead in steps of bounded length.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use nalgebra::{DMatrix, DVector};
 
-use crate::lie::DerivativeSource;
+use super::whole;
+use crate::lie::Predict;
 use crate::qp::Bounds;
 
 /// Part of a state's size by which it is moved to differentiate.
@@ -15,7 +19,9 @@ const RANK: f64 = 1e-9;
 /// The plant, and the longest step in s in which it is run ahead.
 #[derive(Clone, Copy)]
 pub(super) struct Model<'a> {
-    pub(super) source: &'a dyn DerivativeSource,
+    pub(super) plant: &'a dyn Predict,
+    /// Number of states, and of inputs.
+    pub(super) dims: [usize; 2],
     pub(super) bounds: &'a Bounds,
     pub(super) step: f64,
 }
@@ -28,24 +34,24 @@ pub(super) struct Linear {
 
 impl Model<'_> {
     pub(super) fn states(&self) -> usize {
-        self.source.state_dim()
+        self.dims[0]
     }
 
     pub(super) fn inputs(&self) -> usize {
-        self.source.input_dim()
+        self.dims[1]
     }
 
     /// Number of equal steps of at most [`Self::step`] in `duration`.
     pub(super) fn steps(&self, duration: f64) -> usize {
         // Round-off of a sum of steps is no further step.
-        ((duration / self.step) * (1.0 - 1e-9)).ceil().max(1.0) as usize
+        whole((duration / self.step) * (1.0 - 1e-9)).max(1)
     }
 
     /// Moves `x` by `duration` s under the held input `u`.
     pub(super) fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
         let steps = self.steps(duration);
         for _ in 0..steps {
-            self.source.predict(x, u, duration / steps as f64);
+            self.plant.flow(x, u, duration / steps as f64);
         }
     }
 

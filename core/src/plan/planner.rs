@@ -1,13 +1,14 @@
 //! Which trials are made, in which order, and what is kept between samples.
 
-use std::sync::Arc;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use super::check::{Failure, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use super::search::{Search, Trajectory};
-use super::{Plan, Requirement};
-use crate::lie::DerivativeSource;
+use super::{Plan, Requirement, whole};
+use crate::lie::{DerivativeSource, Predict};
 use crate::qp::Bounds;
 
 /// Holds of a grid until the last deadline and after it: first for a plant that stops soon, then for one that does not.
@@ -30,7 +31,8 @@ const GUESS: [f64; 2] = [0.4, 0.35];
 /// The plant, its bounds and the requirements at a sample, from which plans are made.
 #[derive(Clone, Copy)]
 pub struct Planner<'a> {
-    source: &'a dyn DerivativeSource,
+    plant: &'a dyn Predict,
+    dims: [usize; 2],
     bounds: &'a Bounds,
     requirements: &'a [Requirement<'a>],
     /// The sampling period in s.
@@ -41,19 +43,20 @@ pub struct Planner<'a> {
 
 impl<'a> Planner<'a> {
     /// A planner for the plant of `source`, whose inputs are within `bounds` and held for `period` s; `size` > 0 is the
-    /// size of an input that has no bounds, in its unit. Every source has to predict.
+    /// size of an input that has no bounds, in its unit. `None` where that source does not know its plant.
     pub fn new(
         source: &'a dyn DerivativeSource,
         bounds: &'a Bounds,
         requirements: &'a [Requirement<'a>],
         period: f64,
         size: f64,
-    ) -> Self {
-        Self { source, bounds, requirements, period, size }
+    ) -> Option<Self> {
+        let dims = [source.state_dim(), source.input_dim()];
+        Some(Self { plant: source.predict()?, dims, bounds, requirements, period, size })
     }
 
     fn model(&self, step: f64) -> Model<'a> {
-        Model { source: self.source, bounds: self.bounds, step }
+        Model { plant: self.plant, dims: self.dims, bounds: self.bounds, step }
     }
 
     /// Searches for a plan from `x` at `t`.
@@ -68,7 +71,7 @@ impl<'a> Planner<'a> {
             let hold = self.hold(last, before);
             let step = self.resolved(x, hold);
             let model = self.model(step);
-            let holds = (last / hold).ceil() as usize + after;
+            let holds = whole(last / hold) + after;
             let Some(brake) = Brake::around(&model, x, hold) else { continue };
             let brake = Arc::new(brake);
             let search = Search {
@@ -108,15 +111,15 @@ impl<'a> Planner<'a> {
         }
         let (most, mut nearest) =
             ((last / holds as f64 / self.period).max(1.0), (f64::INFINITY, self.period));
-        let mut periods = most.floor();
-        while periods >= 1.0 && periods >= 0.6 * most {
-            let hold = periods * self.period;
+        let mut periods = most as usize;
+        while periods >= 1 && periods as f64 >= 0.6 * most {
+            let hold = periods as f64 * self.period;
             // Round-off of a deadline that is a number of holds is no further hold.
-            let after = (last / hold * (1.0 - 1e-9)).ceil() * hold - last;
+            let after = whole(last / hold * (1.0 - 1e-9)) as f64 * hold - last;
             if after < nearest.0 - 1e-9 * last {
                 nearest = (after, hold);
             }
-            periods -= 1.0;
+            periods -= 1;
         }
         nearest.1
     }
@@ -168,7 +171,7 @@ impl<'a> Planner<'a> {
     /// What it fails at.
     pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
-        let nu = self.source.input_dim();
+        let nu = self.dims[1];
         let replay = || {
             let mut walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
             let mut at = t;
@@ -208,7 +211,7 @@ impl<'a> Planner<'a> {
 
     /// A step of the model with which a hold from `x` is resolved, with inputs at both bounds.
     fn resolved(&self, x: &[f64], hold: f64) -> f64 {
-        let nu = self.source.input_dim();
+        let nu = self.dims[1];
         let mut step = self.period.max(hold / 8.0);
         for _ in 0..HALVINGS {
             let error = |sign: f64| {
@@ -261,7 +264,7 @@ impl<'a> Planner<'a> {
                 }
             }
         }
-        let pushed = ((GUESS[1] * deadline).ceil() as usize).clamp(1, holds);
+        let pushed = whole(GUESS[1] * deadline).clamp(1, holds);
         sides
             .iter()
             .enumerate()

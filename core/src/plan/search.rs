@@ -11,6 +11,9 @@
 //! with u within its bounds and a trust region, and the convex part of the curvature of the sets at the last multipliers. A
 //! step is kept where the true merit falls. The solver is clarabel: sparse, interior point.
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT};
 use nalgebra::DMatrix;
@@ -115,7 +118,12 @@ impl Search<'_> {
         let effort: f64 = of
             .inputs
             .iter()
-            .flat_map(|u| u.iter().enumerate().map(|(i, u)| (u / self.width(i)).powi(2) * share))
+            .flat_map(|u| {
+                u.iter().enumerate().map(|(i, u)| {
+                    let part = u / self.width(i);
+                    part * part * share
+                })
+            })
             .sum();
         let mut violation = 0.0;
         let mut most = 0.0_f64;
@@ -249,7 +257,7 @@ impl Search<'_> {
         let share = 2.0 / (holds + 1) as f64;
         for (k, u) in at.inputs.iter().enumerate() {
             for (i, u) in u.iter().enumerate() {
-                let price = share / self.width(i).powi(2);
+                let price = share / (self.width(i) * self.width(i));
                 diagonal[input(k, i)] = price;
                 q[input(k, i)] = price * u;
             }
@@ -296,7 +304,8 @@ impl Search<'_> {
         for (k, u) in inputs.iter_mut().enumerate() {
             for (i, u) in u.iter_mut().enumerate() {
                 *u += solution.x[input(k, i)];
-                merit += 0.5 * share * (*u / self.width(i)).powi(2);
+                let part = *u / self.width(i);
+                merit += 0.5 * share * part * part;
             }
             self.model.clamp(u);
         }

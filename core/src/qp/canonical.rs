@@ -7,8 +7,10 @@
 //! It is the minimiser, and no other set of rows and bounds is active in it. So [`solve`] gives the same u for a set
 //! from the last answer and for one that a method found.
 
-use super::factors::{Factors, dot};
+use super::factors::Factors;
 use super::{Active, Constraint, Enforcement, Problem, Row};
+use crate::elementary;
+use crate::scalar::dot;
 
 /// Multipliers and slacks count as strict from this part of their terms on: far above round-off, so that a method
 /// that is exact up to round-off cannot find another set.
@@ -19,7 +21,7 @@ const STRICT: f64 = 1e-8;
 const INDEPENDENT: f64 = 1e-3;
 
 /// Sizes that neither overflow nor lose digits when squared.
-const SIZES: std::ops::Range<f64> = 1e-140..1e140;
+const SIZES: core::ops::Range<f64> = 1e-140..1e140;
 
 /// Solves into `u` for the active rows and bounds `guess`, in any order, and writes their multipliers; false, with
 /// both as they were, where that is not strictly the minimiser, or weights or an active soft row are involved.
@@ -43,7 +45,7 @@ pub(super) fn solve<const N: usize>(p: &Problem, guess: &mut [Active], u: &mut [
     let mut norms = [0.0; N];
     for (&constraint, norm) in active.iter().zip(&mut norms) {
         let Some((normal, _)) = affine(p, constraint) else { return false };
-        *norm = dot(&normal, &normal).sqrt();
+        *norm = elementary::sqrt(dot(&normal, &normal));
         if !SIZES.contains(norm) {
             return false;
         }
@@ -124,7 +126,7 @@ fn is_strict<const N: usize>(
 ) -> bool {
     let dim = p.u_ref.len();
     let moved: f64 = (0..dim).map(|i| (u[i] - u_ref[i]) * (u[i] - u_ref[i])).sum();
-    let length = moved.sqrt();
+    let length = elementary::sqrt(moved);
     let size = u.iter().chain(u_ref).fold(0.0, |s: f64, v| s.max(v.abs()));
     if !(SIZES.contains(&length) && length + STRICT * size <= (1.0 - STRICT) * p.correction_limit) {
         return false;

@@ -6,6 +6,9 @@
 //! columns. Only the first `len` columns mean anything, so starting anew costs nothing. Arrays have N
 //! components, of which those from `dim` on are 0.
 
+use crate::elementary;
+use crate::scalar::dot;
+
 /// A normal whose part outside the span of the active ones is below this part of it depends on them.
 const DEPENDENT: f64 = 1e-14;
 
@@ -80,7 +83,7 @@ impl<const N: usize> Factors<N> {
     #[inline(always)]
     pub(super) fn append(&mut self, p: &Projection<N>) {
         let k = self.len;
-        let length = p.square.sqrt();
+        let length = elementary::sqrt(p.square);
         self.upper[k][..k].copy_from_slice(&p.inside[..k]);
         self.upper[k][k] = length;
         let inverse = 1.0 / length;
@@ -98,7 +101,7 @@ impl<const N: usize> Factors<N> {
             self.upper[k] = self.upper[k + 1];
             // The rotation of rows k and k + 1 that makes R(k + 1, k) vanish.
             let (a, b) = (self.upper[k][k], self.upper[k][k + 1]);
-            let length = a.hypot(b);
+            let length = elementary::hypot(a, b);
             let (c, s) = (a / length, b / length);
             self.upper[k][k] = length;
             self.inverse[k] = 1.0 / length;
@@ -136,9 +139,4 @@ impl<const N: usize> Factors<N> {
     pub(super) fn component(&self, i: usize, y: &[f64; N]) -> f64 {
         self.basis[..self.len].iter().zip(y).map(|(q, y)| q[i] * y).sum()
     }
-}
-
-/// Σ a_i b_i over the shorter of the two.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -7,10 +7,14 @@
 //! about 1e-6 of the correction, not round-off; it allocates. Infeasible rows are relaxed together
 //! with an exact (L1) penalty.
 
+use alloc::vec::Vec;
+
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 
-use super::{Bounds, Outcome, Row, Solution, Solver, distance_from_clamped, dot, scaled};
+use super::{Bounds, Outcome, Row, Solution, Solver, distance_from_clamped, scaled};
+use crate::elementary;
+use crate::scalar::dot;
 
 /// Weight of a violated row against ½‖u − u_ref‖², both in units of the least correction needed: an
 /// exact penalty up to multipliers of this size. The second is for the rare problem on which the first
@@ -63,7 +67,7 @@ pub(super) fn solve(rows: &[Row], bounds: &Bounds, u_ref: &[f64], limit: f64, u:
 /// `row` with a normal of length 1, `None` where it vanishes.
 fn of_unit_length(row: &Row) -> Option<Row> {
     let Row { normal, floor } = scaled(row)?;
-    let norm = normal.iter().map(|a| a * a).sum::<f64>().sqrt();
+    let norm = elementary::sqrt(normal.iter().map(|a| a * a).sum::<f64>());
     Some(Row { normal: normal.map(|a| a / norm), floor: floor / norm })
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Active, Constraint, Enforcement, Problem, Row};
 use crate::MAX_INPUTS;
+use crate::elementary;
 
 /// The four conditions of optimality, each as a part of the terms it is the sum of: dimensionless, 0 for the
 /// exact minimiser, a small multiple of 1e-16 for a good answer. Where rows were given up or yielded, they
@@ -45,9 +46,9 @@ impl Residuals {
         }
         // The violation of each row, and the distance of each active one from its floor. u is known to the round-off of
         // the terms above, as a length of √W u.
-        let length = (0..m).fold(0.0, |s: f64, i| s.max(size[i] / weight(i).sqrt()));
+        let length = (0..m).fold(0.0, |s: f64, i| s.max(size[i] / elementary::sqrt(weight(i))));
         let part = |row: &Row, slack: f64| {
-            let terms = |s: f64, i: usize| s + (row.normal[i] / weight(i).sqrt()).abs() * length;
+            let terms = |s: f64, i: usize| s + (row.normal[i] / elementary::sqrt(weight(i))).abs() * length;
             if slack == 0.0 { 0.0 } else { slack / (0..m).fold(row.floor.abs(), terms) }
         };
         let violation = p.rows.iter().map(|row| part(row, -row.slack(u).min(0.0)));
@@ -58,8 +59,8 @@ impl Residuals {
                 let slack = p.rows[k].slack(u);
                 part(&p.rows[k], if soft { slack.max(0.0) } else { slack.abs() })
             }
-            Constraint::Lower(i) => (u[i] - p.bounds.min[i]).abs() * weight(i).sqrt() / length,
-            Constraint::Upper(i) => (u[i] - p.bounds.max[i]).abs() * weight(i).sqrt() / length,
+            Constraint::Lower(i) => (u[i] - p.bounds.min[i]).abs() * elementary::sqrt(weight(i)) / length,
+            Constraint::Upper(i) => (u[i] - p.bounds.max[i]).abs() * elementary::sqrt(weight(i)) / length,
         });
         let largest_of = |v: &[f64; MAX_INPUTS]| v.iter().fold(0.0, |s: f64, v| s.max(v.abs()));
         let relative = |value: f64, to: f64| if value == 0.0 { 0.0 } else { value / to };

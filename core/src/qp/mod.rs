@@ -38,6 +38,8 @@ mod single_row;
 
 pub use kkt::Residuals;
 
+use crate::elementary;
+use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_ROWS};
 use dual_active_set::DualActiveSet;
 use one_active::Answer;
@@ -48,10 +50,13 @@ const ROUND_OFF: f64 = 1e-12;
 
 /// One row aᵀu ≥ b.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Row {
     /// a; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub normal: [f64; MAX_INPUTS],
     /// b.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub floor: f64,
 }
 
@@ -80,11 +85,6 @@ impl Row {
     }
 }
 
-/// Σ a_i b_i over the shorter of the two.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 /// The power of two that brings the largest component of `normal` to 1 ..< 2: multiplying by it is exact.
 /// `None` where the normal vanishes (is zero or subnormal).
 fn power_of_two(normal: &[f64]) -> Option<f64> {
@@ -103,15 +103,21 @@ fn scaled(row: &Row) -> Option<Row> {
 
 /// Distance by which the rows moved `u`, from the reference within the bounds.
 fn distance_from_clamped(u: &[f64], bounds: &Bounds, u_ref: &[f64]) -> f64 {
-    u.iter().zip(u_ref).enumerate().fold(0.0, |d: f64, (i, (v, r))| d.hypot(v - bounds.clamp(i, *r)))
+    u.iter()
+        .zip(u_ref)
+        .enumerate()
+        .fold(0.0, |d: f64, (i, (v, r))| elementary::hypot(d, v - bounds.clamp(i, *r)))
 }
 
 /// Bounds on u; ±infinity where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Bounds {
     /// Lower bounds, unit of u.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub min: [f64; MAX_INPUTS],
     /// Upper bounds, unit of u.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub max: [f64; MAX_INPUTS],
 }
 
@@ -188,6 +194,8 @@ pub enum Backend {
 
 /// Method that produced the answer. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 #[repr(u8)]
 pub enum Solver {

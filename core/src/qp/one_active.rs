@@ -5,12 +5,12 @@
 //! Karush, Kuhn and Tucker, so it is the minimiser. The row to try is the one furthest from u_ref, since no other
 //! can be the only active one.
 
-use std::array::from_fn;
+use core::array::from_fn;
 
 use super::{Bounds, Enforcement, MAX_INPUTS, Problem, ROUND_OFF, Row};
 
 /// Squared lengths and slacks in this range can neither overflow nor lose digits on the way.
-const SIZES: std::ops::Range<f64> = 1e-150..1e150;
+const SIZES: core::ops::Range<f64> = 1e-150..1e150;
 
 /// The active row, if there is one.
 pub(super) enum Answer {

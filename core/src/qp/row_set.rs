@@ -1,6 +1,6 @@
 //! A set of rows, one bit each.
 
-use std::ops::{BitAnd, BitOr, BitOrAssign, Sub};
+use core::ops::{BitAnd, BitOr, BitOrAssign, Sub};
 
 use crate::MAX_ROWS;
 
@@ -62,7 +62,7 @@ impl RowSet {
     #[inline(always)]
     pub fn iter(self) -> impl Iterator<Item = usize> {
         let Self(mut bits) = self;
-        std::iter::from_fn(move || {
+        core::iter::from_fn(move || {
             let i = bits.trailing_zeros() as usize;
             (bits != 0).then(|| {
                 bits &= bits - 1;

@@ -12,8 +12,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::dot;
 use crate::MAX_INPUTS;
+use crate::elementary;
+use crate::scalar::dot;
 
 const SIZE: usize = 2 * MAX_INPUTS;
 
@@ -52,7 +53,7 @@ impl Equations {
             return false;
         }
         let row = MAX_INPUTS + self.rows;
-        let norm = dot(normal, normal).sqrt();
+        let norm = elementary::sqrt(dot(normal, normal));
         for j in 0..self.inputs {
             let component = normal[j] / norm;
             self.matrix[(row, j)] = component;

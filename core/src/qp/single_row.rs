@@ -5,7 +5,7 @@
 //! and non-decreasing in λ. So λ is found by walking the breakpoints, at most 2 dim u, at which a component
 //! leaves or reaches a bound. Without bounds there is none and λ = (b − aᵀr)/‖a‖².
 
-use std::array::from_fn;
+use core::array::from_fn;
 
 use super::{Bounds, Outcome, Row, distance_from_clamped, power_of_two, scaled};
 use crate::MAX_INPUTS;

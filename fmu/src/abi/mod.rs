@@ -12,6 +12,7 @@
 //! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
 //! for does not exist.
 
+#[macro_use]
 pub mod fmi2;
 #[cfg(old_glibc)]
 mod glibc;
@@ -48,7 +49,7 @@ macro_rules! exported {
     };
 }
 
-crate::fmi2_functions!(exported);
+fmi2_functions!(exported);
 
 /// Returns `"default"`: the types of `fmi2TypesPlatform.h`.
 #[unsafe(no_mangle)]

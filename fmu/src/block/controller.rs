@@ -107,11 +107,11 @@ impl Block for ControllerBlock {
         derivative: &mut [f64],
     ) -> Result<(), String> {
         let x = &values.reals[..self.layout.states];
-        let along = |i: usize| Tangent { value: x[i], along: direction[i] };
-        let u = self.wanted(along, self.present(x));
+        let moving = |i: usize| Tangent { value: x[i], directional: direction[i] };
+        let u = self.wanted(moving, self.present(x));
         for (slot, u) in derivative[self.layout.outputs..].iter_mut().zip(u) {
             // An input without a value has no derivative either.
-            *slot = if u.value.is_finite() { u.along } else { u.value };
+            *slot = if u.value.is_finite() { u.directional } else { u.value };
         }
         Ok(())
     }

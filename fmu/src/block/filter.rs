@@ -1,6 +1,7 @@
 //! A filter: it samples its inputs and remembers its promises.
 
 use punctual_core::filter::{FilterState, NoDerivative, SampleDerivative, Status};
+use punctual_core::lie::Direction;
 
 use super::{Block, BlockState, Values};
 use crate::FilterLoop;
@@ -153,7 +154,8 @@ impl Block for FilterBlock {
         let hold = self.hold();
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
         let before = self.filter.integrated();
-        let unknown = self.filter.differentiate((t, hold), [x, dx], [u_ref, du_ref], &mut self.change);
+        let unknown =
+            self.filter.differentiate(t, hold, x, u_ref, Direction { x: dx, u: du_ref }, &mut self.change);
         if rising {
             self.filter.restore(&self.kept, before).map_err(|e| e.to_string())?;
         }
@@ -167,8 +169,8 @@ impl Block for FilterBlock {
         at += inputs + 1;
         for b in &self.change.barriers {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
-                if let Reading::Real(_, _, along) = output.reading {
-                    derivative[i] = along(b);
+                if let Reading::Real(_, _, directional) = output.reading {
+                    derivative[i] = directional(b);
                 }
             }
             at += BARRIER_OUTPUTS.len();

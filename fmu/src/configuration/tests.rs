@@ -93,7 +93,7 @@ defects! {
     measurement_error_of_the_repeated_root: FILTER,
         "bounds = { a = [-9.0, 8.0] }\n[[barrier]]" =>
         "measurement_errors = { v = 0.1 }\n[[barrier]]\nmethod = \"repeated_root\"",
-        "goal.measurement_errors: needs the reference profile";
+        "goal.measurement_errors: needs a method that allows for errors, such as the reference profile";
     measurement_error_of_a_delayed_filter: FILTER,
         "bounds =" => "actuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
         "measurement_errors: needs an actuation_delay of 0, it is 0.001";

@@ -395,7 +395,7 @@ impl PeriodProblem<'_> {
             }
             let mut target = [0.0; MAX_INPUTS];
             qp.solve(&self.problem(at.rows), &mut target[..m]);
-            let left: Input = std::array::from_fn(|i| target[i] - point.u[i]);
+            let left: Input = core::array::from_fn(|i| target[i] - point.u[i]);
             let way = left.iter().fold(0.0, |w: f64, d| w.max(d.abs()));
             if way < least && point.distance <= (1.0 + NEARER) * start.distance {
                 (*start, least) = (point, way);

@@ -34,8 +34,10 @@
 mod rows;
 
 use super::RowSet;
-use super::factors::{Factors, Projection, dot};
+use super::factors::{Factors, Projection};
 use super::{Active, Constraint, Enforcement, Outcome, Problem, power_of_two};
+use crate::elementary;
+use crate::scalar::dot;
 
 /// A violation up to this part of the terms of its slack is round-off.
 const ROUND_OFF: f64 = 1e-14;
@@ -192,7 +194,7 @@ impl<const N: usize> DualActiveSet<N> {
         }
         if let Some(weights) = p.weights {
             for i in 0..n {
-                self.weight[i] = weights[i].sqrt();
+                self.weight[i] = elementary::sqrt(weights[i]);
                 self.reach[i] = 1.0 / self.weight[i];
             }
         }
@@ -481,7 +483,7 @@ impl<const N: usize> DualActiveSet<N> {
         step: f64,
     ) -> Option<(f64, Constraint)> {
         let z = &projection.outside;
-        let length = projection.square.sqrt();
+        let length = elementary::sqrt(projection.square);
         let (mut step, mut first) = (step, None);
         for k in (kept - self.active).iter() {
             let Some(_) = power_of_two(&p.rows[k].normal[..N]) else { continue };
@@ -517,7 +519,7 @@ impl<const N: usize> DualActiveSet<N> {
         if (1e-280..1e280).contains(&square) && p.correction_limit > 1e-140 {
             return square <= p.correction_limit * p.correction_limit;
         }
-        (0..self.dim).fold(0.0, |d: f64, i| d.hypot(moved(i))) <= p.correction_limit
+        (0..self.dim).fold(0.0, |d: f64, i| elementary::hypot(d, moved(i))) <= p.correction_limit
     }
 
     /// The active rows and bounds with their multipliers, then the soft rows at their largest.

@@ -1,8 +1,10 @@
 //! The rows and bounds as the method sees them, and the list of the active ones.
 
-use super::super::factors::{Projection, dot};
+use super::super::factors::Projection;
 use super::super::{Constraint, Enforcement, Problem, Row, power_of_two};
 use super::{DualActiveSet, Slot};
+use crate::elementary;
+use crate::scalar::dot;
 
 impl<const N: usize> DualActiveSet<N> {
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
@@ -15,7 +17,7 @@ impl<const N: usize> DualActiveSet<N> {
         }
         let normal = self.normal(p, &slot);
         if let Constraint::Row(k) = constraint {
-            norm = dot(&normal, &normal).sqrt();
+            norm = elementary::sqrt(dot(&normal, &normal));
             if let Some(Enforcement::Soft { penalty }) = p.enforcement.get(k) {
                 slot.cap = penalty / norm;
             }

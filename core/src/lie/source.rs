@@ -1,0 +1,92 @@
+//! The derivatives of a barrier as the filter asks for them, whoever gives them.
+
+use super::{Ahead, Derivatives};
+
+/// A supplier of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
+/// [`external`](super::external()) takes the derivatives from whoever computes them, and a user's own code can be another.
+///
+/// The first four methods are all that a filter needs. The others say what else a source can do:
+///
+/// | method | for |
+/// |---|---|
+/// | [`predict`](Self::predict) | constraints over the sampling period ([`Sampling`](crate::filter::Sampling)), delayed inputs |
+/// | [`directional`](Self::directional) | [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate) |
+/// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and errors of the measurement |
+/// | [`highest`](Self::highest) | deadlines that are lost ([`reach`](crate::reach)) |
+pub trait DerivativeSource: Send {
+    /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`](crate::MAX_RELATIVE_DEGREE).
+    fn relative_degree(&self) -> usize;
+
+    /// Number of states.
+    fn state_dim(&self) -> usize;
+
+    /// Number of inputs.
+    fn input_dim(&self) -> usize;
+
+    /// Writes the derivatives at time `t` (s) and state `x` (of [`Self::state_dim`] components).
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives);
+
+    /// The source as one that knows the plant. The default does not.
+    fn predict(&self) -> Option<&dyn Predict> {
+        None
+    }
+
+    /// The source as one that differentiates along a direction. The default does not.
+    fn directional(&self) -> Option<&dyn Directional> {
+        None
+    }
+
+    /// The source as one that differentiates its predictions along a direction. The default does not.
+    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        None
+    }
+
+    /// A number that h does not exceed between `time[0]` and `time[1]` s after `t` and `x`, under any input
+    /// with `bounds[0]` ≤ u ≤ `bounds[1]`; for [`crate::reach`]. The default knows none.
+    fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
+        None
+    }
+}
+
+/// What a source with a model of the plant foretells under a held input.
+pub trait Predict {
+    /// Moves `x` by `duration` ≥ 0 seconds under the held input `u`.
+    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64);
+
+    /// Writes the derivatives of h `duration` ≥ 0 seconds after `t` and `x` under the held input `u`; at time
+    /// `t + duration`.
+    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead);
+}
+
+/// The derivatives of h at an instant, differentiated along a direction.
+pub trait Directional {
+    /// Writes the derivative along `direction` of h⁽⁰⁾ … h⁽ⁿ⁾ at time `t`, state `x` and input `u`, and of the gradient of
+    /// each by u.
+    fn evaluate_directional(&self, t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead);
+}
+
+/// What [`Predict`] foretells, differentiated along a direction.
+pub trait PredictDirectional {
+    /// Moves `x` as [`Predict::flow`] does, and the direction `dx` by the derivative of that.
+    fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64);
+
+    /// Writes the derivative along `direction` of what [`Predict::ahead`] writes.
+    fn ahead_directional(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        direction: Direction,
+        duration: f64,
+        out: &mut Ahead,
+    );
+}
+
+/// The direction of a derivative: how state and input move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction<'a> {
+    /// Of the state, as many components.
+    pub x: &'a [f64],
+    /// Of the input, or of the reference input, as many components.
+    pub u: &'a [f64],
+}

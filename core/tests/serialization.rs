@@ -1,0 +1,187 @@
+//! States, reports and settings as JSON, and back.
+
+mod scenario;
+
+use proptest::prelude::*;
+use punctual_core::convergence::first_order::Exponent;
+use punctual_core::convergence::operator::Operator;
+use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
+use punctual_core::dynamics::rk4_step;
+use punctual_core::filter::{
+    BarrierSettings, Begin, End, FilterBuilder, FilterState, Integration, Method, Report, SafetyFilter,
+    SampleDerivative, Sampling, Strictness,
+};
+use punctual_core::lie::Direction;
+use punctual_core::qp::Bounds;
+use punctual_reference::plants::Unicycle;
+use scenario::{distance_disc, quadratic_disc};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+const STEP: f64 = 0.05;
+const BOUNDS: [f64; 2] = [6.0, 2.0];
+
+fn json<T: Serialize>(value: &T) -> String {
+    serde_json::to_string(value).expect("serialises")
+}
+
+fn back<T: DeserializeOwned>(text: &str) -> T {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// A goal with a deadline, and a set without one: its deadline is infinite.
+fn filter() -> SafetyFilter {
+    SafetyFilter::builder(4, 2)
+        .barrier("goal", Unicycle, distance_disc(), BarrierSettings::within(12.0))
+        .and_then(|b| b.barrier("room", Unicycle, quadratic_disc(), BarrierSettings::keeping()))
+        .and_then(|b| b.bounds(&BOUNDS.map(|b| -b), &BOUNDS))
+        .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter")
+}
+
+/// What each of `count` steps from sample number `from` says, and the input, by their bits.
+fn run(filter: &mut SafetyFilter, x: &mut [f64; 4], from: usize, count: usize) -> Vec<String> {
+    (from..from + count)
+        .map(|k| {
+            let mut u = [0.0; 2];
+            let report = filter.step(k as f64 * STEP, x, &[1.0, 0.1], &mut u).expect("right lengths");
+            let said = json(report);
+            *x = rk4_step(&Unicycle, &(*x).into(), &u.into(), STEP).into();
+            format!("{said} {:?}", u.map(f64::to_bits))
+        })
+        .collect()
+}
+
+/// Runs, writes the state to JSON, and goes on in a new filter: bit for bit what the first one says.
+#[test]
+fn a_filter_goes_on_from_a_file() {
+    let (mut one, mut x) = (filter(), [0.0, 0.0, 0.3, 1.0]);
+    run(&mut one, &mut x, 0, 100);
+    let text = json(one.state());
+    let state: FilterState = back(&text);
+    assert_eq!(&state, one.state());
+    assert_eq!(state.barriers[1].deadline, f64::INFINITY);
+    assert_eq!(text.matches("\"inf\"").count(), 1, "{text}");
+    let mut two = filter();
+    two.restore(&state).expect("as many barriers");
+    let mut also = x;
+    assert_eq!(run(&mut one, &mut x, 100, 200), run(&mut two, &mut also, 100, 200));
+    assert_eq!(x, also);
+    assert_eq!(json(one.state()), json(two.state()));
+}
+
+/// Nothing stands in a file that is no number but a word or none: a state that was never used, with a barrier that was
+/// never seen, and the report before the first step.
+#[test]
+fn reports_and_fresh_states_come_back() {
+    let mut filter = filter();
+    let fresh = json(filter.report());
+    assert!(fresh.contains("\"NaN\""), "{fresh}");
+    assert_eq!(json(&back::<Report>(&fresh)), fresh);
+    assert_eq!(&back::<FilterState>(&json(filter.state())), filter.state());
+    let mut u = [0.0; 2];
+    let report = filter.step(0.0, &[0.0, 0.0, 0.3, 1.0], &[0.0; 2], &mut u).expect("right lengths");
+    assert_eq!(&back::<Report>(&json(report)), report);
+    let mut derivative = SampleDerivative::default();
+    let (x, u_ref) = ([0.0, 0.0, 0.3, 1.0], [0.0; 2]);
+    let unknown =
+        filter.differentiate(1.0, &x, &u_ref, Direction { x: &[1.0; 4], u: &[0.0; 2] }, &mut derivative);
+    assert_eq!(unknown, Ok(None));
+    let read: SampleDerivative = back(&json(&derivative));
+    assert_eq!((read.u, read.barriers), (derivative.u, derivative.barriers));
+}
+
+#[test]
+fn settings_come_back() {
+    let settings = BarrierSettings {
+        method: Method::FirstOrder(Exponent::new(0.25).expect("in range")),
+        stay_rate: Some(3.0),
+        recovery: Some(0.1),
+        ..BarrierSettings::within(5.0)
+    };
+    assert_eq!(back::<BarrierSettings>(&json(&settings)), settings);
+    let rates = Operator::new(&[1.0, 2.5]).ok();
+    let settings = BarrierSettings { rates, ..BarrierSettings::within(f64::INFINITY) };
+    assert_eq!(back::<BarrierSettings>(&json(&settings)), settings);
+    assert_eq!(back::<BarrierSettings>("{\"deadline\": 7}"), BarrierSettings::within(7.0));
+    assert_eq!(back::<BarrierSettings>("{}"), BarrierSettings::keeping());
+    let sampling = Sampling::Measured { first: Some(0.1) };
+    assert_eq!(back::<Sampling>(&json(&sampling)), sampling);
+    let window = (Begin::AfterArrival(2), End::At(4.0), Strictness::Soft(1.5));
+    assert_eq!(back::<(Begin, End, Strictness)>(&json(&window)), window);
+    let beta = Integration { state: 4, input: 1, limits: [f64::NEG_INFINITY, 0.5], gain: 10.0 };
+    assert_eq!(back::<Integration>(&json(&beta)), beta);
+    assert_eq!(back::<Bounds>(&json(&Bounds::NONE)), Bounds::NONE);
+}
+
+#[test]
+fn what_a_constructor_refuses_a_file_cannot_bring() {
+    let refused = |text: &str| {
+        let message = serde_json::from_str::<BarrierSettings>(text).unwrap_err().to_string();
+        message.split(" at line").next().expect("a message").to_owned()
+    };
+    assert_eq!(refused("{\"rates\": [1, -2]}"), "rates[2]: is -2, must be finite and > 0");
+    assert!(refused("{\"method\": {\"first_order\": 1}}").starts_with("exponent: is 1, must be"));
+    assert!(refused("{\"deadlin\": 1}").starts_with("unknown field `deadlin`"));
+    let word = refused("{\"margin\": \"infinite\"}");
+    assert_eq!(word, "invalid value: string \"infinite\", expected a number, \"inf\", \"-inf\" or \"NaN\"");
+}
+
+/// Ordinary numbers, and those that no filter remembers.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![-100.0..100.0, -1.0..1.0, any::<f64>(), Just(f64::NAN), Just(f64::INFINITY), Just(0.0)]
+}
+
+prop_compose! {
+    fn promise()(
+        phase in prop::sample::select(Phase::ALL.to_vec()),
+        n in prop::array::uniform12(number()),
+        anchor in prop::array::uniform8(number()),
+        options in prop::array::uniform3(prop::option::of(number())),
+        counts in prop::array::uniform3(any::<u32>()),
+        flags in prop::array::uniform2(any::<bool>()),
+    ) -> FixedTimeState {
+        FixedTimeState {
+            phase,
+            start_time: options[0],
+            anchor_time: n[0],
+            deadline: n[1],
+            recoveries: counts[0],
+            postponed: counts[1],
+            anchor,
+            rate: n[2],
+            stay_rate: n[3],
+            stay_margin: n[4],
+            pull: n[5],
+            gain: n[6],
+            margin: n[7],
+            period: n[8],
+            fallback: flags[0],
+            arrival: options[1],
+            guaranteed: flags[1],
+            unmet: options[2].map(|since| Unmet { steps: counts[2], since, h: n[9] }),
+        }
+    }
+}
+
+proptest! {
+    /// What stands in a file cannot lead the input out of its bounds.
+    #[test]
+    fn any_state_leaves_the_input_within_its_bounds(
+        barriers in prop::collection::vec(promise(), 2),
+        (time, period) in (prop::option::of(number()), prop::option::of(number())),
+        input in prop::array::uniform12(number()),
+    ) {
+        let state = FilterState { barriers, time, period, input };
+        let text = json(&state);
+        prop_assert_eq!(json(&back::<FilterState>(&text)), text);
+        let mut filter = filter();
+        filter.restore(&state).expect("as many barriers");
+        for k in 0..3 {
+            let mut u = [f64::NAN; 2];
+            filter.step(f64::from(k) * STEP, &[0.0, 0.0, 0.3, 1.0], &[1.0, 0.1], &mut u).expect("right lengths");
+            prop_assert!(u.iter().zip(BOUNDS).all(|(u, b)| u.abs() <= b), "{u:?}");
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Compiles only if nothing below the core takes std: there can be one panic handler.
+#![no_std]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+use alloc::boxed::Box;
+
+use punctual_core::Error;
+use punctual_core::barriers::DistanceDisc;
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{BarrierSettings, SafetyFilter, Status};
+use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::scalar::Scalar;
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {}
+}
+
+/// Two double integrators.
+struct PointMass;
+
+impl ControlAffine<4, 2> for PointMass {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        SVector::from([x[2], x[3], S::zero(), S::zero()])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+        SMatrix::from_fn(|i, j| if i == j + 2 { S::one() } else { S::zero() })
+    }
+}
+
+/// A filter that reaches a disc.
+///
+/// # Errors
+///
+/// None: the numbers are in range.
+pub fn filter() -> Result<Box<SafetyFilter>, Error> {
+    let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
+        .build()?;
+    Ok(Box::new(filter))
+}
+
+/// One step of it.
+///
+/// # Errors
+///
+/// None: the lengths are right.
+pub fn step(filter: &mut SafetyFilter, t: f64, x: &[f64; 4], u: &mut [f64; 2]) -> Result<Status, Error> {
+    Ok(filter.step(t, x, &[0.0; 2], u)?.status)
+}
