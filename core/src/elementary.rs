@@ -1,4 +1,4 @@
-//! Elementary functions of numbers, which exist in std only: std's, or those of the crate `libm`.
+//! Elementary functions of numbers, which exist in std only: std's, or those of the crate `libm`. And the dot product.
 //!
 //! With the feature `libm` results have the same bits on every operating system. A square root is exact either way, and
 //! std's is an instruction.
@@ -40,7 +40,15 @@ pub(crate) fn sqrt(x: f64) -> f64 {
 #[inline(always)]
 pub(crate) fn powi(x: f64, exponent: i32) -> f64 {
     #[cfg(feature = "libm")]
-    return crate::scalar::Scalar::powi(x, exponent);
+    {
+        let power = num_traits::pow(x, exponent.unsigned_abs() as usize);
+        if exponent < 0 { 1.0 / power } else { power }
+    }
     #[cfg(not(feature = "libm"))]
     f64::powi(x, exponent)
+}
+
+/// Σ a_i b_i over the shorter of the two.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -191,11 +191,6 @@ impl Scalar for f64 {
     }
 }
 
-/// Σ a_i b_i over the shorter of the two.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 /// Whether all of `values` are finite, without a branch per number.
 #[inline]
 pub(crate) fn all_finite(values: &[f64]) -> bool {

@@ -5,8 +5,8 @@ use super::hold::{Hold, Lowest};
 use super::search::Requirement;
 use super::{FixedTimeState, Phase, SAME_PERIOD};
 use crate::convergence::sampled::PeriodBound;
+use crate::elementary::dot;
 use crate::qp::Row;
-use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// The course of h until the next sample, as the derivatives at a sample foresee it.

@@ -3,9 +3,8 @@
 use alloc::vec::Vec;
 
 use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
-use crate::elementary;
+use crate::elementary::{self, dot};
 use crate::qp::{Active, Constraint, Row, Solver};
-use crate::scalar::dot;
 
 /// Part of the deadline without progress in [`BarrierReport::deadlocked`].
 const DEADLOCK_TIME: f64 = 0.1;

@@ -25,12 +25,11 @@ use core::fmt;
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
 use crate::convergence::BoundDerivative;
 use crate::convergence::sampled::{PeriodBound, Weighted};
-use crate::elementary;
+use crate::elementary::{self, dot};
 use crate::error::{Error, finite, length};
 use crate::lie::{Ahead, Derivatives, Direction};
 use crate::qp::sensitivity::Equations;
 use crate::qp::{self, Constraint, Enforcement, Problem, Solver};
-use crate::scalar::dot;
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.

@@ -3,8 +3,8 @@
 use alloc::boxed::Box;
 
 use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, checked_degree, checked_inputs};
+use crate::elementary::dot;
 use crate::error::Error;
-use crate::scalar::dot;
 
 /// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h, the last with one number for each input.
 struct External {

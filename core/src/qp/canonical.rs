@@ -9,8 +9,7 @@
 
 use super::factors::Factors;
 use super::{Active, Constraint, Enforcement, Problem, Row};
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 /// Multipliers and slacks count as strict from this part of their terms on: far above round-off, so that a method
 /// that is exact up to round-off cannot find another set.

@@ -6,8 +6,7 @@
 //! columns. Only the first `len` columns mean anything, so starting anew costs nothing. Arrays have N
 //! components, of which those from `dim` on are 0.
 
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 /// A normal whose part outside the span of the active ones is below this part of it depends on them.
 const DEPENDENT: f64 = 1e-14;

@@ -13,8 +13,7 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 
 use super::{Bounds, Outcome, Row, Solution, Solver, distance_from_clamped, scaled};
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 /// Weight of a violated row against ½‖u − u_ref‖², both in units of the least correction needed: an
 /// exact penalty up to multipliers of this size. The second is for the rare problem on which the first

@@ -38,8 +38,7 @@ mod single_row;
 
 pub use kkt::Residuals;
 
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 use crate::{MAX_INPUTS, MAX_ROWS};
 use dual_active_set::DualActiveSet;
 use one_active::Answer;

@@ -13,8 +13,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::MAX_INPUTS;
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 const SIZE: usize = 2 * MAX_INPUTS;
 

@@ -36,8 +36,7 @@ mod rows;
 use super::RowSet;
 use super::factors::{Factors, Projection};
 use super::{Active, Constraint, Enforcement, Outcome, Problem, power_of_two};
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 /// A violation up to this part of the terms of its slack is round-off.
 const ROUND_OFF: f64 = 1e-14;

@@ -3,8 +3,7 @@
 use super::super::factors::Projection;
 use super::super::{Constraint, Enforcement, Problem, Row, power_of_two};
 use super::{DualActiveSet, Slot};
-use crate::elementary;
-use crate::scalar::dot;
+use crate::elementary::{self, dot};
 
 impl<const N: usize> DualActiveSet<N> {
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
