@@ -94,7 +94,7 @@ impl Wanted {
         match self {
             Self::None => u_ref.fill(0.0),
             Self::Constant(values) => u_ref.copy_from_slice(values),
-            Self::Damping if c.plant.model == Some(ModelName::PointMass) => {
+            Self::Damping if c.plant.model() == Some(ModelName::PointMass) => {
                 u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
             }
             Self::Damping => {
@@ -107,7 +107,7 @@ impl Wanted {
 
 /// Whether damping is known for the plant: the fourth state of every vehicle is a velocity.
 pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
-    c.plant.model.is_some() && c.plant.states().len() > 3
+    c.plant.model().is_some() && c.plant.states().len() > 3
 }
 
 /// Result of a closed loop.

@@ -13,6 +13,7 @@ use super::key::{
     Unit::{Is, Of},
     Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, Word},
 };
+use super::model::RawModel;
 use super::names::{Named, check_identifier, is_reserved, taken};
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, EXPERIMENT, ExperimentSection, IntegratorSection,
@@ -57,7 +58,7 @@ pub(super) struct RawFilter {
     period_max: f64,
     #[serde(default = "correction_limit")]
     correction_limit: f64,
-    plant: PlantSection,
+    plant: RawModel,
     integrator: Option<IntegratorSection>,
     barrier: Vec<RawBarrier>,
     #[serde(default)]
@@ -203,7 +204,7 @@ fn barriers(raw: Vec<RawBarrier>, plant: &PlantSection) -> Result<Vec<BarrierSec
         let barrier = BarrierSection::parse(raw, &format!("barrier[{i}]"), plant)?;
         let name = &barrier.name;
         // A barrier's variables must not fall among the filter's own.
-        let others = plant.parameters.iter().map(|p| &p.name).chain(barriers.iter().map(|b| &b.name));
+        let others = plant.own_parameters().iter().map(|p| &p.name).chain(barriers.iter().map(|b| &b.name));
         if is_reserved(name, Named::Barrier) || others.into_iter().any(|other| other == name) {
             return Err(taken(format!("barrier[{i}].name"), name));
         }
@@ -218,9 +219,8 @@ impl FilterConfiguration {
         // Name and plant.
         let name = if raw.name.is_empty() { "filter".to_owned() } else { raw.name };
         check_identifier("name", &name)?;
-        let mut plant = raw.plant;
-        plant.complete(loader)?;
-        if let Some(model) = plant.model.filter(|model| !model.is_affine()) {
+        let plant = PlantSection::parse(raw.plant, loader)?;
+        if let Some(model) = plant.model().filter(|model| !model.is_affine()) {
             return Err(not_affine(model));
         }
         if let Some(integrator) = &raw.integrator {
