@@ -390,10 +390,10 @@ pub(super) fn reach(
     Ok(ReachReport { deadline: verdict, soonest_at_least: soonest, soonest_at_most: most })
 }
 
-fn name(profile: ProfileKind) -> &'static str {
+fn named(profile: ProfileKind) -> ProfileName {
     match profile {
-        ProfileKind::Hermite => "hermite",
-        ProfileKind::LowPeak => "low_peak",
+        ProfileKind::Hermite => ProfileName::Hermite,
+        ProfileKind::LowPeak => ProfileName::LowPeak,
     }
 }
 
@@ -419,10 +419,7 @@ pub(super) fn ratings(
             let Some(deadline) = section.deadline else { continue };
             section.rates.clear();
             section.rate = Automatic(candidate.rate_times_deadline / deadline);
-            section.profile = match candidate.profile {
-                ProfileKind::Hermite => ProfileName::Hermite,
-                ProfileKind::LowPeak => ProfileName::LowPeak,
-            };
+            section.profile = named(candidate.profile);
         }
         for &i in &driven {
             let limit = written(bound).min(UNBOUNDED);
@@ -445,7 +442,7 @@ pub(super) fn ratings(
             // A barrier without a deadline has nothing to paste.
             let Some(deadline) = section.deadline else { continue };
             let rate = candidate.rate_times_deadline / deadline;
-            let profile = name(candidate.profile);
+            let profile = named(candidate.profile).name();
             lines
                 .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));
         }
@@ -460,7 +457,7 @@ pub(super) fn ratings(
     Ok(ratings
         .iter()
         .map(|r| RatingReport {
-            profile: name(r.candidate.profile),
+            profile: named(r.candidate.profile).name(),
             rate_times_deadline: r.candidate.rate_times_deadline,
             peak: r.peak,
             smallest_bound: r.bound.map(written),

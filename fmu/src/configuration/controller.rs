@@ -11,30 +11,20 @@ use super::key::{
 };
 use super::names::check_identifier;
 use super::reference::{self, RawReference};
+use super::words::words;
 use super::{
     ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, Range, ReferenceSection,
 };
 
-/// The nominal controllers by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ControllerName {
-    /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
-    Damping,
-    /// [`Heading`] to one goal.
-    Heading,
-    /// [`Heading`] to one point after the other; the last is held.
-    Waypoints,
-}
-
-impl ControllerName {
-    /// Its name in a configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Damping => "damping",
-            Self::Heading => "heading",
-            Self::Waypoints => "waypoints",
-        }
+words! {
+    /// The nominal controllers by name.
+    pub enum ControllerName {
+        /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
+        Damping = "damping",
+        /// [`Heading`] to one goal.
+        Heading = "heading",
+        /// [`Heading`] to one point after the other; the last is held.
+        Waypoints = "waypoints",
     }
 }
 
@@ -173,7 +163,7 @@ pub(super) static SECTION: Section = Section {
             Key::new("plant", Table(&reference::SECTION), None, "`model`, `l_r`, `l_f` of a vehicle"),
             Key::new(
                 "controller",
-                Word(&["damping", "heading", "waypoints"]),
+                Word(ControllerName::WORDS),
                 None,
                 "`damping`, `heading` to a goal, `waypoints` one after the other, the last one held (output `waypoint`)",
             ),

@@ -15,6 +15,7 @@ use super::key::{
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, is_reserved, taken};
+use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, EXPERIMENT, ExperimentSection, IntegratorSection,
     Parameter, PlantSection, PluginLoader, Range, VariableSection, barrier, integrator, model,
@@ -23,17 +24,17 @@ use super::{
 /// Size from which an input bound means "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
 
-/// The treatment of inputs that are held between samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SamplingName {
-    /// [`Sampling::Pointwise`]: the margin has to cover the hold.
-    Pointwise,
-    /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
-    /// `[experiment]`.
-    Measured,
-    /// [`Sampling::Period`] with the step size of `[experiment]`.
-    StepSize,
+words! {
+    /// The treatment of inputs that are held between samples.
+    pub enum SamplingName {
+        /// [`Sampling::Pointwise`]: the margin has to cover the hold.
+        Pointwise = "pointwise",
+        /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
+        /// `[experiment]`.
+        Measured = "measured",
+        /// [`Sampling::Period`] with the step size of `[experiment]`.
+        StepSize = "step_size",
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -136,7 +137,7 @@ pub(super) static SECTION: Section = Section {
             ),
             Key::new(
                 "sampling",
-                Word(&["pointwise", "measured", "step_size"]),
+                Word(SamplingName::WORDS),
                 Some(
                     "`measured`; `pointwise` where the plant has inputs only. With an external barrier it must be `pointwise`",
                 ),

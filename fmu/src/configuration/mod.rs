@@ -19,6 +19,7 @@ mod plugin;
 mod read;
 mod reference;
 mod unit;
+mod words;
 
 pub use barrier::{
     Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,

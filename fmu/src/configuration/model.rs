@@ -15,7 +15,7 @@ use super::key::{
 };
 use super::names::{Named, check_identifier, is_reserved, taken};
 use super::plugin::{PluginDigest, PluginLoader, PluginSection};
-use super::reference::{self, MODELS, RawReference};
+use super::reference::{self, RawReference};
 use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit};
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
@@ -141,7 +141,7 @@ pub(super) static PLANT: Section = Section {
     name: "model",
     keys: || {
         static KEYS: [Key; 9] = [
-            Key::new("model", Word(&MODELS), Some(""), "a vehicle by name, see the next table"),
+            Key::new("model", Word(ModelName::WORDS), Some(""), "a vehicle by name, see the next table"),
             reference::L_R,
             reference::L_F,
             Key::new(
@@ -339,57 +339,51 @@ impl PlantSection {
         matches!(self, Self::External { .. })
     }
 
+    /// The states, inputs and parameters that the file or the plug-in gives.
+    fn own(&self) -> (&[VariableSection], &[VariableSection], &[ParameterSection]) {
+        match self {
+            Self::Reference(_) => (&[], &[], &[]),
+            Self::Expressions(ExpressionSection { states, inputs, parameters, .. })
+            | Self::Plugin(PluginSection { states, inputs, parameters, .. }) => (states, inputs, parameters),
+            Self::External { inputs } => (&[], inputs, &[]),
+        }
+    }
+
     /// The states, in order.
     pub fn states(&self) -> Vec<VariableSection> {
-        match self {
-            Self::Reference(reference) => {
-                reference.model.states().iter().map(VariableSection::from).collect()
-            }
-            Self::Expressions(ExpressionSection { states, .. })
-            | Self::Plugin(PluginSection { states, .. }) => states.clone(),
-            Self::External { .. } => Vec::new(),
+        match self.model() {
+            Some(model) => model.states().iter().map(VariableSection::from).collect(),
+            None => self.own().0.to_vec(),
         }
     }
 
     /// The inputs, in order.
     pub fn inputs(&self) -> Vec<VariableSection> {
-        match self {
-            Self::Reference(reference) => {
-                reference.model.inputs().iter().map(VariableSection::from).collect()
-            }
-            Self::Expressions(ExpressionSection { inputs, .. })
-            | Self::Plugin(PluginSection { inputs, .. })
-            | Self::External { inputs } => inputs.clone(),
+        match self.model() {
+            Some(model) => model.inputs().iter().map(VariableSection::from).collect(),
+            None => self.own().1.to_vec(),
         }
     }
 
     /// The name of state `i`, or nothing.
     pub(crate) fn state_name(&self, i: usize) -> &str {
-        match self {
-            Self::Reference(reference) => reference.model.states().get(i).map_or("", |s| s.name),
-            Self::Expressions(ExpressionSection { states, .. })
-            | Self::Plugin(PluginSection { states, .. }) => states.get(i).map_or("", |s| &s.name),
-            Self::External { .. } => "",
+        match self.model() {
+            Some(model) => model.states().get(i).map_or("", |s| s.name),
+            None => self.own().0.get(i).map_or("", |s| &s.name),
         }
     }
 
     /// The name of input `i`, or nothing.
     pub(crate) fn input_name(&self, i: usize) -> &str {
-        match self {
-            Self::Reference(reference) => reference.model.inputs().get(i).map_or("", |s| s.name),
-            Self::Expressions(ExpressionSection { inputs, .. })
-            | Self::Plugin(PluginSection { inputs, .. })
-            | Self::External { inputs } => inputs.get(i).map_or("", |s| &s.name),
+        match self.model() {
+            Some(model) => model.inputs().get(i).map_or("", |s| s.name),
+            None => self.own().1.get(i).map_or("", |s| &s.name),
         }
     }
 
-    /// The constants that the user or the plug-in gave it.
+    /// The constants that the file or the plug-in gives.
     pub(super) fn own_parameters(&self) -> &[ParameterSection] {
-        match self {
-            Self::Expressions(ExpressionSection { parameters, .. })
-            | Self::Plugin(PluginSection { parameters, .. }) => parameters,
-            Self::Reference(_) | Self::External { .. } => &[],
-        }
+        self.own().2
     }
 
     /// The range in which each state is meant to be, or an infinite one.

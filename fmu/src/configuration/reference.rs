@@ -8,43 +8,32 @@ use punctual_reference::plants::{
 use serde::Deserialize;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
+use super::words::words;
 use super::{ConfigurationError, Key, Parameter, Range, Section, Unit, Value};
 
-/// The reference plants by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ModelName {
-    /// [`PointMass`].
-    PointMass,
-    /// [`Unicycle`].
-    Unicycle,
-    /// [`Bicycle`], simplified.
-    Bicycle,
-    /// [`SmallSlipBicycle`]: as a plant only, since position barriers have a mixed relative degree.
-    BicycleSmallSlip,
-    /// [`SmallSlipBicycleWithRate`]: the same with the rate of the slip angle as its input.
-    BicycleSmallSlipRate,
-    /// [`KinematicBicycle`], steered by the rate of its front wheel.
-    BicycleKinematic,
-    /// The same, steered by the angle of its front wheel: as a plant only, since that does not enter linearly.
-    BicycleKinematicAngle,
-    /// The same, steered by its slip angle as the simplified and the small-slip bicycle are: as a plant only.
-    BicycleKinematicSlip,
+words! {
+    /// The reference plants by name.
+    pub enum ModelName {
+        /// [`PointMass`].
+        PointMass = "point_mass",
+        /// [`Unicycle`].
+        Unicycle = "unicycle",
+        /// [`Bicycle`], simplified.
+        Bicycle = "bicycle",
+        /// [`SmallSlipBicycle`]: as a plant only, since position barriers have a mixed relative degree.
+        BicycleSmallSlip = "bicycle_small_slip",
+        /// [`SmallSlipBicycleWithRate`]: the same with the rate of the slip angle as its input.
+        BicycleSmallSlipRate = "bicycle_small_slip_rate",
+        /// [`KinematicBicycle`], steered by the rate of its front wheel.
+        BicycleKinematic = "bicycle_kinematic",
+        /// The same, steered by the angle of its front wheel: as a plant only, since that does not enter linearly.
+        BicycleKinematicAngle = "bicycle_kinematic_angle",
+        /// The same, steered by its slip angle as the simplified and the small-slip bicycle are: as a plant only.
+        BicycleKinematicSlip = "bicycle_kinematic_slip",
+    }
 }
 
 impl ModelName {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::PointMass,
-        Self::Unicycle,
-        Self::Bicycle,
-        Self::BicycleSmallSlip,
-        Self::BicycleSmallSlipRate,
-        Self::BicycleKinematic,
-        Self::BicycleKinematicAngle,
-        Self::BicycleKinematicSlip,
-    ];
-
     /// The states, in order.
     pub fn states(self) -> &'static [Signal] {
         match self {
@@ -86,20 +75,6 @@ impl ModelName {
         }
     }
 
-    /// Its name in a configuration.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PointMass => "point_mass",
-            Self::Unicycle => "unicycle",
-            Self::Bicycle => "bicycle",
-            Self::BicycleSmallSlip => "bicycle_small_slip",
-            Self::BicycleSmallSlipRate => "bicycle_small_slip_rate",
-            Self::BicycleKinematic => "bicycle_kinematic",
-            Self::BicycleKinematicAngle => "bicycle_kinematic_angle",
-            Self::BicycleKinematicSlip => "bicycle_kinematic_slip",
-        }
-    }
-
     fn has_l_r(self) -> bool {
         !matches!(self, Self::PointMass | Self::Unicycle)
     }
@@ -113,17 +88,6 @@ impl ModelName {
         !matches!(self, Self::BicycleKinematicAngle | Self::BicycleKinematicSlip)
     }
 }
-
-/// The names of the models.
-pub(super) static MODELS: [&str; ModelName::ALL.len()] = {
-    let mut names = [""; ModelName::ALL.len()];
-    let mut i = 0;
-    while i < names.len() {
-        names[i] = ModelName::ALL[i].name();
-        i += 1;
-    }
-    names
-};
 
 pub(super) const L_R: Key =
     Key::new("l_r", LENGTH_VALUE, Some("10"), "bicycles: from the rear axle to the centre of mass");
@@ -139,8 +103,11 @@ const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
 pub(super) static SECTION: Section = Section {
     name: "vehicle",
     keys: || {
-        static KEYS: [Key; 3] =
-            [Key::new("model", Value::Word(&MODELS), None, "a [vehicle](#models) by name"), L_R, L_F];
+        static KEYS: [Key; 3] = [
+            Key::new("model", Value::Word(ModelName::WORDS), None, "a [vehicle](#models) by name"),
+            L_R,
+            L_F,
+        ];
         KEYS.iter().collect()
     },
 };
