@@ -313,7 +313,7 @@ impl Serialize for ControllerConfiguration {
 
 impl ControllerConfiguration {
     /// Completes and checks `raw`.
-    pub(super) fn parse(raw: RawController) -> Result<Self, ConfigurationError> {
+    pub(super) fn parse(raw: &RawController) -> Result<Self, ConfigurationError> {
         let name = if raw.name.is_empty() { "controller".to_owned() } else { raw.name.clone() };
         check_identifier("name", &name)?;
         let plant = ReferenceSection::parse(&raw.plant)?;
@@ -368,7 +368,7 @@ impl ControllerConfiguration {
             experiment: raw.experiment,
         };
         for gain in &GAINS {
-            match ((gain.given)(&raw), (gain.access)(&mut configuration)) {
+            match ((gain.given)(raw), (gain.access)(&mut configuration)) {
                 (Some(value), Some(number)) => *number = value,
                 (Some(_), None) => {
                     return refuse(gain.key.name, format!("{word} of {} has none", model.name()));

@@ -103,7 +103,7 @@ impl Configuration {
         Ok(match kind {
             Kind::Filter => Self::Filter(FilterConfiguration::parse(read_toml(text)?, loader)?),
             Kind::Plant => Self::Plant(PlantConfiguration::parse(read_toml(text)?, loader)?),
-            Kind::Controller => Self::Controller(ControllerConfiguration::parse(read_toml(text)?)?),
+            Kind::Controller => Self::Controller(ControllerConfiguration::parse(&read_toml(text)?)?),
         })
     }
 
