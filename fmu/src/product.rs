@@ -15,8 +15,9 @@ use punctual_modeldescription::{
 use uuid::Uuid;
 
 use crate::configuration::{
-    BarrierInput, Configuration, ConfigurationError, ControllerConfiguration, ControllerName,
-    FilterConfiguration, Parameter, PlantConfiguration, Range, VariableSection, base_unit, quantity,
+    BarrierInput, Configuration, ConfigurationError, Controller, ControllerConfiguration,
+    FilterConfiguration, Parameter, PlantConfiguration, PlantSection, Range, VariableSection, base_unit,
+    quantity,
 };
 
 /// Log categories: name and meaning.
@@ -79,10 +80,12 @@ impl Product {
             Configuration::Filter(c) => {
                 format!("Fixed-time safety filter for a {}", c.plant.title())
             }
-            Configuration::Plant(c) => match c.plant.reference() {
-                Some(plant) => format!("Reference plant: {}", plant.model.title()),
-                None if c.plant.plugin.is_some() => "Plant given by a plug-in".to_owned(),
-                None => "Plant given by expressions".to_owned(),
+            Configuration::Plant(c) => match &c.plant {
+                PlantSection::Reference(plant) => format!("Reference plant: {}", plant.model.title()),
+                PlantSection::Plugin(_) => "Plant given by a plug-in".to_owned(),
+                PlantSection::Expressions(_) | PlantSection::External { .. } => {
+                    "Plant given by expressions".to_owned()
+                }
             },
             Configuration::Controller(c) => {
                 format!("Nominal controller ({}) for a {}", c.controller.name(), c.plant.model.title())
@@ -361,15 +364,15 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
         // Damping depends on the states that it opposes; a goal is sought with all of them.
         let dependencies = match c.controller {
             _ if !c.direct_feedthrough => Vec::new(),
-            ControllerName::Damping => {
+            Controller::Damping { .. } => {
                 c.damped().iter().filter(|pair| pair.1 == i).map(|pair| pair.0 as u32).collect()
             }
             _ => (0..outputs as u32).collect(),
         };
         table.signal("u_ref", &input.into(), "wanted ", Causality::Output).dependencies = Some(dependencies);
     }
-    if c.controller == ControllerName::Waypoints {
-        let max = i32::try_from(c.points.len()).ok();
+    if let Controller::Waypoints { points, .. } = &c.controller {
+        let max = i32::try_from(points.len()).ok();
         let kind = VariableKind::Integer(Integer { min: Some(1), max, ..Integer::default() });
         let waypoint = "which of the points is the goal, from 1";
         let position = if c.direct_feedthrough { vec![0, 1] } else { Vec::new() };

@@ -180,7 +180,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
             BlockState::Plant { x }
         }
         Configuration::Controller(c) => {
-            let (waypoint, points) = (input.field("waypoint")?, c.points.len().max(1));
+            let (waypoint, points) = (input.field("waypoint")?, c.points().len().max(1));
             if waypoint as usize >= points {
                 return Err(format!("waypoint: is {waypoint}, must be < {points}"));
             }

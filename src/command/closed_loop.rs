@@ -94,7 +94,7 @@ impl Wanted {
         match self {
             Self::None => u_ref.fill(0.0),
             Self::Constant(values) => u_ref.copy_from_slice(values),
-            Self::Damping if c.plant.model == Some(ModelName::PointMass) => {
+            Self::Damping if c.plant.model() == Some(ModelName::PointMass) => {
                 u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
             }
             Self::Damping => {
@@ -107,7 +107,7 @@ impl Wanted {
 
 /// Whether damping is known for the plant: the fourth state of every vehicle is a velocity.
 pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
-    c.plant.model.is_some() && c.plant.states().len() > 3
+    c.plant.model().is_some() && c.plant.states().len() > 3
 }
 
 /// Result of a closed loop.
@@ -390,10 +390,10 @@ pub(super) fn reach(
     Ok(ReachReport { deadline: verdict, soonest_at_least: soonest, soonest_at_most: most })
 }
 
-fn name(profile: ProfileKind) -> &'static str {
+fn named(profile: ProfileKind) -> ProfileName {
     match profile {
-        ProfileKind::Hermite => "hermite",
-        ProfileKind::LowPeak => "low_peak",
+        ProfileKind::Hermite => ProfileName::Hermite,
+        ProfileKind::LowPeak => ProfileName::LowPeak,
     }
 }
 
@@ -419,10 +419,7 @@ pub(super) fn ratings(
             let Some(deadline) = section.deadline else { continue };
             section.rates.clear();
             section.rate = Automatic(candidate.rate_times_deadline / deadline);
-            section.profile = match candidate.profile {
-                ProfileKind::Hermite => ProfileName::Hermite,
-                ProfileKind::LowPeak => ProfileName::LowPeak,
-            };
+            section.profile = named(candidate.profile);
         }
         for &i in &driven {
             let limit = written(bound).min(UNBOUNDED);
@@ -445,7 +442,7 @@ pub(super) fn ratings(
             // A barrier without a deadline has nothing to paste.
             let Some(deadline) = section.deadline else { continue };
             let rate = candidate.rate_times_deadline / deadline;
-            let profile = name(candidate.profile);
+            let profile = named(candidate.profile).name();
             lines
                 .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));
         }
@@ -460,7 +457,7 @@ pub(super) fn ratings(
     Ok(ratings
         .iter()
         .map(|r| RatingReport {
-            profile: name(r.candidate.profile),
+            profile: named(r.candidate.profile).name(),
             rate_times_deadline: r.candidate.rate_times_deadline,
             peak: r.peak,
             smallest_bound: r.bound.map(written),

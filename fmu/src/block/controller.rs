@@ -2,11 +2,11 @@
 
 use punctual_core::jet::Tangent;
 use punctual_core::scalar::Scalar;
-use punctual_reference::nominal::damping;
+use punctual_reference::nominal::{Heading, damping};
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{
-    ConfigurationError, ControllerConfiguration, ControllerName, ModelName, Parameter, updated,
+    ConfigurationError, Controller, ControllerConfiguration, ModelName, Parameter, updated,
 };
 use crate::product::Layout;
 
@@ -28,12 +28,13 @@ impl ControllerBlock {
 
     /// The present point at the position of `x`: points that are reached are passed, except the last.
     fn present(&self, x: &[f64]) -> usize {
-        let (points, radius) = (&self.configuration.points, self.configuration.acceptance());
         let mut present = self.waypoint;
-        while present + 1 < points.len()
-            && (points[present][0] - x[0]).hypot(points[present][1] - x[1]) <= radius
-        {
-            present += 1;
+        if let Controller::Waypoints { points, acceptance_radius, .. } = &self.configuration.controller {
+            while present + 1 < points.len()
+                && (points[present][0] - x[0]).hypot(points[present][1] - x[1]) <= *acceptance_radius
+            {
+                present += 1;
+            }
         }
         present
     }
@@ -47,22 +48,22 @@ impl ControllerBlock {
             return [S::from(f64::NAN); INPUTS];
         }
         let states = c.plant.model.states().len();
-        let goal = match c.controller {
-            ControllerName::Damping => {
+        let (goal, drive) = match &c.controller {
+            Controller::Damping { gain } => {
                 let mut u = [S::zero(); INPUTS];
                 for &(state, input) in c.damped() {
-                    u[input] = damping(x(state), c.damping_gain());
+                    u[input] = damping(x(state), *gain);
                 }
                 return u;
             }
-            ControllerName::Heading if c.goal_input => [x(states), x(states + 1)],
-            ControllerName::Heading => c.goal.unwrap_or_default().map(S::from),
-            ControllerName::Waypoints => c.points[waypoint].map(S::from),
+            Controller::Heading { drive, goal_input: true } => ([x(states), x(states + 1)], drive),
+            Controller::Heading { drive, goal_input: false } => (drive.goal.map(S::from), drive),
+            Controller::Waypoints { points, drive, .. } => (points[waypoint].map(S::from), drive),
         };
         // The state as seen from the goal.
-        let heading = c.heading([0.0; 2]);
+        let heading = Heading { goal: [0.0; 2], ..*drive };
         let x = &[x(0) - goal[0], x(1) - goal[1], x(2), x(3)];
-        match (c.plant.model, c.plant.l_r) {
+        match (c.plant.model, c.plant.l_r()) {
             (ModelName::PointMass, _) => heading.point_mass(x),
             (_, None) => heading.unicycle(x),
             (_, Some(l_r)) => heading.bicycle(x, l_r),
@@ -72,7 +73,7 @@ impl ControllerBlock {
     fn write(&self, values: &mut Values, waypoint: usize, u: [f64; INPUTS]) {
         let at = self.layout.outputs;
         values.reals[at..][..INPUTS].copy_from_slice(&u);
-        if self.configuration.controller == ControllerName::Waypoints {
+        if let Controller::Waypoints { .. } = self.configuration.controller {
             values.integers[at + INPUTS] = i32::try_from(waypoint + 1).unwrap_or(i32::MAX);
         }
     }

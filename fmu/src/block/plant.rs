@@ -4,7 +4,7 @@ use punctual_core::dynamics::DynPlant;
 
 use super::disturbance::Disturbance;
 use super::{Block, BlockState, Values};
-use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, updated};
+use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, PlantSection, updated};
 use crate::product::Layout;
 
 /// Most Runge-Kutta steps in one communication step. A number beyond it is a mistake in the step sizes, and would
@@ -84,7 +84,10 @@ impl Block for PlantBlock {
         }
         if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
             let name = self.configuration.plant.state_name(i);
-            let place = self.configuration.plant.derivatives.get(name);
+            let place = match &self.configuration.plant {
+                PlantSection::Expressions(own) => own.derivatives.get(name),
+                _ => None,
+            };
             let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
             return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i]));
         }

@@ -100,8 +100,13 @@ impl Adding<'_> {
     /// Adds the barrier of the plant's plug-in that is called `output`.
     pub(super) fn plugin(self, output: &str) -> Result<FilterBuilder, ConfigurationError> {
         let plant = &self.configuration.plant;
+        let Some(plugin) = plant.plugin() else {
+            let field = format!("barrier[{}].shape", self.index);
+            return Err(ConfigurationError::new(field, "is for the plants that are a plug-in"));
+        };
         let position = plant.plugin_barriers().iter().position(|b| b.name == output);
-        let barrier = plant.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
+        let barrier =
+            plugin.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
         let found = barrier.relative_degree(&plant.ranges());
         self.model(found, |n| barrier.source(n))
     }
@@ -151,7 +156,7 @@ impl FilterConfiguration {
         if let Some(found) = error.relative_degree() {
             let inputs = self.plant.inputs();
             let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
-            let advice = match (self.plant.model, found) {
+            let advice = match (self.plant.model(), found) {
                 (Some(ModelName::BicycleSmallSlip), _) => {
                     "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself"
                 }

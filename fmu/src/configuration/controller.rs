@@ -1,7 +1,8 @@
 //! `kind = "controller"`: a nominal controller, which gives the wanted input of a plant without any promise.
 
 use punctual_reference::nominal::Heading;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::key::{
     Key, Section,
@@ -9,55 +10,33 @@ use super::key::{
     Value::{Flag, Name, Number, Pair, Pairs, Table, Word},
 };
 use super::names::check_identifier;
+use super::reference::{self, RawReference};
+use super::words::words;
 use super::{
     ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, Range, ReferenceSection,
-    reference,
 };
 
-/// The nominal controllers by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ControllerName {
-    /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
-    Damping,
-    /// [`Heading`] to one goal.
-    Heading,
-    /// [`Heading`] to one point after the other; the last is held.
-    Waypoints,
-}
-
-impl ControllerName {
-    /// Its name in a configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Damping => "damping",
-            Self::Heading => "heading",
-            Self::Waypoints => "waypoints",
-        }
+words! {
+    /// The nominal controllers by name.
+    pub enum ControllerName {
+        /// [`damping`](punctual_reference::nominal::damping): of speeds, and of the angle that a rate steers.
+        Damping = "damping",
+        /// [`Heading`] to one goal.
+        Heading = "heading",
+        /// [`Heading`] to one point after the other; the last is held.
+        Waypoints = "waypoints",
     }
 }
 
-/// The numbers of the controllers, each with the controllers and models that have it.
+/// A number of a controller.
 struct Gain {
     key: Key,
     /// Meaning, as the FMU tells it.
     description: &'static str,
-    has: fn(ControllerName, ModelName) -> bool,
-    default: fn(&Heading) -> f64,
-    access: fn(&mut ControllerConfiguration) -> &mut Option<f64>,
-}
-
-fn drives(controller: ControllerName, _: ModelName) -> bool {
-    controller != ControllerName::Damping
-}
-
-fn turns(controller: ControllerName, model: ModelName) -> bool {
-    drives(controller, model) && model != ModelName::PointMass
-}
-
-fn slips(controller: ControllerName, model: ModelName) -> bool {
-    drives(controller, model)
-        && matches!(model, ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip)
+    /// Value in a file.
+    given: fn(&RawController) -> Option<f64>,
+    /// The number, in a controller that has it.
+    access: fn(&mut ControllerConfiguration) -> Option<&mut f64>,
 }
 
 /// Default of the gain of the damping in 1/s.
@@ -75,9 +54,11 @@ static GAINS: [Gain; 9] = [
             "`damping`: deceleration per speed, and rate per steering or slip angle where a rate steers",
         ),
         description: "deceleration per speed, and rate per steering or slip angle where a rate steers",
-        has: |controller, _| controller == ControllerName::Damping,
-        default: |_| GAIN,
-        access: |c| &mut c.gain,
+        given: |raw| raw.gain,
+        access: |c| match &mut c.controller {
+            Controller::Damping { gain } => Some(gain),
+            _ => None,
+        },
     },
     Gain {
         key: Key::new(
@@ -87,9 +68,11 @@ static GAINS: [Gain; 9] = [
             "`waypoints`: distance from a point at which the next one becomes the goal",
         ),
         description: "distance from a point at which the next one becomes the goal",
-        has: |controller, _| controller == ControllerName::Waypoints,
-        default: |_| ACCEPTANCE,
-        access: |c| &mut c.acceptance_radius,
+        given: |raw| raw.acceptance_radius,
+        access: |c| match &mut c.controller {
+            Controller::Waypoints { acceptance_radius, .. } => Some(acceptance_radius),
+            _ => None,
+        },
     },
     Gain {
         key: Key::new(
@@ -99,9 +82,8 @@ static GAINS: [Gain; 9] = [
             "speed aimed at per distance to the goal",
         ),
         description: "speed aimed at per distance to the goal",
-        has: drives,
-        default: |h| h.speed_gain,
-        access: |c| &mut c.speed_gain,
+        given: |raw| raw.speed_gain,
+        access: |c| c.drive().map(|h| &mut h.speed_gain),
     },
     Gain {
         key: Key::new(
@@ -111,9 +93,8 @@ static GAINS: [Gain; 9] = [
             "largest speed aimed at",
         ),
         description: "largest speed aimed at",
-        has: drives,
-        default: |h| h.speed_limit,
-        access: |c| &mut c.speed_limit,
+        given: |raw| raw.speed_limit,
+        access: |c| c.drive().map(|h| &mut h.speed_limit),
     },
     Gain {
         key: Key::new(
@@ -123,9 +104,8 @@ static GAINS: [Gain; 9] = [
             "acceleration per speed error",
         ),
         description: "acceleration per speed error",
-        has: drives,
-        default: |h| h.acceleration_gain,
-        access: |c| &mut c.acceleration_gain,
+        given: |raw| raw.acceleration_gain,
+        access: |c| c.drive().map(|h| &mut h.acceleration_gain),
     },
     Gain {
         key: Key::new(
@@ -135,9 +115,8 @@ static GAINS: [Gain; 9] = [
             "largest acceleration",
         ),
         description: "largest acceleration",
-        has: drives,
-        default: |h| h.acceleration_limit,
-        access: |c| &mut c.acceleration_limit,
+        given: |raw| raw.acceleration_limit,
+        access: |c| c.drive().map(|h| &mut h.acceleration_limit),
     },
     Gain {
         key: Key::new(
@@ -147,9 +126,8 @@ static GAINS: [Gain; 9] = [
             "turning rate per angle to the goal; not for the point mass",
         ),
         description: "turning rate per angle to the goal",
-        has: turns,
-        default: |h| h.turn_gain,
-        access: |c| &mut c.turn_gain,
+        given: |raw| raw.turn_gain,
+        access: |c| c.turning().map(|h| &mut h.turn_gain),
     },
     Gain {
         key: Key::new(
@@ -159,9 +137,8 @@ static GAINS: [Gain; 9] = [
             "largest turning rate; not for the point mass",
         ),
         description: "largest turning rate",
-        has: turns,
-        default: |h| h.turn_limit,
-        access: |c| &mut c.turn_limit,
+        given: |raw| raw.turn_limit,
+        access: |c| c.turning().map(|h| &mut h.turn_limit),
     },
     Gain {
         key: Key::new(
@@ -171,9 +148,8 @@ static GAINS: [Gain; 9] = [
             "largest slip angle; bicycles steered by it",
         ),
         description: "largest slip angle",
-        has: slips,
-        default: |h| h.slip_limit,
-        access: |c| &mut c.slip_limit,
+        given: |raw| raw.slip_limit,
+        access: |c| c.slipping().map(|h| &mut h.slip_limit),
     },
 ];
 
@@ -187,7 +163,7 @@ pub(super) static SECTION: Section = Section {
             Key::new("plant", Table(&reference::SECTION), None, "`model`, `l_r`, `l_f` of a vehicle"),
             Key::new(
                 "controller",
-                Word(&["damping", "heading", "waypoints"]),
+                Word(ControllerName::WORDS),
                 None,
                 "`damping`, `heading` to a goal, `waypoints` one after the other, the last one held (output `waypoint`)",
             ),
@@ -213,86 +189,138 @@ pub(super) static SECTION: Section = Section {
     },
 };
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum ControllerKind {
+enum ControllerKind {
     Controller,
 }
 
-/// A controller FMU: from the state of a plant to `u_ref`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+/// A controller as it stands in a file: the keys of every kind.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ControllerConfiguration {
-    pub(super) kind: ControllerKind,
-    /// The FMU's name, a C identifier. Default `controller`.
+pub(super) struct RawController {
+    kind: ControllerKind,
     #[serde(default)]
-    pub name: String,
-    /// The kind of controller.
-    pub controller: ControllerName,
-    /// Whether outputs follow inputs without a step between them. Default true; with false, outputs
-    /// are computed in steps only.
+    name: String,
+    controller: ControllerName,
     #[serde(default = "yes")]
-    pub direct_feedthrough: bool,
-    /// `damping`: in 1/s, > 0. Default 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gain: Option<f64>,
-    /// `heading`: the goal in m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub goal: Option<[f64; 2]>,
-    /// `heading`: whether the goal is an input of the FMU, such as another FMU's output, that starts with
-    /// the value here, and not a parameter. Default false.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub goal_input: bool,
-    /// `waypoints`: the points in m, in order, at least one.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub points: Vec<[f64; 2]>,
-    /// `waypoints`: a point counts as reached within this distance in m, > 0. Default 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub acceptance_radius: Option<f64>,
-    /// `heading`, `waypoints`: as [`Heading::speed_gain`], whose type has the defaults of this and the following.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub speed_gain: Option<f64>,
-    /// As [`Heading::speed_limit`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub speed_limit: Option<f64>,
-    /// As [`Heading::acceleration_gain`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub acceleration_gain: Option<f64>,
-    /// As [`Heading::acceleration_limit`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub acceleration_limit: Option<f64>,
-    /// As [`Heading::turn_gain`]; not for the point mass.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub turn_gain: Option<f64>,
-    /// As [`Heading::turn_limit`]; not for the point mass.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub turn_limit: Option<f64>,
-    /// As [`Heading::slip_limit`]; bicycles only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub slip_limit: Option<f64>,
-    /// The plant that it controls.
-    pub plant: ReferenceSection,
-    /// The run that it is meant for.
+    direct_feedthrough: bool,
+    gain: Option<f64>,
+    goal: Option<[f64; 2]>,
     #[serde(default)]
-    pub experiment: ExperimentSection,
+    goal_input: bool,
+    #[serde(default)]
+    points: Vec<[f64; 2]>,
+    acceptance_radius: Option<f64>,
+    speed_gain: Option<f64>,
+    speed_limit: Option<f64>,
+    acceleration_gain: Option<f64>,
+    acceleration_limit: Option<f64>,
+    turn_gain: Option<f64>,
+    turn_limit: Option<f64>,
+    slip_limit: Option<f64>,
+    plant: RawReference,
+    #[serde(default)]
+    experiment: ExperimentSection,
 }
 
 fn yes() -> bool {
     true
 }
 
-impl ControllerConfiguration {
-    pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
-        if self.name.is_empty() {
-            self.name = "controller".to_owned();
+/// A kind of controller, with its target and its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Controller {
+    /// [`damping`](punctual_reference::nominal::damping).
+    Damping {
+        /// In 1/s, > 0.
+        gain: f64,
+    },
+    /// [`Heading`] to one goal.
+    Heading {
+        /// The goal, and how it is driven to.
+        drive: Heading,
+        /// Whether the goal is an input of the FMU, such as another FMU's output, that starts with the value in
+        /// `drive`, and not a parameter.
+        goal_input: bool,
+    },
+    /// [`Heading`] to one point after the other.
+    Waypoints {
+        /// The points in m, in order, at least one.
+        points: Vec<[f64; 2]>,
+        /// Distance in m within which a point counts as reached, > 0.
+        acceptance_radius: f64,
+        /// The way to a point, which takes the place of the goal.
+        drive: Heading,
+    },
+}
+
+impl Controller {
+    /// Its name in a configuration.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Damping { .. } => ControllerName::Damping.name(),
+            Self::Heading { .. } => ControllerName::Heading.name(),
+            Self::Waypoints { .. } => ControllerName::Waypoints.name(),
         }
-        check_identifier("name", &self.name)?;
-        self.plant.complete()?;
-        // The controller must suit the plant.
-        let (controller, model) = (self.controller, self.plant.model);
+    }
+}
+
+/// A controller FMU: from the state of a plant to `u_ref`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ControllerConfiguration {
+    kind: ControllerKind,
+    /// The FMU's name, a C identifier.
+    pub name: String,
+    /// The controller.
+    pub controller: Controller,
+    /// Whether outputs follow inputs without a step between them; with false, outputs are computed in steps only.
+    pub direct_feedthrough: bool,
+    /// The plant that it controls.
+    pub plant: ReferenceSection,
+    /// The run that it is meant for.
+    pub experiment: ExperimentSection,
+}
+
+impl Serialize for ControllerConfiguration {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("kind", &self.kind)?;
+        map.serialize_entry("name", &self.name)?;
+        map.serialize_entry("controller", self.controller.name())?;
+        map.serialize_entry("direct_feedthrough", &self.direct_feedthrough)?;
+        match &self.controller {
+            Controller::Damping { .. } => {}
+            Controller::Heading { drive, goal_input } => {
+                map.serialize_entry("goal", &drive.goal)?;
+                if *goal_input {
+                    map.serialize_entry("goal_input", goal_input)?;
+                }
+            }
+            Controller::Waypoints { points, .. } => map.serialize_entry("points", points)?,
+        }
+        let mut reached = self.clone();
+        for gain in &GAINS {
+            if let Some(value) = (gain.access)(&mut reached) {
+                map.serialize_entry(gain.key.name, value)?;
+            }
+        }
+        map.serialize_entry("plant", &self.plant)?;
+        map.serialize_entry("experiment", &self.experiment)?;
+        map.end()
+    }
+}
+
+impl ControllerConfiguration {
+    /// Completes and checks `raw`.
+    pub(super) fn parse(raw: &RawController) -> Result<Self, ConfigurationError> {
+        let name = if raw.name.is_empty() { "controller".to_owned() } else { raw.name.clone() };
+        check_identifier("name", &name)?;
+        let plant = ReferenceSection::parse(&raw.plant)?;
+        let (word, model) = (raw.controller.name(), plant.model);
         let refuse = |field: &str, message: String| Err(ConfigurationError::new(field, message));
-        let name = controller.name();
-        if drives(controller, model)
+        // The controller must suit the plant.
+        if raw.controller != ControllerName::Damping
             && matches!(
                 model,
                 ModelName::BicycleSmallSlipRate
@@ -300,94 +328,147 @@ impl ControllerConfiguration {
                     | ModelName::BicycleKinematicAngle
             )
         {
-            let message = format!("is {name:?}, which {} has none of; must be \"damping\"", model.name());
+            let message = format!("is {word:?}, which {} has none of; must be \"damping\"", model.name());
             return refuse("controller", message);
         }
         // The target, a goal or points, must be that of the controller.
-        let (heading, waypoints) =
-            (controller == ControllerName::Heading, controller == ControllerName::Waypoints);
-        for (field, given, has) in
-            [("goal", self.goal.is_some(), heading), ("points", !self.points.is_empty(), waypoints)]
-        {
-            match (given, has) {
-                (true, false) => return refuse(field, format!("{name} has none")),
-                (false, true) => return refuse(field, format!("missing, {name} needs it")),
-                _ => {}
+        let none = |field: &str, given: bool| match given {
+            true => Err(ConfigurationError::new(field, format!("{word} has none"))),
+            false => Ok(()),
+        };
+        let missing = |field: &str| ConfigurationError::new(field, format!("missing, {word} needs it"));
+        let points = Some(raw.points.clone()).filter(|points| !points.is_empty());
+        let controller = match raw.controller {
+            ControllerName::Damping => {
+                none("goal", raw.goal.is_some())?;
+                none("points", points.is_some())?;
+                none("goal_input", raw.goal_input)?;
+                Controller::Damping { gain: GAIN }
             }
-        }
-        if self.goal_input && !heading {
-            return refuse("goal_input", format!("{name} has none"));
-        }
-        // Complete the gains.
-        let defaults = Heading::towards([0.0; 2]);
+            ControllerName::Heading => {
+                let drive = Heading::towards(raw.goal.ok_or_else(|| missing("goal"))?);
+                none("points", points.is_some())?;
+                Controller::Heading { drive, goal_input: raw.goal_input }
+            }
+            ControllerName::Waypoints => {
+                none("goal", raw.goal.is_some())?;
+                let points = points.ok_or_else(|| missing("points"))?;
+                none("goal_input", raw.goal_input)?;
+                let drive = Heading::towards([0.0; 2]);
+                Controller::Waypoints { points, acceptance_radius: ACCEPTANCE, drive }
+            }
+        };
+        // The numbers have their defaults, until others are given.
+        let mut configuration = Self {
+            kind: raw.kind,
+            name,
+            controller,
+            direct_feedthrough: raw.direct_feedthrough,
+            plant,
+            experiment: raw.experiment,
+        };
         for gain in &GAINS {
-            let value = (gain.access)(&mut self);
-            if (gain.has)(controller, model) {
-                value.get_or_insert((gain.default)(&defaults));
-            } else if value.is_some() {
-                return refuse(gain.key.name, format!("{name} of {} has none", model.name()));
+            match ((gain.given)(raw), (gain.access)(&mut configuration)) {
+                (Some(value), Some(number)) => *number = value,
+                (Some(_), None) => {
+                    return refuse(gain.key.name, format!("{word} of {} has none", model.name()));
+                }
+                (None, _) => {}
             }
         }
         // Check every number against its range.
-        self.experiment.check()?;
+        configuration.experiment.check()?;
         // The start values of inputs are not parameters.
-        if let Some([x, y]) = self.goal {
+        if let Some([x, y]) = raw.goal {
             Range::FINITE.check("goal[1]", x)?;
             Range::FINITE.check("goal[2]", y)?;
         }
-        for parameter in self.parameters() {
-            parameter.check(&mut self)?;
+        for parameter in configuration.parameters() {
+            parameter.check(&mut configuration)?;
         }
-        Ok(self)
+        Ok(configuration)
+    }
+
+    /// The drive of a controller that has one.
+    fn drive(&mut self) -> Option<&mut Heading> {
+        match &mut self.controller {
+            Controller::Damping { .. } => None,
+            Controller::Heading { drive, .. } | Controller::Waypoints { drive, .. } => Some(drive),
+        }
+    }
+
+    /// The drive of a vehicle that turns.
+    fn turning(&mut self) -> Option<&mut Heading> {
+        if self.plant.model == ModelName::PointMass { None } else { self.drive() }
+    }
+
+    /// The drive of a vehicle that is steered by its slip angle.
+    fn slipping(&mut self) -> Option<&mut Heading> {
+        match self.plant.model {
+            ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip => {
+                self.drive()
+            }
+            _ => None,
+        }
     }
 
     /// The numbers that are parameters of the FMU.
     pub fn parameters(&self) -> Vec<Parameter<Self>> {
         let mut rows: Vec<Parameter<Self>> = Vec::new();
         let axes = ["x", "y"];
-        for (i, axis) in axes.iter().enumerate().filter(|_| self.goal.is_some() && !self.goal_input) {
-            let name = format!("goal[{}]", i + 1);
-            let description = format!("the goal along {axis}");
-            rows.push(Parameter::new(
-                (name.clone(), name),
-                "m",
-                Range::FINITE,
-                description,
-                move |c: &mut Self| c.goal.as_mut().map(|goal| &mut goal[i]),
-            ));
+        if let Controller::Heading { goal_input: false, .. } = self.controller {
+            for (i, axis) in axes.iter().enumerate() {
+                let name = format!("goal[{}]", i + 1);
+                let description = format!("the goal along {axis}");
+                rows.push(Parameter::new(
+                    (name.clone(), name),
+                    "m",
+                    Range::FINITE,
+                    description,
+                    move |c: &mut Self| c.drive().map(|drive| &mut drive.goal[i]),
+                ));
+            }
         }
-        for k in 0..self.points.len() {
+        for k in 0..self.points().len() {
             for (i, axis) in axes.iter().enumerate() {
                 // Files count points from 0, as the error messages of serde do; variables from 1, as FMI.
                 let names = (format!("points[{},{}]", k + 1, i + 1), format!("points[{k}][{}]", i + 1));
                 let description = format!("point {} along {axis}", k + 1);
                 rows.push(Parameter::new(names, "m", Range::FINITE, description, move |c: &mut Self| {
-                    c.points.get_mut(k).map(|point| &mut point[i])
+                    match &mut c.controller {
+                        Controller::Waypoints { points, .. } => points.get_mut(k).map(|point| &mut point[i]),
+                        _ => None,
+                    }
                 }));
             }
         }
-        for gain in GAINS.iter().filter(|g| (g.has)(self.controller, self.plant.model)) {
+        let mut reached = self.clone();
+        for gain in GAINS.iter().filter(|gain| (gain.access)(&mut reached).is_some()) {
             let Number(unit, range) = gain.key.value else { continue };
             let names = (gain.key.name.to_owned(), gain.key.name.to_owned());
             let unit = unit.of_barrier("1", 0);
-            rows.push(Parameter::new(names, unit, range, gain.description, |c: &mut Self| {
-                (gain.access)(c).as_mut()
-            }));
+            rows.push(Parameter::new(names, unit, range, gain.description, gain.access));
         }
-        if slips(self.controller, self.plant.model) {
-            rows.extend(
-                self.plant.parameters(|c: &mut Self| &mut c.plant.l_r, |c: &mut Self| &mut c.plant.l_f),
-            );
+        if reached.slipping().is_some() {
+            rows.extend(self.plant.parameters(|c: &mut Self| Some(&mut c.plant)));
         }
         rows
     }
 
+    /// The points of `waypoints`, else none.
+    pub fn points(&self) -> &[[f64; 2]] {
+        match &self.controller {
+            Controller::Waypoints { points, .. } => points,
+            _ => &[],
+        }
+    }
+
     /// Its inputs besides the state, with units, start values and meanings.
     pub fn goal_inputs(&self) -> Vec<(&'static str, &'static str, f64, &'static str)> {
-        let [x, y] = self.goal.unwrap_or_default();
-        if !self.goal_input {
+        let Controller::Heading { drive: Heading { goal: [x, y], .. }, goal_input: true } = self.controller
+        else {
             return Vec::new();
-        }
+        };
         vec![("goal[1]", "m", x, "the goal along x"), ("goal[2]", "m", y, "the goal along y")]
     }
 
@@ -402,31 +483,5 @@ impl ControllerConfiguration {
             | ModelName::BicycleKinematicSlip => &[(3, 0)],
             ModelName::BicycleSmallSlipRate | ModelName::BicycleKinematic => &[(3, 0), (4, 1)],
         }
-    }
-
-    /// The controller of `heading` and `waypoints` towards `goal` (m). A gain that is not given has the default.
-    pub fn heading(&self, goal: [f64; 2]) -> Heading {
-        let or = |value: Option<f64>, default: f64| value.unwrap_or(default);
-        let defaults = Heading::towards(goal);
-        Heading {
-            goal,
-            speed_gain: or(self.speed_gain, defaults.speed_gain),
-            speed_limit: or(self.speed_limit, defaults.speed_limit),
-            acceleration_gain: or(self.acceleration_gain, defaults.acceleration_gain),
-            acceleration_limit: or(self.acceleration_limit, defaults.acceleration_limit),
-            turn_gain: or(self.turn_gain, defaults.turn_gain),
-            turn_limit: or(self.turn_limit, defaults.turn_limit),
-            slip_limit: or(self.slip_limit, defaults.slip_limit),
-        }
-    }
-
-    /// The gain of `damping` in 1/s.
-    pub fn damping_gain(&self) -> f64 {
-        self.gain.unwrap_or(GAIN)
-    }
-
-    /// The acceptance radius of `waypoints` in m.
-    pub fn acceptance(&self) -> f64 {
-        self.acceptance_radius.unwrap_or(ACCEPTANCE)
     }
 }

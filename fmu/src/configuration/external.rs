@@ -4,8 +4,8 @@ use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 use super::names::taken;
 use super::{
-    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, Shape, over_seconds,
-    unit_per,
+    BarrierSection, ConfigurationError, FilterConfiguration, PlantSection, SamplingName, Shape,
+    VariableSection, over_seconds, unit_per,
 };
 
 /// A real input of a filter that belongs to a barrier.
@@ -53,13 +53,13 @@ pub(super) fn check_degree(path: &str, degree: usize) -> Result<(), Configuratio
 }
 
 /// Refuses inputs of a plant without a model that are too many or share a name.
-pub(super) fn check_inputs(plant: &PlantSection) -> Result<(), ConfigurationError> {
-    if plant.inputs.len() > MAX_INPUTS {
-        let message = format!("has {} entries, must have at most {MAX_INPUTS}", plant.inputs.len());
+pub(super) fn check_inputs(inputs: &[VariableSection]) -> Result<(), ConfigurationError> {
+    if inputs.len() > MAX_INPUTS {
+        let message = format!("has {} entries, must have at most {MAX_INPUTS}", inputs.len());
         return Err(ConfigurationError::new("plant.inputs", message));
     }
-    for (i, input) in plant.inputs.iter().enumerate() {
-        if plant.inputs[..i].iter().any(|other| other.name == input.name) {
+    for (i, input) in inputs.iter().enumerate() {
+        if inputs[..i].iter().any(|other| other.name == input.name) {
             return Err(taken(format!("plant.inputs[{i}].name"), &input.name));
         }
     }

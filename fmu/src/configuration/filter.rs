@@ -13,7 +13,9 @@ use super::key::{
     Unit::{Is, Of},
     Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, Word},
 };
+use super::model::RawModel;
 use super::names::{Named, check_identifier, is_reserved, taken};
+use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, EXPERIMENT, ExperimentSection, IntegratorSection,
     Parameter, PlantSection, PluginLoader, Range, VariableSection, barrier, integrator, model,
@@ -22,17 +24,17 @@ use super::{
 /// Size from which an input bound means "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
 
-/// The treatment of inputs that are held between samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SamplingName {
-    /// [`Sampling::Pointwise`]: the margin has to cover the hold.
-    Pointwise,
-    /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
-    /// `[experiment]`.
-    Measured,
-    /// [`Sampling::Period`] with the step size of `[experiment]`.
-    StepSize,
+words! {
+    /// The treatment of inputs that are held between samples.
+    pub enum SamplingName {
+        /// [`Sampling::Pointwise`]: the margin has to cover the hold.
+        Pointwise = "pointwise",
+        /// [`Sampling::Measured`]: predicted over the period since the last step, at first the step size of
+        /// `[experiment]`.
+        Measured = "measured",
+        /// [`Sampling::Period`] with the step size of `[experiment]`.
+        StepSize = "step_size",
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -57,7 +59,7 @@ pub(super) struct RawFilter {
     period_max: f64,
     #[serde(default = "correction_limit")]
     correction_limit: f64,
-    plant: PlantSection,
+    plant: RawModel,
     integrator: Option<IntegratorSection>,
     barrier: Vec<RawBarrier>,
     #[serde(default)]
@@ -135,7 +137,7 @@ pub(super) static SECTION: Section = Section {
             ),
             Key::new(
                 "sampling",
-                Word(&["pointwise", "measured", "step_size"]),
+                Word(SamplingName::WORDS),
                 Some(
                     "`measured`; `pointwise` where the plant has inputs only. With an external barrier it must be `pointwise`",
                 ),
@@ -203,7 +205,7 @@ fn barriers(raw: Vec<RawBarrier>, plant: &PlantSection) -> Result<Vec<BarrierSec
         let barrier = BarrierSection::parse(raw, &format!("barrier[{i}]"), plant)?;
         let name = &barrier.name;
         // A barrier's variables must not fall among the filter's own.
-        let others = plant.parameters.iter().map(|p| &p.name).chain(barriers.iter().map(|b| &b.name));
+        let others = plant.own_parameters().iter().map(|p| &p.name).chain(barriers.iter().map(|b| &b.name));
         if is_reserved(name, Named::Barrier) || others.into_iter().any(|other| other == name) {
             return Err(taken(format!("barrier[{i}].name"), name));
         }
@@ -218,9 +220,8 @@ impl FilterConfiguration {
         // Name and plant.
         let name = if raw.name.is_empty() { "filter".to_owned() } else { raw.name };
         check_identifier("name", &name)?;
-        let mut plant = raw.plant;
-        plant.complete(loader)?;
-        if let Some(model) = plant.model.filter(|model| !model.is_affine()) {
+        let plant = PlantSection::parse(raw.plant, loader)?;
+        if let Some(model) = plant.model().filter(|model| !model.is_affine()) {
             return Err(not_affine(model));
         }
         if let Some(integrator) = &raw.integrator {

@@ -19,19 +19,20 @@ mod plugin;
 mod read;
 mod reference;
 mod unit;
+mod words;
 
 pub use barrier::{
     Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
 };
-pub use controller::{ControllerConfiguration, ControllerName};
+pub use controller::{Controller, ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
-pub use model::{ParameterSection, PlantSection, VariableSection};
+pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
-pub use plugin::{Plugin, PluginDigest, PluginLoader};
+pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};
@@ -101,8 +102,8 @@ impl Configuration {
         };
         Ok(match kind {
             Kind::Filter => Self::Filter(FilterConfiguration::parse(read_toml(text)?, loader)?),
-            Kind::Plant => Self::Plant(read_toml::<PlantConfiguration>(text)?.completed(loader)?),
-            Kind::Controller => Self::Controller(read_toml::<ControllerConfiguration>(text)?.completed()?),
+            Kind::Plant => Self::Plant(PlantConfiguration::parse(read_toml(text)?, loader)?),
+            Kind::Controller => Self::Controller(ControllerConfiguration::parse(&read_toml(text)?)?),
         })
     }
 
@@ -140,11 +141,12 @@ impl Configuration {
 
     /// The plug-in of its plant, if the plant is one.
     pub fn plugin(&self) -> Option<&Plugin> {
-        match self {
-            Self::Filter(c) => c.plant.loaded(),
-            Self::Plant(c) => c.plant.loaded(),
-            Self::Controller(_) => None,
-        }
+        let plant = match self {
+            Self::Filter(c) => &c.plant,
+            Self::Plant(c) => &c.plant,
+            Self::Controller(_) => return None,
+        };
+        plant.plugin().map(PluginSection::loaded)
     }
 
     /// The run that it is meant for.

@@ -14,8 +14,8 @@ use super::key::{
     Value::{Name, Number, Tables, Text, TextByName, TextOrByName, Word},
 };
 use super::names::{Named, check_identifier, is_reserved, taken};
-use super::plugin::{Loaded, PluginDigest, PluginLoader};
-use super::reference::{self, MODELS};
+use super::plugin::{PluginDigest, PluginLoader, PluginSection};
+use super::reference::{self, RawReference};
 use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit};
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
@@ -84,41 +84,55 @@ impl From<&Signal> for VariableSection {
     }
 }
 
-/// `[plant]`: a reference plant (`model`, with its constants), a model of expressions (`states`, `inputs`,
-/// `parameters`, `derivatives`), a plug-in (`plugin`), or `inputs` alone, for a filter that is given the
-/// derivatives of its barriers.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlantSection {
-    /// The reference plant. Default: none, the model is given by expressions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<ModelName>,
-    /// The name of a plug-in, a shared library beside this file (`lib<name>.so`, `<name>.dll`, `lib<name>.dylib`);
-    /// states, inputs and parameters are its own, and given here only to change ranges and values. Default: none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plugin: Option<String>,
-    /// Digest of the plug-in's bytes, one for every platform or each by its name. Default: any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plugin_digest: Option<PluginDigest>,
-    #[serde(skip)]
-    pub(super) loaded: Option<Loaded>,
-    /// As [`ReferenceSection::l_r`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub l_r: Option<f64>,
-    /// As [`ReferenceSection::l_f`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub l_f: Option<f64>,
+/// `[plant]` of a filter or plant as it stands in a file: the keys of every kind of plant.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "struct PlantSection")]
+pub(super) struct RawModel {
+    pub(super) model: Option<ModelName>,
+    pub(super) plugin: Option<String>,
+    pub(super) plugin_digest: Option<PluginDigest>,
+    l_r: Option<f64>,
+    l_f: Option<f64>,
+    #[serde(default)]
+    pub(super) states: Vec<VariableSection>,
+    #[serde(default)]
+    pub(super) inputs: Vec<VariableSection>,
+    #[serde(default)]
+    pub(super) parameters: Vec<ParameterSection>,
+    #[serde(default)]
+    pub(super) derivatives: BTreeMap<String, String>,
+}
+
+/// `[plant]` of a filter or plant.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum PlantSection {
+    /// A reference plant.
+    Reference(ReferenceSection),
+    /// The user's own model.
+    Expressions(ExpressionSection),
+    /// A plug-in.
+    Plugin(PluginSection),
+    /// Inputs alone, for a filter that is given the derivatives of its barriers.
+    External {
+        /// The inputs, in order: at most 12.
+        inputs: Vec<VariableSection>,
+    },
+}
+
+/// A model of expressions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExpressionSection {
     /// The states, in order: at most 32.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<VariableSection>,
     /// The inputs, in order: at most 12.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<VariableSection>,
-    /// The constants. Default: none.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// The constants.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<ParameterSection>,
     /// The expression for the derivative of each state, affine in the inputs.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub derivatives: BTreeMap<String, String>,
 }
 
@@ -127,7 +141,7 @@ pub(super) static PLANT: Section = Section {
     name: "model",
     keys: || {
         static KEYS: [Key; 9] = [
-            Key::new("model", Word(&MODELS), Some(""), "a vehicle by name, see the next table"),
+            Key::new("model", Word(ModelName::WORDS), Some(""), "a vehicle by name, see the next table"),
             reference::L_R,
             reference::L_F,
             Key::new(
@@ -213,102 +227,38 @@ pub(super) static PARAMETER: Section = Section {
 };
 
 impl PlantSection {
-    /// The reference plant, if it is one.
-    pub fn reference(&self) -> Option<ReferenceSection> {
-        let model = self.model?;
-        Some(ReferenceSection { model, l_r: self.l_r, l_f: self.l_f })
-    }
-
-    /// The name in messages: that of the reference plant, or the kind of model that stands in its place.
-    pub fn name(&self) -> &'static str {
-        let unnamed = match self.plugin {
-            Some(_) => "a plug-in",
-            None if self.is_external() => "external",
-            None => "expressions",
-        };
-        self.model.map_or(unnamed, ModelName::name)
-    }
-
-    /// A description, for a human.
-    pub fn title(&self) -> &'static str {
-        let unnamed = match self.plugin {
-            Some(_) => "plant given by a plug-in",
-            None if self.is_external() => "plant whose simulator computes the derivatives",
-            None => "plant given by expressions",
-        };
-        self.model.map_or(unnamed, ModelName::title)
-    }
-
-    /// Whether its inputs are all that is known of it.
-    pub fn is_external(&self) -> bool {
-        let unknown = self.states.is_empty() && self.parameters.is_empty() && self.derivatives.is_empty();
-        self.model.is_none() && self.plugin.is_none() && unknown && !self.inputs.is_empty()
-    }
-
-    /// The states, in order.
-    pub fn states(&self) -> Vec<VariableSection> {
-        match self.model {
-            Some(model) => model.states().iter().map(VariableSection::from).collect(),
-            None => self.states.clone(),
-        }
-    }
-
-    /// The inputs, in order.
-    pub fn inputs(&self) -> Vec<VariableSection> {
-        match self.model {
-            Some(model) => model.inputs().iter().map(VariableSection::from).collect(),
-            None => self.inputs.clone(),
-        }
-    }
-
-    /// The name of state `i`, or nothing.
-    pub(crate) fn state_name(&self, i: usize) -> &str {
-        match self.model {
-            Some(model) => model.states().get(i).map_or("", |s| s.name),
-            None => self.states.get(i).map_or("", |s| &s.name),
-        }
-    }
-
-    /// The name of input `i`, or nothing.
-    pub(crate) fn input_name(&self, i: usize) -> &str {
-        match self.model {
-            Some(model) => model.inputs().get(i).map_or("", |s| s.name),
-            None => self.inputs.get(i).map_or("", |s| &s.name),
-        }
-    }
-
-    pub(super) fn complete(&mut self, loader: &dyn PluginLoader) -> Result<(), ConfigurationError> {
+    /// Completes and checks `raw`.
+    pub(super) fn parse(raw: RawModel, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
         let refuse =
             |field: &str, message: String| Err(ConfigurationError::new(format!("plant.{field}"), message));
         // The kind of plant decides which keys belong to it.
         let given = [
-            ("plugin", self.plugin.is_some()),
-            ("states", !self.states.is_empty()),
-            ("inputs", !self.inputs.is_empty()),
-            ("parameters", !self.parameters.is_empty()),
-            ("derivatives", !self.derivatives.is_empty()),
+            ("plugin", raw.plugin.is_some()),
+            ("states", !raw.states.is_empty()),
+            ("inputs", !raw.inputs.is_empty()),
+            ("parameters", !raw.parameters.is_empty()),
+            ("derivatives", !raw.derivatives.is_empty()),
         ];
-        if self.plugin_digest.is_some() && self.plugin.is_none() {
+        if raw.plugin_digest.is_some() && raw.plugin.is_none() {
             return refuse("plugin_digest", "given without `plugin`".into());
         }
         // A reference plant needs nothing more.
-        if let Some(mut reference) = self.reference() {
+        if let Some(model) = raw.model {
             if let Some((field, _)) = given.iter().find(|(_, given)| *given) {
-                let message = format!("given beside `model`; {} has its own", reference.model.name());
+                let message = format!("given beside `model`; {} has its own", model.name());
                 return refuse(field, message);
             }
-            reference.complete()?;
-            (self.l_r, self.l_f) = (reference.l_r, reference.l_f);
-            return Ok(());
+            let reference = RawReference { model, l_r: raw.l_r, l_f: raw.l_f };
+            return ReferenceSection::parse(&reference).map(Self::Reference);
         }
         // The other kinds have no constants; a plug-in brings everything else.
-        for (field, value) in [("l_r", self.l_r), ("l_f", self.l_f)] {
+        for (field, value) in [("l_r", raw.l_r), ("l_f", raw.l_f)] {
             if value.is_some() {
                 return refuse(field, "is a constant of the bicycle; other models have `parameters`".into());
             }
         }
-        if let Some(name) = self.plugin.clone() {
-            return self.complete_plugin(&name, loader);
+        if let Some(name) = raw.plugin.clone() {
+            return PluginSection::parse(name, raw, loader).map(Self::Plugin);
         }
         if given.iter().all(|(_, given)| !given) {
             return refuse(
@@ -317,45 +267,128 @@ impl PlantSection {
             );
         }
         // Expressions, or inputs alone: check the names and ranges.
-        for (group, variables) in [("states", &self.states), ("inputs", &self.inputs)] {
+        let RawModel { states, inputs, parameters, derivatives, .. } = raw;
+        for (group, variables) in [("states", &states), ("inputs", &inputs)] {
             for (i, variable) in variables.iter().enumerate() {
                 let path = format!("plant.{group}[{i}]");
                 check_variable(&path, &variable.name, &variable.unit, variable.range())?;
             }
         }
-        if self.is_external() {
-            return check_external_inputs(self);
+        if states.is_empty() && parameters.is_empty() && derivatives.is_empty() {
+            check_external_inputs(&inputs)?;
+            return Ok(Self::External { inputs });
         }
         // Every state has one expression, and every expression can be used.
-        self.check_parameters()?;
-        if let Some(unknown) = self.derivatives.keys().find(|k| self.states.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = self.states.iter().map(|s| s.name.as_str()).collect();
+        check_parameters(&parameters)?;
+        if let Some(unknown) = derivatives.keys().find(|k| states.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown state, must be one of {}", names.join(", "));
             return refuse(&format!("derivatives.{unknown}"), message);
         }
-        if let Some(state) = self.states.iter().find(|s| !self.derivatives.contains_key(&s.name)) {
+        if let Some(state) = states.iter().find(|s| !derivatives.contains_key(&s.name)) {
             return refuse(&format!("derivatives.{}", state.name), "missing, every state needs one".into());
         }
-        self.expressions()?;
-        Ok(())
+        let plant = Self::Expressions(ExpressionSection { states, inputs, parameters, derivatives });
+        plant.expressions()?;
+        Ok(plant)
     }
 
-    pub(super) fn check_parameters(&self) -> Result<(), ConfigurationError> {
-        for (i, p) in self.parameters.iter().enumerate() {
-            let path = format!("plant.parameters[{i}]");
-            check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
-            if is_reserved(&p.name, Named::Parameter) {
-                return Err(taken(format!("{path}.name"), &p.name));
-            }
+    /// The reference plant, if it is one.
+    pub fn reference(&self) -> Option<&ReferenceSection> {
+        match self {
+            Self::Reference(reference) => Some(reference),
+            _ => None,
         }
-        Ok(())
+    }
+
+    /// The model of the reference plant, if it is one.
+    pub fn model(&self) -> Option<ModelName> {
+        self.reference().map(|reference| reference.model)
+    }
+
+    /// The plug-in, if it is one.
+    pub(super) fn plugin(&self) -> Option<&PluginSection> {
+        match self {
+            Self::Plugin(plugin) => Some(plugin),
+            _ => None,
+        }
+    }
+
+    /// The name in messages: that of the reference plant, or the kind of model that stands in its place.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Reference(reference) => reference.model.name(),
+            Self::Expressions(_) => "expressions",
+            Self::Plugin(_) => "a plug-in",
+            Self::External { .. } => "external",
+        }
+    }
+
+    /// A description, for a human.
+    pub fn title(&self) -> &'static str {
+        match self {
+            Self::Reference(reference) => reference.model.title(),
+            Self::Expressions(_) => "plant given by expressions",
+            Self::Plugin(_) => "plant given by a plug-in",
+            Self::External { .. } => "plant whose simulator computes the derivatives",
+        }
+    }
+
+    /// Whether its inputs are all that is known of it.
+    pub fn is_external(&self) -> bool {
+        matches!(self, Self::External { .. })
+    }
+
+    /// The states, inputs and parameters that the file or the plug-in gives.
+    fn own(&self) -> (&[VariableSection], &[VariableSection], &[ParameterSection]) {
+        match self {
+            Self::Reference(_) => (&[], &[], &[]),
+            Self::Expressions(ExpressionSection { states, inputs, parameters, .. })
+            | Self::Plugin(PluginSection { states, inputs, parameters, .. }) => (states, inputs, parameters),
+            Self::External { inputs } => (&[], inputs, &[]),
+        }
+    }
+
+    /// The states, in order.
+    pub fn states(&self) -> Vec<VariableSection> {
+        match self.model() {
+            Some(model) => model.states().iter().map(VariableSection::from).collect(),
+            None => self.own().0.to_vec(),
+        }
+    }
+
+    /// The inputs, in order.
+    pub fn inputs(&self) -> Vec<VariableSection> {
+        match self.model() {
+            Some(model) => model.inputs().iter().map(VariableSection::from).collect(),
+            None => self.own().1.to_vec(),
+        }
+    }
+
+    /// The name of state `i`, or nothing.
+    pub(crate) fn state_name(&self, i: usize) -> &str {
+        match self.model() {
+            Some(model) => model.states().get(i).map_or("", |s| s.name),
+            None => self.own().0.get(i).map_or("", |s| &s.name),
+        }
+    }
+
+    /// The name of input `i`, or nothing.
+    pub(crate) fn input_name(&self, i: usize) -> &str {
+        match self.model() {
+            Some(model) => model.inputs().get(i).map_or("", |s| s.name),
+            None => self.own().1.get(i).map_or("", |s| &s.name),
+        }
+    }
+
+    /// The constants that the file or the plug-in gives.
+    pub(super) fn own_parameters(&self) -> &[ParameterSection] {
+        self.own().2
     }
 
     /// The range in which each state is meant to be, or an infinite one.
     pub(super) fn ranges(&self) -> Vec<[f64; 2]> {
-        let end = |value: Option<f64>, none: f64| value.unwrap_or(none);
-        let range = |s: VariableSection| [end(s.min, f64::NEG_INFINITY), end(s.max, f64::INFINITY)];
-        self.states().into_iter().map(range).collect()
+        ranges(&self.states())
     }
 
     /// The plant as a model of expressions.
@@ -368,37 +401,45 @@ impl PlantSection {
         let names =
             |variables: &[VariableSection]| variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         let (states, inputs) = (names(&states), names(&inputs));
-        let lengths = [("l_r", self.l_r), ("l_f", self.l_f)];
-        let lengths = lengths.into_iter().filter_map(|(name, value)| Some((name, value?)));
-        let own = self.parameters.iter().map(|p| (p.name.as_str(), p.start));
         let derivatives = self.derivatives();
-        let parameters: Vec<_> = lengths.chain(own).collect();
+        let constants = self.reference().into_iter().flat_map(ReferenceSection::constants);
+        let mut parameters: Vec<(&str, f64)> = constants.collect();
+        parameters.extend(self.own_parameters().iter().map(|p| (p.name.as_str(), p.start)));
         Model::new(&texts(&states), &texts(&inputs), &parameters, &derivatives)
             .map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
     }
 
-    /// The expressions for the derivatives of its states, in order.
+    /// The expressions for the derivatives of its states, in order; none where no expressions are known.
     pub(super) fn derivatives(&self) -> Vec<&str> {
-        let own = |s: &VariableSection| self.derivatives.get(&s.name).map_or("", String::as_str);
-        match self.reference() {
-            Some(reference) => reference.derivatives().to_vec(),
-            None => self.states.iter().map(own).collect(),
+        match self {
+            Self::Reference(reference) => reference.derivatives().to_vec(),
+            Self::Expressions(own) => {
+                own.states.iter().map(|s| own.derivatives.get(&s.name).map_or("", String::as_str)).collect()
+            }
+            Self::Plugin(_) | Self::External { .. } => Vec::new(),
         }
     }
 
     /// The parameters of the model, reached through `section` in a configuration of type `C`.
     pub(super) fn parameters<C: 'static>(&self, section: fn(&mut C) -> &mut Self) -> Vec<Parameter<C>> {
-        if let Some(reference) = self.reference() {
-            return reference.parameters(move |c| &mut section(c).l_r, move |c| &mut section(c).l_f);
+        if let Self::Reference(reference) = self {
+            return reference.parameters(move |c| match section(c) {
+                Self::Reference(reference) => Some(reference),
+                _ => None,
+            });
         }
         let row = |(i, p): (usize, &ParameterSection)| {
             let names = (p.name.clone(), format!("plant.parameters[{i}].start"));
             let range = Range { min: p.min, max: p.max };
-            Parameter::new(names, p.unit.clone(), range, p.description.clone(), move |c| {
-                section(c).parameters.get_mut(i).map(|p| &mut p.start)
+            Parameter::new(names, p.unit.clone(), range, p.description.clone(), move |c| match section(c) {
+                Self::Expressions(ExpressionSection { parameters, .. })
+                | Self::Plugin(PluginSection { parameters, .. }) => {
+                    parameters.get_mut(i).map(|p| &mut p.start)
+                }
+                Self::Reference(_) | Self::External { .. } => None,
             })
         };
-        self.parameters.iter().enumerate().map(row).collect()
+        self.own_parameters().iter().enumerate().map(row).collect()
     }
 
     /// The plant, to simulate.
@@ -407,12 +448,29 @@ impl PlantSection {
     ///
     /// A constant outside its range, an expression that cannot be used.
     pub fn build(&self) -> Result<Box<dyn DynPlant>, ConfigurationError> {
-        match self.reference() {
-            Some(reference) => reference.build(),
-            None if self.plugin.is_some() => Ok(self.code()?.plant()),
-            None => Ok(self.expressions()?.plant()),
+        match self {
+            Self::Reference(reference) => reference.build(),
+            Self::Plugin(plugin) => Ok(plugin.code()?.plant()),
+            Self::Expressions(_) | Self::External { .. } => Ok(self.expressions()?.plant()),
         }
     }
+}
+
+pub(super) fn check_parameters(parameters: &[ParameterSection]) -> Result<(), ConfigurationError> {
+    for (i, p) in parameters.iter().enumerate() {
+        let path = format!("plant.parameters[{i}]");
+        check_variable(&path, &p.name, &p.unit, Range { min: p.min, max: p.max })?;
+        if is_reserved(&p.name, Named::Parameter) {
+            return Err(taken(format!("{path}.name"), &p.name));
+        }
+    }
+    Ok(())
+}
+
+/// The range in which each of `states` is meant to be, or an infinite one.
+pub(super) fn ranges(states: &[VariableSection]) -> Vec<[f64; 2]> {
+    let range = |s: &VariableSection| [s.min.unwrap_or(f64::NEG_INFINITY), s.max.unwrap_or(f64::INFINITY)];
+    states.iter().map(range).collect()
 }
 
 fn texts(names: &[String]) -> Vec<&str> {

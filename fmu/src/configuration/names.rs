@@ -1,6 +1,6 @@
 //! Names that a configuration gives: their form, and those that are taken.
 
-use punctual_models::is_identifier;
+use punctual_modeldescription::is_c_identifier;
 
 use super::ConfigurationError;
 
@@ -9,7 +9,7 @@ const LONGEST: usize = 64;
 
 /// Refuses a name that is no C identifier of at most 64 characters, by the path of its field.
 pub(super) fn check_identifier(field: &str, name: &str) -> Result<(), ConfigurationError> {
-    if is_identifier(name) && name.len() <= LONGEST {
+    if is_c_identifier(name) && name.len() <= LONGEST {
         return Ok(());
     }
     let message =

@@ -10,9 +10,11 @@ use super::key::{
     Unit::{Is, Of},
     Value::{Name, Number, NumberByName, Table, Word},
 };
+use super::model::RawModel;
 use super::names::check_identifier;
 use super::{
-    ConfigurationError, EXPERIMENT, ExperimentSection, Parameter, PlantSection, PluginLoader, Range, model,
+    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
+    Range, model,
 };
 
 const INNER_STEP: Range = Range::POSITIVE;
@@ -155,57 +157,72 @@ pub(super) enum PlantKind {
     Plant,
 }
 
-/// A plant FMU: `ẋ = f(x) + g(x) u` with held input u.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+/// A plant as it stands in a file.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PlantConfiguration {
-    pub(super) kind: PlantKind,
-    /// The FMU's name, a C identifier. Default: the model's name.
+pub(super) struct RawPlant {
+    kind: PlantKind,
     #[serde(default)]
+    name: String,
+    plant: RawModel,
+    #[serde(default)]
+    integration: IntegrationSection,
+    disturbance: Option<DisturbanceSection>,
+    #[serde(default)]
+    x0: BTreeMap<String, f64>,
+    #[serde(default)]
+    experiment: ExperimentSection,
+}
+
+/// A plant FMU: `ẋ = f(x) + g(x) u` with held input u.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlantConfiguration {
+    kind: PlantKind,
+    /// The FMU's name, a C identifier.
     pub name: String,
     /// The plant's model.
     pub plant: PlantSection,
     /// Integration between communication points.
-    #[serde(default)]
     pub integration: IntegrationSection,
-    /// Disturbances that the model does not know. Default: nothing.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// Disturbances that the model does not know.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<DisturbanceSection>,
-    /// Initial state by name, in the units of the states; finite. Default 0, or nearest to it in the state's range.
-    #[serde(default)]
+    /// Initial value of each state, in its unit; finite.
     pub x0: BTreeMap<String, f64>,
     /// The run that it is meant for.
-    #[serde(default)]
     pub experiment: ExperimentSection,
 }
 
 impl PlantConfiguration {
-    pub(super) fn completed(mut self, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
-        if self.name.is_empty() {
-            self.name = self.plant.reference().map_or("plant", |r| r.model.name()).to_owned();
+    /// Completes and checks `raw`.
+    pub(super) fn parse(raw: RawPlant, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
+        let RawPlant { kind, mut name, plant, integration, disturbance, mut x0, experiment } = raw;
+        if name.is_empty() {
+            name = plant.model.map_or("plant", ModelName::name).to_owned();
         }
-        check_identifier("name", &self.name)?;
-        self.plant.complete(loader)?;
-        let states = self.plant.states();
-        if let Some(unknown) = self.x0.keys().find(|k| states.iter().all(|s| s.name != **k)) {
+        check_identifier("name", &name)?;
+        let plant = PlantSection::parse(plant, loader)?;
+        let states = plant.states();
+        if let Some(unknown) = x0.keys().find(|k| states.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown state, must be one of {}", names.join(", "));
             return Err(ConfigurationError::new(format!("x0.{unknown}"), message));
         }
-        if let Some(disturbance) = &self.disturbance {
-            disturbance.check(&self.plant)?;
+        if let Some(disturbance) = &disturbance {
+            disturbance.check(&plant)?;
         }
         for state in states {
             let start = state.range().nearest(0.0);
-            self.x0.entry(state.name).or_insert(start);
+            x0.entry(state.name).or_insert(start);
         }
-        self.experiment.check()?;
-        for parameter in self.parameters() {
-            parameter.check(&mut self)?;
+        experiment.check()?;
+        let mut configuration = Self { kind, name, plant, integration, disturbance, x0, experiment };
+        for parameter in configuration.parameters() {
+            parameter.check(&mut configuration)?;
         }
         // The plant itself refuses what the ranges of single numbers cannot.
-        self.build()?;
-        Ok(self)
+        configuration.build()?;
+        Ok(configuration)
     }
 
     /// The numbers that are parameters of the FMU; `x0.*` come first, in the order of the states.

@@ -13,7 +13,7 @@ use punctual_modeldescription::PLATFORM;
 use punctual_models::evaluated::{Code, CodeModel, Dimensions};
 use serde::{Deserialize, Serialize};
 
-use super::model::check_variable;
+use super::model::{RawModel, check_parameters, check_variable, ranges};
 use super::names::{check_identifier, taken};
 use super::{ConfigurationError, ParameterSection, PlantSection, Range, VariableSection};
 
@@ -130,63 +130,86 @@ impl Plugin {
     }
 }
 
-impl PlantSection {
-    /// Loads its plug-in and takes over its description, unless the section gives other values where it may.
-    pub(super) fn complete_plugin(
-        &mut self,
-        name: &str,
+/// A plant that is a plug-in: its description, with the values that the file gives where it may.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PluginSection {
+    /// The name of the plug-in, a shared library beside the file (`lib<name>.so`, `<name>.dll`, `lib<name>.dylib`).
+    plugin: String,
+    /// Digest of its bytes, one for every platform or each by its name.
+    plugin_digest: PluginDigest,
+    #[serde(skip)]
+    loaded: Loaded,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) states: Vec<VariableSection>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) inputs: Vec<VariableSection>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) parameters: Vec<ParameterSection>,
+}
+
+impl PluginSection {
+    /// Loads the plug-in `name` and takes over its description, unless `raw` gives other values where it may.
+    pub(super) fn parse(
+        name: String,
+        raw: RawModel,
         loader: &dyn PluginLoader,
-    ) -> Result<(), ConfigurationError> {
+    ) -> Result<Self, ConfigurationError> {
         let refuse = |message: String| Err(ConfigurationError::new("plant.plugin", message));
-        if !self.derivatives.is_empty() {
+        if !raw.derivatives.is_empty() {
             let message = "given beside `plugin`, which has its own";
             return Err(ConfigurationError::new("plant.derivatives", message));
         }
-        check_identifier("plant.plugin", name)?;
-        let plugin = loader.load(name).map_err(|e| ConfigurationError::new("plant.plugin", e))?;
+        check_identifier("plant.plugin", &name)?;
+        let plugin = loader.load(&name).map_err(|e| ConfigurationError::new("plant.plugin", e))?;
         if let Err(error) = plugin.check() {
             return refuse(format!("{}: {error}", plugin.file));
         }
-        self.plugin_digest.get_or_insert_with(|| PluginDigest::One(plugin.digest.clone())).check(&plugin)?;
-        merge("states", &mut self.states, &plugin.states)?;
-        merge("inputs", &mut self.inputs, &plugin.inputs)?;
-        merge_parameters(&mut self.parameters, &plugin.parameters)?;
-        self.loaded = Some(Loaded(Arc::new(plugin)));
-        self.check_parameters()?;
-        for (i, p) in self.parameters.iter().enumerate() {
+        let plugin_digest = raw.plugin_digest.unwrap_or_else(|| PluginDigest::One(plugin.digest.clone()));
+        plugin_digest.check(&plugin)?;
+        let section = Self {
+            plugin: name,
+            plugin_digest,
+            states: merged("states", raw.states, &plugin.states)?,
+            inputs: merged("inputs", raw.inputs, &plugin.inputs)?,
+            parameters: merged_parameters(&raw.parameters, &plugin.parameters)?,
+            loaded: Loaded(Arc::new(plugin)),
+        };
+        check_parameters(&section.parameters)?;
+        for (i, p) in section.parameters.iter().enumerate() {
             let field = format!("plant.parameters[{i}].start");
             Range { min: p.min, max: p.max }.check(&field, p.start)?;
         }
-        self.code().map(drop)
+        section.code()?;
+        Ok(section)
     }
 
-    /// The model of its plug-in, with its parameters.
+    /// Its model, with its parameters.
     ///
     /// # Errors
     ///
-    /// The section has no plug-in, or the code does something that it must not.
+    /// The code does something that it must not.
     pub(super) fn code(&self) -> Result<CodeModel, ConfigurationError> {
-        let Some(plugin) = self.loaded() else {
-            return Err(ConfigurationError::new("plant.plugin", "is not loaded"));
-        };
+        let plugin = self.loaded();
         let dimensions = Dimensions {
             states: plugin.states.len(),
             inputs: plugin.inputs.len(),
             barriers: plugin.barriers.len(),
         };
         let parameters = self.parameters.iter().map(|p| p.start).collect();
-        CodeModel::new(Arc::clone(&plugin.code), dimensions, parameters, &self.ranges())
+        CodeModel::new(Arc::clone(&plugin.code), dimensions, parameters, &ranges(&self.states))
             .map_err(|e| ConfigurationError::new("plant.plugin", format!("{}: {e}", plugin.file)))
     }
 
-    /// Its plug-in, if it is one.
-    pub(super) fn loaded(&self) -> Option<&Plugin> {
-        self.loaded.as_ref().map(|loaded| &*loaded.0)
+    /// The plug-in itself.
+    pub(super) fn loaded(&self) -> &Plugin {
+        &self.loaded.0
     }
+}
 
+impl PlantSection {
     /// The barriers of its plug-in.
     pub(super) fn plugin_barriers(&self) -> &[VariableSection] {
-        self.loaded().map_or(&[], |plugin| &plugin.barriers)
+        self.plugin().map_or(&[], |section| &section.loaded().barriers)
     }
 }
 
@@ -197,19 +220,18 @@ fn fill<T: PartialEq>(own: &mut T, unsaid: &T, theirs: T) {
     }
 }
 
-/// Fills `own`, which is empty or has the names of `theirs` in their order; a range of its own it keeps.
-fn merge(
+/// What `own`, which is empty or has the names of `theirs` in their order, says, and else `theirs`.
+fn merged(
     group: &str,
-    own: &mut Vec<VariableSection>,
+    mut own: Vec<VariableSection>,
     theirs: &[VariableSection],
-) -> Result<(), ConfigurationError> {
+) -> Result<Vec<VariableSection>, ConfigurationError> {
     if own.is_empty() {
-        *own = theirs.to_vec();
-        return Ok(());
+        return Ok(theirs.to_vec());
     }
     let names = |list: &[VariableSection]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
     if own.len() != theirs.len() || own.iter().zip(theirs).any(|(a, b)| a.name != b.name) {
-        let message = format!("are {}, but those of the plug-in are {}", names(own), names(theirs));
+        let message = format!("are {}, but those of the plug-in are {}", names(&own), names(theirs));
         return Err(ConfigurationError::new(format!("plant.{group}"), message));
     }
     for (i, (own, theirs)) in own.iter_mut().zip(theirs).enumerate() {
@@ -221,14 +243,14 @@ fn merge(
         fill(&mut own.max, &None, theirs.max);
         check_variable(&path, &own.name, &own.unit, own.range())?;
     }
-    Ok(())
+    Ok(own)
 }
 
-/// Replaces `own` by `theirs` with the values that `own` gives.
-fn merge_parameters(
-    own: &mut Vec<ParameterSection>,
+/// `theirs` with the values that `own` gives.
+fn merged_parameters(
+    own: &[ParameterSection],
     theirs: &[ParameterSection],
-) -> Result<(), ConfigurationError> {
+) -> Result<Vec<ParameterSection>, ConfigurationError> {
     let mut merged = theirs.to_vec();
     for (i, given) in own.iter().enumerate() {
         let path = format!("plant.parameters[{i}]");
@@ -255,8 +277,7 @@ fn merge_parameters(
             place.description.clone_from(&given.description);
         }
     }
-    *own = merged;
-    Ok(())
+    Ok(merged)
 }
 
 fn same_unit(path: &str, own: &str, theirs: &str) -> Result<(), ConfigurationError> {

@@ -5,45 +5,35 @@ use punctual_reference::plants::{
     Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
     SteeredBicycle, Steering, Unicycle,
 };
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
+use super::words::words;
 use super::{ConfigurationError, Key, Parameter, Range, Section, Unit, Value};
 
-/// The reference plants by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ModelName {
-    /// [`PointMass`].
-    PointMass,
-    /// [`Unicycle`].
-    Unicycle,
-    /// [`Bicycle`], simplified.
-    Bicycle,
-    /// [`SmallSlipBicycle`]: as a plant only, since position barriers have a mixed relative degree.
-    BicycleSmallSlip,
-    /// [`SmallSlipBicycleWithRate`]: the same with the rate of the slip angle as its input.
-    BicycleSmallSlipRate,
-    /// [`KinematicBicycle`], steered by the rate of its front wheel.
-    BicycleKinematic,
-    /// The same, steered by the angle of its front wheel: as a plant only, since that does not enter linearly.
-    BicycleKinematicAngle,
-    /// The same, steered by its slip angle as the simplified and the small-slip bicycle are: as a plant only.
-    BicycleKinematicSlip,
+words! {
+    /// The reference plants by name.
+    pub enum ModelName {
+        /// [`PointMass`].
+        PointMass = "point_mass",
+        /// [`Unicycle`].
+        Unicycle = "unicycle",
+        /// [`Bicycle`], simplified.
+        Bicycle = "bicycle",
+        /// [`SmallSlipBicycle`]: as a plant only, since position barriers have a mixed relative degree.
+        BicycleSmallSlip = "bicycle_small_slip",
+        /// [`SmallSlipBicycleWithRate`]: the same with the rate of the slip angle as its input.
+        BicycleSmallSlipRate = "bicycle_small_slip_rate",
+        /// [`KinematicBicycle`], steered by the rate of its front wheel.
+        BicycleKinematic = "bicycle_kinematic",
+        /// The same, steered by the angle of its front wheel: as a plant only, since that does not enter linearly.
+        BicycleKinematicAngle = "bicycle_kinematic_angle",
+        /// The same, steered by its slip angle as the simplified and the small-slip bicycle are: as a plant only.
+        BicycleKinematicSlip = "bicycle_kinematic_slip",
+    }
 }
 
 impl ModelName {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::PointMass,
-        Self::Unicycle,
-        Self::Bicycle,
-        Self::BicycleSmallSlip,
-        Self::BicycleSmallSlipRate,
-        Self::BicycleKinematic,
-        Self::BicycleKinematicAngle,
-        Self::BicycleKinematicSlip,
-    ];
-
     /// The states, in order.
     pub fn states(self) -> &'static [Signal] {
         match self {
@@ -85,20 +75,6 @@ impl ModelName {
         }
     }
 
-    /// Its name in a configuration.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PointMass => "point_mass",
-            Self::Unicycle => "unicycle",
-            Self::Bicycle => "bicycle",
-            Self::BicycleSmallSlip => "bicycle_small_slip",
-            Self::BicycleSmallSlipRate => "bicycle_small_slip_rate",
-            Self::BicycleKinematic => "bicycle_kinematic",
-            Self::BicycleKinematicAngle => "bicycle_kinematic_angle",
-            Self::BicycleKinematicSlip => "bicycle_kinematic_slip",
-        }
-    }
-
     fn has_l_r(self) -> bool {
         !matches!(self, Self::PointMass | Self::Unicycle)
     }
@@ -112,17 +88,6 @@ impl ModelName {
         !matches!(self, Self::BicycleKinematicAngle | Self::BicycleKinematicSlip)
     }
 }
-
-/// The names of the models.
-pub(super) static MODELS: [&str; ModelName::ALL.len()] = {
-    let mut names = [""; ModelName::ALL.len()];
-    let mut i = 0;
-    while i < names.len() {
-        names[i] = ModelName::ALL[i].name();
-        i += 1;
-    }
-    names
-};
 
 pub(super) const L_R: Key =
     Key::new("l_r", LENGTH_VALUE, Some("10"), "bicycles: from the rear axle to the centre of mass");
@@ -138,63 +103,96 @@ const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
 pub(super) static SECTION: Section = Section {
     name: "vehicle",
     keys: || {
-        static KEYS: [Key; 3] =
-            [Key::new("model", Value::Word(&MODELS), None, "a [vehicle](#models) by name"), L_R, L_F];
+        static KEYS: [Key; 3] = [
+            Key::new("model", Value::Word(ModelName::WORDS), None, "a [vehicle](#models) by name"),
+            L_R,
+            L_F,
+        ];
         KEYS.iter().collect()
     },
 };
 
+/// `[plant]` of a controller as it stands in a file, and what a reference plant has of the `[plant]` of others.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, expecting = "struct ReferenceSection")]
+pub(super) struct RawReference {
+    pub(super) model: ModelName,
+    pub(super) l_r: Option<f64>,
+    pub(super) l_f: Option<f64>,
+}
+
 /// A reference plant with its constants: `[plant]` of a controller, or of a filter or plant without expressions.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSection {
     /// The plant's model.
     pub model: ModelName,
-    /// Bicycles only: distance from the rear axle to the centre of mass in m, > 0. Default 10.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub l_r: Option<f64>,
-    /// `bicycle_kinematic` and `bicycle_kinematic_angle` only: distance from the centre of mass to the front axle in m, > 0.
-    /// Default 10.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub l_f: Option<f64>,
+    /// Lengths in m, whether the model has them or not.
+    l_r: f64,
+    l_f: f64,
+}
+
+impl Serialize for ReferenceSection {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("model", self.model.name())?;
+        for (name, value) in self.constants() {
+            map.serialize_entry(name, &value)?;
+        }
+        map.end()
+    }
 }
 
 /// Default of the lengths of a bicycle in m: the paper's.
 const LENGTH: f64 = 10.0;
 
 impl ReferenceSection {
-    pub(super) fn complete(&mut self) -> Result<(), ConfigurationError> {
-        for (field, value, has, owner) in [
-            ("l_r", &mut self.l_r, self.model.has_l_r(), "the bicycle"),
-            ("l_f", &mut self.l_f, self.model.has_l_f(), "bicycle_kinematic"),
+    /// Completes `raw`, unless it has constants of other models. Their ranges are those of the parameters.
+    pub(super) fn parse(raw: &RawReference) -> Result<Self, ConfigurationError> {
+        for (field, given, has, owner) in [
+            ("l_r", raw.l_r.is_some(), raw.model.has_l_r(), "the bicycle"),
+            ("l_f", raw.l_f.is_some(), raw.model.has_l_f(), "bicycle_kinematic"),
         ] {
-            if has {
-                value.get_or_insert(LENGTH);
-            } else if value.is_some() {
+            if given && !has {
                 let message = format!("is a constant of {owner}; this model has none");
                 return Err(ConfigurationError::new(format!("plant.{field}"), message));
             }
         }
-        Ok(())
+        let [l_r, l_f] = [raw.l_r, raw.l_f].map(|given| given.unwrap_or(LENGTH));
+        Ok(Self { model: raw.model, l_r, l_f })
     }
 
-    /// The parameters of the model, reached through `l_r` and `l_f` in a configuration of type `C`.
+    /// Distance in m from the rear axle to the centre of mass, > 0, of a bicycle.
+    pub fn l_r(&self) -> Option<f64> {
+        self.model.has_l_r().then_some(self.l_r)
+    }
+
+    /// Distance in m from the centre of mass to the front axle, > 0, of `bicycle_kinematic` and
+    /// `bicycle_kinematic_angle`.
+    pub fn l_f(&self) -> Option<f64> {
+        self.model.has_l_f().then_some(self.l_f)
+    }
+
+    /// The constants that the model has, by name.
+    pub(super) fn constants(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        let all = [("l_r", self.l_r()), ("l_f", self.l_f())];
+        all.into_iter().filter_map(|(name, value)| Some((name, value?)))
+    }
+
+    /// The parameters of the model, reached through `section` in a configuration of type `C`.
     pub(super) fn parameters<C: 'static>(
-        self,
-        l_r: impl Fn(&mut C) -> &mut Option<f64> + Send + 'static,
-        l_f: impl Fn(&mut C) -> &mut Option<f64> + Send + 'static,
+        &self,
+        section: impl Fn(&mut C) -> Option<&mut Self> + Copy + Send + 'static,
     ) -> Vec<Parameter<C>> {
-        let names = |field: &str| (field.to_owned(), format!("plant.{field}"));
+        let row = |field: &str, what: &str, access: fn(&mut Self) -> &mut f64| {
+            let names = (field.to_owned(), format!("plant.{field}"));
+            Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| section(c).map(access))
+        };
         let mut rows = Vec::new();
-        if self.l_r.is_some() {
-            let what = "distance from the rear axle to the centre of mass";
-            let names = names("l_r");
-            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| l_r(c).as_mut()));
+        if self.model.has_l_r() {
+            rows.push(row("l_r", "distance from the rear axle to the centre of mass", |r| &mut r.l_r));
         }
-        if self.l_f.is_some() {
-            let what = "distance from the centre of mass to the front axle";
-            let names = names("l_f");
-            rows.push(Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| l_f(c).as_mut()));
+        if self.model.has_l_f() {
+            rows.push(row("l_f", "distance from the centre of mass to the front axle", |r| &mut r.l_f));
         }
         rows
     }
@@ -240,17 +238,17 @@ impl ReferenceSection {
     ///
     /// A constant outside its range.
     pub(crate) fn bicycle(&self) -> Result<Bicycle, ConfigurationError> {
-        Bicycle::new(self.l_r.unwrap_or(LENGTH)).map_err(constant)
+        Bicycle::new(self.l_r).map_err(constant)
     }
 
     /// The small-slip bicycle of this section; errors as for [`Self::bicycle`].
     pub(crate) fn small_slip(&self) -> Result<SmallSlipBicycle, ConfigurationError> {
-        SmallSlipBicycle::new(self.l_r.unwrap_or(LENGTH)).map_err(constant)
+        SmallSlipBicycle::new(self.l_r).map_err(constant)
     }
 
     /// The kinematic bicycle of this section; errors as for [`Self::bicycle`].
     pub(crate) fn kinematic(&self) -> Result<KinematicBicycle, ConfigurationError> {
-        KinematicBicycle::new(self.l_f.unwrap_or(LENGTH), self.l_r.unwrap_or(LENGTH)).map_err(constant)
+        KinematicBicycle::new(self.l_f, self.l_r).map_err(constant)
     }
 
     /// The plant.

@@ -389,10 +389,12 @@ fn defaults_are_those_of_the_documentation() {
     else {
         panic!("not a plant")
     };
-    assert_eq!((c.name.as_str(), c.plant.l_r, c.integration.inner_step), ("bicycle", Some(10.0), 0.001));
+    let reference = |c: &PlantConfiguration| *c.plant.reference().expect("a plant by name");
+    assert_eq!((c.name.as_str(), c.integration.inner_step), ("bicycle", 0.001));
+    assert_eq!((reference(&c).l_r(), reference(&c).l_f()), (Some(10.0), None));
     let kinematic = Configuration::parse("kind = \"plant\"\nplant.model = \"bicycle_kinematic\"").unwrap();
     let Configuration::Plant(kinematic) = kinematic else { panic!("not a plant") };
-    assert_eq!((kinematic.plant.l_f, kinematic.plant.l_r), (Some(10.0), Some(10.0)));
+    assert_eq!((reference(&kinematic).l_f(), reference(&kinematic).l_r()), (Some(10.0), Some(10.0)));
     assert_eq!(c.x0.values().copied().collect::<Vec<_>>(), [0.0; 4]);
 }
 

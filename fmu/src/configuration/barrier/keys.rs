@@ -8,8 +8,8 @@ use super::super::key::{
     Value::{self, Count, Flag, Name, Number, Numbers, Pair, Text, Word},
 };
 use super::super::{FilterConfiguration, Parameter, PlantSection, Range};
-use super::BarrierSection;
 use super::shape::NAMES;
+use super::{BarrierSection, InfeasibleName, MethodName, ProfileName};
 
 const S: Unit = Is("s");
 const M: Unit = Is("m");
@@ -75,13 +75,13 @@ static KEYS: [Row; 33] = [
     },
     plain(
         "method",
-        Word(&["reference_profile", "repeated_root"]),
+        Word(MethodName::WORDS),
         Some("`reference_profile`"),
         "`reference_profile` (ours) or `repeated_root` (the paper's, where it has an admissible rate)",
     ),
     plain(
         "profile",
-        Word(&["hermite", "low_peak"]),
+        Word(ProfileName::WORDS),
         Some("`hermite`"),
         "`hermite`, or `low_peak`: least peak, 4d/T² from rest in place of 6d/T²",
     ),
@@ -151,7 +151,7 @@ static KEYS: [Row; 33] = [
     },
     plain(
         "when_infeasible",
-        Word(&["report", "soonest"]),
+        Word(InfeasibleName::WORDS),
         Some("`report`"),
         "`report`, or `soonest`: give up a deadline that the bounds certainly do not allow for a later one",
     ),

@@ -16,45 +16,49 @@ pub(super) use raw::RawBarrier;
 
 use punctual_core::convergence::operator::Operator;
 use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::names::check_identifier;
+use super::words::words;
 use super::{BarrierInput, ConfigurationError, PlantSection, external};
 
 /// Default margin as a part of the radius, or of the smaller half axis or side.
 const MARGIN_OF_SIZE: f64 = 0.01;
 
-/// The method by which the deadline is met.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MethodName {
-    /// [`Method::ReferenceProfile`].
-    #[default]
-    ReferenceProfile,
-    /// [`Method::RepeatedRoot`], the paper's.
-    RepeatedRoot,
+words! {
+    /// The method by which the deadline is met.
+    #[derive(Default)]
+    pub enum MethodName {
+        /// [`Method::ReferenceProfile`].
+        #[default]
+        ReferenceProfile = "reference_profile",
+        /// [`Method::RepeatedRoot`], the paper's.
+        RepeatedRoot = "repeated_root",
+    }
 }
 
-/// The profile that `reference_profile` follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ProfileName {
-    /// [`ProfileKind::Hermite`].
-    #[default]
-    Hermite,
-    /// [`ProfileKind::LowPeak`]: of least peak.
-    LowPeak,
+words! {
+    /// The profile that `reference_profile` follows.
+    #[derive(Default)]
+    pub enum ProfileName {
+        /// [`ProfileKind::Hermite`].
+        #[default]
+        Hermite = "hermite",
+        /// [`ProfileKind::LowPeak`]: of least peak.
+        LowPeak = "low_peak",
+    }
 }
 
-/// The reaction where the bounds certainly do not allow the deadline.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum InfeasibleName {
-    /// [`Infeasible::Report`].
-    #[default]
-    Report,
-    /// [`Infeasible::Soonest`].
-    Soonest,
+words! {
+    /// The reaction where the bounds certainly do not allow the deadline.
+    #[derive(Default)]
+    pub enum InfeasibleName {
+        /// [`Infeasible::Report`].
+        #[default]
+        Report = "report",
+        /// [`Infeasible::Soonest`].
+        Soonest = "soonest",
+    }
 }
 
 /// A number that is 0 where the filter chooses it or does without, since a parameter of an FMU cannot be left

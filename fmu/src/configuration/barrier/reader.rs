@@ -75,9 +75,9 @@ impl Reader<'_> {
         let own = ["expression", "external", "plugin"].contains(&shape);
         let message = if plant.is_external() && shape != "external" {
             format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"")
-        } else if plant.plugin.is_some() && !["plugin", "external"].contains(&shape) {
+        } else if plant.plugin().is_some() && !["plugin", "external"].contains(&shape) {
             format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")")
-        } else if plant.plugin.is_none() && shape == "plugin" {
+        } else if plant.plugin().is_none() && shape == "plugin" {
             format!("is {shape:?}, but the plant is none")
         } else if plant.reference().is_none() && !own {
             format!("is {shape:?}, which is for the plants that have a name; give an `expression`")
@@ -148,7 +148,7 @@ impl Shape {
         plant: &PlantSection,
     ) -> Result<Self, ConfigurationError> {
         let unstated = match raw.expression {
-            _ if plant.plugin.is_some() => "plugin",
+            _ if plant.plugin().is_some() => "plugin",
             _ if plant.is_external() => "external",
             Some(_) => "expression",
             None => "disc",

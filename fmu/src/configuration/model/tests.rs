@@ -206,24 +206,22 @@ fn the_reference_plants_by_name_and_by_expression_filter_alike() {
         let expression = parsed(&by_name(BARRIERS[1]));
         // The same configuration with all of it as expressions.
         let mut written = expression.clone();
-        let (reference, plant) = (shape.plant.reference().expect("by name"), &mut written.plant);
-        (plant.states, plant.inputs) = (shape.plant.states(), shape.plant.inputs());
+        let (reference, states) = (shape.plant.reference().expect("by name"), shape.plant.states());
         let derivatives = reference.derivatives().iter().map(|&d| d.to_owned());
-        plant.derivatives = plant.states.iter().map(|s| s.name.clone()).zip(derivatives).collect();
-        let constant = |name: &str, start: Option<f64>| {
-            let (name, unit) = (name.to_owned(), "m".to_owned());
-            start.map(|start| ParameterSection {
-                name,
-                start,
-                unit,
-                description: String::new(),
-                min: None,
-                max: None,
-            })
+        let constant = |(name, start): (&str, f64)| ParameterSection {
+            name: name.to_owned(),
+            start,
+            unit: "m".to_owned(),
+            description: String::new(),
+            min: None,
+            max: None,
         };
-        plant.parameters =
-            [constant("l_r", plant.l_r), constant("l_f", plant.l_f)].into_iter().flatten().collect();
-        (plant.model, plant.l_r, plant.l_f) = (None, None, None);
+        written.plant = PlantSection::Expressions(ExpressionSection {
+            derivatives: states.iter().map(|s| s.name.clone()).zip(derivatives).collect(),
+            states,
+            inputs: shape.plant.inputs(),
+            parameters: reference.constants().map(constant).collect(),
+        });
 
         let mut filters = [&shape, &expression, &written].map(|c| c.build().expect("a filter"));
         let plants = [shape.plant.build(), written.plant.build()].map(|p| p.expect("a plant"));
