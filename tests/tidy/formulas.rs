@@ -15,6 +15,7 @@ const COMMANDS: &[&str] = &[
     "left",
     "right",
     "qquad",
+    "nabla",
     "frac",
     "binom",
     "partial",

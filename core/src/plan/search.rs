@@ -3,9 +3,11 @@
 //! The plant is run ahead under a guess, and linearised along it, as are the sets. A quadratic program moves the inputs:
 //!
 //! ```math
-//! \min \frac{1}{N} \sum_k \left(\frac{u_k}{w}\right)^2 + \rho \sum_j s_j
-//! \quad \text{with} \quad \delta x_{k+1} = A_k \delta x_k + B_k \delta u_k, \quad
-//! h_j + \nabla h_j \delta x_k + s_j \ge \mu_j, \quad |\dot x_N| \le s
+//! \begin{align}
+//! \min\ & \frac{1}{N} \sum_k \left(\frac{u_k}{w}\right)^2 + \rho \sum_j s_j \\
+//! & \delta x_{k+1} = A_k \delta x_k + B_k \delta u_k, & h_j + \nabla h_j \delta x_k + s_j &\ge \mu_j,
+//! & |\dot x_N| &\le s
+//! \end{align}
 //! ```
 //!
 //! with u within its bounds and a trust region, and the convex part of the curvature of the sets at the last multipliers. A
