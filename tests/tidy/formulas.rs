@@ -15,6 +15,8 @@ const COMMANDS: &[&str] = &[
     "left",
     "right",
     "qquad",
+    "mu",
+    "dot",
     "nabla",
     "frac",
     "binom",
