@@ -172,14 +172,41 @@ fn a_restored_filter_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn a_late_sample_ends_the_promise() {
+fn a_sample_at_another_time_ends_the_promise() {
     let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);
     let mut u = [0.0; 2];
     assert!(filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
-    let late = filter.step(1.5 * PERIOD, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
-    assert_eq!(late.standing, Standing::Overdue);
-    filter.rearm();
-    assert!(filter.step(1.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+    // The same sample again is no other time.
+    assert!(filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+    for (t, wrong) in [(10.0, 1.5), (1.7e9, 0.5), (-3.0, f64::NAN)] {
+        filter.rearm();
+        let mut x = [0.0; 4];
+        for k in 0..3 {
+            let t = t + PERIOD * f64::from(k);
+            assert!(filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions").is_assured(), "{t}");
+            x = Vehicle::PointMass.move_by(x, u, PERIOD);
+        }
+        let other = filter.step(t + PERIOD * (2.0 + wrong), &x, &[0.0; 2], &mut u).expect("right dimensions");
+        assert_eq!(other.standing, Standing::Irregular, "{t}");
+    }
+}
+
+/// Without a measurement for a while, or a wanted input that is a number, the plan brings the vehicle there.
+#[test]
+fn a_plan_goes_on_without_a_measurement() {
+    let vehicle = Vehicle::Unicycle;
+    let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
+    let (mut x, mut u) = ([0.0, 0.0, -0.4, 1.0], [0.0; 2]);
+    for k in 0..600 {
+        let t = f64::from(k) * PERIOD;
+        let seen = if k > 20 && k % 50 != 0 { [f64::NAN; 4] } else { x };
+        let wish = if k % 3 == 0 { [f64::NAN; 2] } else { [6.0, -1.0] };
+        let assurance = filter.step(t, &seen, &wish, &mut u).expect("right dimensions");
+        assert!(assurance.is_assured(), "{t}: {assurance:?}");
+        x = vehicle.move_by(x, u, PERIOD);
+        let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+        assert!(distance(OBSTACLE.0) >= OBSTACLE.1 && (t < 8.0 || distance(GOAL.0) <= GOAL.1), "{t}: {x:?}");
+    }
 }
 
 #[test]

@@ -7,7 +7,9 @@ use alloc::vec::Vec;
 use super::{Begin, End, FilterState, Report, SafetyFilter, Strictness};
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, length, positive};
+use crate::lie::Derivatives;
 use crate::plan::{Failure, Plan, Planner, Requirement, Witness};
+use crate::scalar::all_finite;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
 const MARGIN: f64 = 1e-4;
@@ -15,8 +17,8 @@ const MARGIN: f64 = 1e-4;
 const COMFORTABLE: f64 = 0.5;
 /// Halvings between the input of the plan and the one that is preferred.
 const BISECTIONS: u32 = 4;
-/// Delay of a sample that counts as none, as a part of the period.
-const ON_TIME: f64 = 1e-6;
+/// Difference of a sample from its time that counts as none, as a part of the period and of the time.
+const ON_TIME: [f64; 2] = [1e-6, 1e-15];
 
 /// Who chose the input of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,8 +48,8 @@ pub enum Standing {
     Refused(Failure),
     /// Was assured, and is no more: the plant is not where the model led.
     Withdrawn(Failure),
-    /// Was assured, and is no more: a sample came later than the period allows.
-    Overdue,
+    /// Was assured, and is no more: a sample came at another time than one period after the last.
+    Irregular,
 }
 
 /// The report of a step of an [`AssuredFilter`].
@@ -90,10 +92,28 @@ pub struct AssuredState {
 /// every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a compromise, or where nothing
 /// else keeps the promise the next input of the plan itself.
 ///
-/// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A filter with bounds on
-/// disturbance or measurement errors, a delay or windows cannot be assured yet, and is refused by [`Self::new`].
+/// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
+/// again at the same time. Where x is not finite, the plan goes on as it is. A filter with bounds on disturbance or
+/// measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by [`Self::new`]. A set that
+/// moves is refused at the first sample.
 ///
 /// The search allocates, as do the plans.
+///
+/// ```
+/// # use punctual_core::{barriers::DistanceDisc, filter::*};
+/// # use punctual_reference::plants::Unicycle;
+/// let goal = DistanceDisc::new([20.0, 10.0], 2.0, 1.0)?;
+/// let filter = SafetyFilter::builder(4, 2)
+///     .barrier("goal", Unicycle, goal, BarrierSettings::within(8.0))?
+///     .bounds(&[-5.0, -2.0], &[5.0, 2.0])?
+///     .sampling(Sampling::Period(0.02))?
+///     .build()?;
+/// let mut filter = AssuredFilter::new(filter, 0.02)?;
+/// let (x, mut u) = ([0.0, 0.0, 1.0, 0.0], [0.0; 2]);
+/// let assurance = filter.step(0.0, &x, &[-5.0, 0.0], &mut u)?;
+/// assert!(assurance.is_assured());
+/// # Ok::<(), punctual_core::Error>(())
+/// ```
 pub struct AssuredFilter {
     filter: SafetyFilter,
     period: f64,
@@ -187,17 +207,23 @@ impl AssuredFilter {
     /// A slice of the wrong length.
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
         length("x", x.len(), self.filter.state_dim)?;
-        let status = self.filter.step(t, x, u_ref, u)?.status;
-        let late = t - self.state.time > self.period * (1.0 + ON_TIME);
+        self.filter.step(t, x, u_ref, u)?;
+        let is_valid = t.is_finite() && all_finite(x);
+        let since = t - self.state.time;
+        let tolerance = ON_TIME[0] * self.period + ON_TIME[1] * t.abs();
+        let regular = since == 0.0 || (since - self.period).abs() <= tolerance;
         match self.state.standing {
-            _ if status == super::Status::InvalidInput => {}
-            Standing::Undecided => self.decide(t, x, u),
-            Standing::Assured if late => self.state.standing = Standing::Overdue,
+            Standing::Undecided if is_valid => self.decide(t, x, u),
+            // Also where t is not a number.
+            Standing::Assured if !regular => self.state.standing = Standing::Irregular,
             _ => {}
         }
         self.report.driver = Driver::Rows;
         if self.state.standing == Standing::Assured {
-            self.report.driver = self.choose(t, x, u_ref, u);
+            self.report.driver = match is_valid {
+                true => self.choose(t, x, u_ref, u),
+                false => self.go_on(t, u),
+            };
             self.filter.state.input[..u.len()].copy_from_slice(u);
         }
         self.state.time = t;
@@ -214,12 +240,26 @@ impl AssuredFilter {
         self.filter.report()
     }
 
+    /// Goes on with the plan as it is, where nobody knows where the plant is.
+    fn go_on(&self, t: f64, u: &mut [f64]) -> Driver {
+        let inputs = &self.state.plan.witness.inputs;
+        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * self.period).or(inputs.last());
+        if let Some((_, input)) = next {
+            u.copy_from_slice(&input[..u.len()]);
+        }
+        Driver::Plan
+    }
+
     /// Decides at the first sample: what is promised, and whether a plan keeps it.
     fn decide(&mut self, t: f64, x: &[f64], u: &[f64]) {
-        let promises = self.filter.slots.iter().zip(&self.filter.report().barriers).map(|(slot, report)| {
+        let promises = self.filter.slots.iter().map(|slot| {
+            // Not that of the report, which has none where u_ref is no number.
+            let mut derivatives = Derivatives::ZERO;
+            slot.source.evaluate(t, x, &mut derivatives);
+            let h = derivatives.drift[0];
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let from = match slot.promise.settings().deadline {
-                _ if report.h >= 0.0 => t,
+                _ if h >= 0.0 => t,
                 Some(deadline) => t + deadline,
                 None => return None,
             };
@@ -228,7 +268,7 @@ impl AssuredFilter {
                 End::At(seconds) => t + seconds,
                 End::OnArrival => from + self.period,
             };
-            (!soft && until > from).then_some([from, until, MARGIN * report.h.abs()])
+            (!soft && until > from).then_some([from, until, MARGIN * h.abs()])
         });
         self.state.promises = promises.collect();
         self.state.standing = match self.planned(u, |planner| planner.search(t, x)) {

@@ -118,7 +118,8 @@ impl<'a> Walk<'a> {
     /// Notes that h of requirement `i` is at least `h` around `t`.
     fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
         let slack = h - self.margin(i);
-        if slack < 0.0 {
+        // Not-a-number is broken too.
+        if slack.is_nan() || slack < 0.0 {
             return Err(Failure::Broken { requirement: i, time: t, slack });
         }
         if self.witness.tightest.is_none_or(|(_, _, least)| slack < least) {
@@ -209,7 +210,7 @@ impl<'a> Walk<'a> {
             }
         };
         let bound = least - second.max(0.0) * dt * dt / 8.0;
-        if bound >= self.margin(i) || halvings == 0 || least < self.margin(i) {
+        if bound >= self.margin(i) || halvings == 0 || !(least >= self.margin(i)) {
             return bound;
         }
         let mut middle = (x.to_vec(), Derivatives::ZERO);

@@ -176,7 +176,7 @@ impl<'a> Planner<'a> {
             let mut walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
             let mut at = t;
             for (end, u) in &plan.witness.inputs {
-                if *end > at + 1e-9 * (1.0 + at.abs()) {
+                if *end > at + 1e-6 * self.period {
                     walk.hold(&u[..nu], end - at)?;
                     at = *end;
                 }
