@@ -210,7 +210,7 @@ impl<'a> Walk<'a> {
             }
         };
         let bound = least - second.max(0.0) * dt * dt / 8.0;
-        if bound >= self.margin(i) || halvings == 0 || !(least >= self.margin(i)) {
+        if bound >= self.margin(i) || halvings == 0 || least < self.margin(i) {
             return bound;
         }
         let mut middle = (x.to_vec(), Derivatives::ZERO);
