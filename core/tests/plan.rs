@@ -145,6 +145,32 @@ fn what_no_input_can_keep_is_refused() {
     assert!(u != [0.0; 2]);
 }
 
+/// The least time in which a point mass gets from rest to rest over a distance d is 2√(d/a); inside earlier.
+#[test]
+fn the_soonest_deadline_is_near_what_physics_allows() {
+    let goal = DistanceDisc::new([30.0, 0.0], 1.0, 1.0).expect("valid disc");
+    for (deadline, bound) in [(2.0, 2.0), (20.0, 2.0), (5.0, 7.0)] {
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (factor, witness) = filter.soonest(0.0, &[0.0; 4], 100.0).expect("there is a deadline");
+        // The edge at 29 m, with the speed from which 2 m are enough to stop: half a v² of 2 a d more.
+        let (d, room) = (29.0, 2.0);
+        let speed = f64::sqrt(bound * (d + room));
+        let least = speed / bound + (speed - f64::sqrt(2.0 * bound * room)) / bound;
+        let soonest = factor * deadline;
+        assert!((0.99 * least..1.08 * least).contains(&soonest), "a <= {bound}: {soonest} s, {least} s");
+        assert!(witness.until.is_infinite() && witness.effort <= 1.0);
+        // As promised, a little later can be assured, and much sooner cannot.
+        assert!(filter.foresee(0.0, &[0.0; 4], 1.1 * factor).is_ok());
+        assert!(filter.foresee(0.0, &[0.0; 4], 0.95 * least / deadline).is_err());
+    }
+}
+
 #[test]
 fn a_restored_filter_goes_on_bit_for_bit() {
     let vehicle = Vehicle::Unicycle;

@@ -4,8 +4,10 @@
 use alloc::format;
 use alloc::vec::Vec;
 
+use super::slot::BarrierSlot;
 use super::{Begin, End, FilterState, Report, SafetyFilter, Strictness};
 use crate::MAX_INPUTS;
+use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::Derivatives;
 use crate::plan::{Failure, Plan, Planner, Requirement, Witness};
@@ -78,11 +80,18 @@ pub struct AssuredState {
     pub filter: FilterState,
     /// Where the promise stands.
     pub standing: Standing,
-    /// For each barrier the times in s from which and until which h ≥ 0 is promised, and the margin of its plans;
-    /// `None` where nothing is.
-    promises: Vec<Option<[f64; 3]>>,
+    /// One of each barrier; `None` where nothing is promised.
+    promises: Vec<Option<Promise>>,
     plan: Plan,
     time: f64,
+}
+
+/// h ≥ 0 from one time in s until another, and the margin that plans keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Promise {
+    from: f64,
+    until: f64,
+    margin: f64,
 }
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
@@ -250,17 +259,16 @@ impl AssuredFilter {
         Driver::Plan
     }
 
-    /// Decides at the first sample: what is promised, and whether a plan keeps it.
-    fn decide(&mut self, t: f64, x: &[f64], u: &[f64]) {
-        let promises = self.filter.slots.iter().map(|slot| {
+    /// The promises from `x` at `t`, with every deadline `factor` times as long.
+    fn promises(&self, t: f64, x: &[f64], factor: f64) -> Vec<Option<Promise>> {
+        let promise = |slot: &BarrierSlot| {
             // Not that of the report, which has none where u_ref is no number.
             let mut derivatives = Derivatives::ZERO;
             slot.source.evaluate(t, x, &mut derivatives);
             let h = derivatives.drift[0];
-            let soft = matches!(slot.strictness, Strictness::Soft(_));
             let from = match slot.promise.settings().deadline {
                 _ if h >= 0.0 => t,
-                Some(deadline) => t + deadline,
+                Some(deadline) => t + factor * deadline,
                 None => return None,
             };
             let until = match slot.end {
@@ -268,10 +276,56 @@ impl AssuredFilter {
                 End::At(seconds) => t + seconds,
                 End::OnArrival => from + self.period,
             };
-            (!soft && until > from).then_some([from, until, MARGIN * h.abs()])
-        });
-        self.state.promises = promises.collect();
-        self.state.standing = match self.planned(u, |planner| planner.search(t, x)) {
+            let soft = matches!(slot.strictness, Strictness::Soft(_));
+            (!soft && until > from).then_some(Promise { from, until, margin: MARGIN * h.abs() })
+        };
+        self.filter.slots.iter().map(promise).collect()
+    }
+
+    /// The plan that a first sample at `t` and `x` would find, with every deadline `factor` times as long. Remembers
+    /// nothing. `factor`: finite, > 0.
+    ///
+    /// # Errors
+    ///
+    /// What the nearest trial fails at.
+    pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
+        let promises = self.promises(t, x, factor);
+        self.planned(&promises, &[], |planner| planner.search(t, x)).map(|plan| plan.witness)
+    }
+
+    /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
+    /// twentieth, and that plan. None is looked for beyond `longest` times the deadlines.
+    pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+        const FINE: f64 = 1.05;
+        // Twice as long until there is one, or half as long until there is none.
+        let (mut low, mut high) = (1.0, 1.0);
+        let mut found = self.foresee(t, x, high).ok();
+        if found.is_some() {
+            while let Some(witness) = self.foresee(t, x, 0.5 * high).ok().filter(|_| high > 1e-3) {
+                (found, high) = (Some(witness), 0.5 * high);
+            }
+            low = 0.5 * high;
+        }
+        while found.is_none() && high < longest {
+            (low, high) = (high, (2.0 * high).min(longest));
+            found = self.foresee(t, x, high).ok();
+        }
+        let mut found = found?;
+        while high > FINE * low {
+            let middle = elementary::sqrt(low * high);
+            match self.foresee(t, x, middle) {
+                Ok(witness) => (found, high) = (witness, middle),
+                Err(_) => low = middle,
+            }
+        }
+        Some((high, found))
+    }
+
+    /// Decides at the first sample: what is promised, and whether a plan keeps it.
+    fn decide(&mut self, t: f64, x: &[f64], u: &[f64]) {
+        self.state.promises = self.promises(t, x, 1.0);
+        let found = self.planned(&self.state.promises, u, |planner| planner.search(t, x));
+        self.state.standing = match found {
             Ok(plan) => {
                 self.state.plan = plan;
                 Standing::Assured
@@ -280,20 +334,18 @@ impl AssuredFilter {
         };
     }
 
-    /// Runs `f` with the planner of the present promises.
+    /// Runs `f` with the planner of `promises`.
     fn planned<R>(
         &self,
+        promises: &[Option<Promise>],
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let requirements: Vec<Requirement<'_>> = self
-            .filter
-            .slots
-            .iter()
-            .zip(&self.state.promises)
-            .filter_map(|(slot, promise)| {
-                let [from, until, margin] = (*promise)?;
-                Some(Requirement { source: &*slot.source, from, until, margin })
+        let slots = self.filter.slots.iter().zip(promises).enumerate();
+        let requirements: Vec<Requirement<'_>> = slots
+            .filter_map(|(barrier, (slot, promise))| {
+                let Promise { from, until, margin } = (*promise)?;
+                Some(Requirement { barrier, source: &*slot.source, from, until, margin })
             })
             .collect();
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
@@ -305,14 +357,14 @@ impl AssuredFilter {
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
     /// does, else the plan's own.
     fn choose(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
-        let reached = self.state.promises.iter().flatten().all(|[from, ..]| *from <= t);
+        let reached = self.state.promises.iter().flatten().all(|promise| promise.from <= t);
         let mut wanted = [0.0; MAX_INPUTS];
         let wanted = &mut wanted[..u.len()];
         for (i, w) in wanted.iter_mut().enumerate() {
             *w = self.filter.bounds.clamp(i, u_ref[i]);
         }
         let plan = &self.state.plan;
-        let found = self.planned(u, |planner| {
+        let found = self.planned(&self.state.promises, u, |planner| {
             if reached
                 && wanted.iter().zip(u_ref).all(|(w, r)| w == r)
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
@@ -346,7 +398,7 @@ impl AssuredFilter {
                 self.state.plan.witness = witness;
                 driver
             }
-            Err(failure) => match self.planned(u, |planner| planner.search(t, x)) {
+            Err(failure) => match self.planned(&self.state.promises, u, |planner| planner.search(t, x)) {
                 Ok(plan) => {
                     u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                     self.state.plan = plan;

@@ -32,10 +32,21 @@ pub struct Witness {
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
     /// Time in s until which the requirements are known to be met; infinite where the plan ends at rest.
     pub until: f64,
-    /// The least h − margin on the way, with the number of its requirement and the time in s.
-    pub tightest: Option<(usize, f64, f64)>,
+    /// The place on the way where h − margin is least.
+    pub tightest: Option<Tightest>,
     /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
+}
+
+/// Where h − margin is least.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tightest {
+    /// The number of the barrier.
+    pub barrier: usize,
+    /// Time in s.
+    pub time: f64,
+    /// h − margin in the unit of h, a bound from below.
+    pub slack: f64,
 }
 
 /// What keeps a list of inputs from being a witness.
@@ -43,8 +54,8 @@ pub struct Witness {
 pub enum Failure {
     /// A requirement is not met.
     Broken {
-        /// Its number.
-        requirement: usize,
+        /// The number of its barrier.
+        barrier: usize,
         /// Time in s.
         time: f64,
         /// h − margin there, < 0.
@@ -117,13 +128,13 @@ impl<'a> Walk<'a> {
 
     /// Notes that h of requirement `i` is at least `h` around `t`.
     fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
-        let slack = h - self.margin(i);
+        let (barrier, slack) = (self.requirements[i].barrier, h - self.margin(i));
         // Not-a-number is broken too.
         if slack.is_nan() || slack < 0.0 {
-            return Err(Failure::Broken { requirement: i, time: t, slack });
+            return Err(Failure::Broken { barrier, time: t, slack });
         }
-        if self.witness.tightest.is_none_or(|(_, _, least)| slack < least) {
-            self.witness.tightest = Some((i, t, slack));
+        if self.witness.tightest.is_none_or(|least| slack < least.slack) {
+            self.witness.tightest = Some(Tightest { barrier, time: t, slack });
         }
         Ok(())
     }
@@ -229,8 +240,7 @@ impl<'a> Walk<'a> {
         let mut u = vec![0.0; self.model.inputs()];
         while let Some(k) = reference.hold_at(self.t) {
             reference.input(&self.model, k, self.t, &self.x, &mut u);
-            let end = reference.start + reference.hold * (k + 1) as f64;
-            self.hold(&u, end - self.t)?;
+            self.hold(&u, reference.times[k + 1] - self.t)?;
         }
         Ok(())
     }

@@ -60,13 +60,11 @@ impl Brake {
     }
 }
 
-/// Inputs and states on a grid of equal holds, with the gains of a feedback along it.
+/// Inputs and states on a grid of holds, with the gains of a feedback along it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Reference {
-    /// Time of the first input, s.
-    pub(super) start: f64,
-    /// The length of a hold in s.
-    pub(super) hold: f64,
+    /// The beginning of every hold in s, and the end of the last.
+    pub(super) times: Vec<f64>,
     /// One input for every hold.
     pub(super) inputs: Vec<Vec<f64>>,
     /// The state at the beginning of every hold, and at the end of the last.
@@ -75,19 +73,13 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// The reference `inputs` from `x` at time `start`, with gains by the Riccati equation backwards along it.
-    pub(super) fn along(
-        model: &Model<'_>,
-        start: f64,
-        x: &[f64],
-        hold: f64,
-        inputs: Vec<Vec<f64>>,
-    ) -> Option<Self> {
+    /// The reference `inputs` from `x` between `times`, with gains by the Riccati equation backwards along it.
+    pub(super) fn along(model: &Model<'_>, times: &[f64], x: &[f64], inputs: Vec<Vec<f64>>) -> Option<Self> {
         let (nx, nu) = (model.states(), model.inputs());
         let mut states = vec![x.to_vec()];
-        for u in &inputs {
-            let mut x = states[states.len() - 1].clone();
-            model.flow(&mut x, u, hold);
+        for (k, u) in inputs.iter().enumerate() {
+            let mut x = states[k].clone();
+            model.flow(&mut x, u, times[k + 1] - times[k]);
             states.push(x);
         }
         // A deviation is priced by how far its state moves along the reference, an input by its bounds.
@@ -106,27 +98,29 @@ impl Reference {
         }));
         let mut p = &q * 10.0;
         let mut gains = Vec::with_capacity(inputs.len());
-        for (u, x) in inputs.iter().zip(&states).rev() {
-            let Linear { a, b } = model.linear(x, u, hold);
+        for (k, u) in inputs.iter().enumerate().rev() {
+            let Linear { a, b } = model.linear(&states[k], u, times[k + 1] - times[k]);
             let (next, gain) = riccati(&p, &a, &b, &q, &r)?;
             p = next;
             gains.push(gain);
         }
         gains.reverse();
         let finite = gains.iter().all(|k| k.iter().all(|v| v.is_finite()));
-        finite.then_some(Self { start, hold, inputs, states, gains })
+        finite.then_some(Self { times: times.to_vec(), inputs, states, gains })
     }
 
     /// The number of the hold that `t` lies in, if one is left.
     pub(super) fn hold_at(&self, t: f64) -> Option<usize> {
         // A time that is a sum of steps counts as the instant it is meant to be.
-        let k = ((t - self.start) / self.hold + 1e-6).max(0.0) as usize;
-        (k < self.inputs.len()).then_some(k)
+        let begun = |k: usize| self.times[k] <= t + 1e-6 * (self.times[k + 1] - self.times[k]);
+        let k = (0..self.inputs.len()).rev().find(|&k| begun(k)).unwrap_or(0);
+        let end = self.times.get(k + 1)?;
+        (*end > t + 1e-6 * (end - self.times[k])).then_some(k)
     }
 
     /// Writes the input for the rest of hold `k`, at time `t` and `x`.
     pub(super) fn input(&self, model: &Model<'_>, k: usize, t: f64, x: &[f64], u: &mut [f64]) {
-        let part = ((t - self.start) / self.hold - k as f64).clamp(0.0, 1.0);
+        let part = ((t - self.times[k]) / (self.times[k + 1] - self.times[k])).clamp(0.0, 1.0);
         let (from, to) = (&self.states[k], &self.states[k + 1]);
         feedback(&self.inputs[k], &self.gains[k], |i| x[i] - (from[i] + part * (to[i] - from[i])), u);
         model.clamp(u);

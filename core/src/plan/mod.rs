@@ -21,7 +21,7 @@ mod model;
 mod planner;
 mod search;
 
-pub use check::{Failure, Witness};
+pub use check::{Failure, Tightest, Witness};
 pub use planner::Planner;
 
 use alloc::sync::Arc;
@@ -32,6 +32,8 @@ use law::{Brake, Reference};
 /// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
 #[derive(Clone, Copy)]
 pub struct Requirement<'a> {
+    /// The number of its barrier, to name it by.
+    pub barrier: usize,
     /// The barrier, along a model that can be run ahead.
     pub source: &'a dyn DerivativeSource,
     /// First time in s.
@@ -57,10 +59,4 @@ pub struct Plan {
     pub witness: Witness,
     /// The longest step in s in which the model is run ahead.
     step: f64,
-}
-
-/// The least whole number that is not below `x`.
-fn whole(x: f64) -> usize {
-    let below = x.max(0.0) as usize;
-    below + usize::from((below as f64) < x)
 }

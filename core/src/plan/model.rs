@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::whole;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
@@ -44,7 +43,7 @@ impl Model<'_> {
     /// Number of equal steps of at most [`Self::step`] in `duration`.
     pub(super) fn steps(&self, duration: f64) -> usize {
         // Round-off of a sum of steps is no further step.
-        whole((duration / self.step) * (1.0 - 1e-9)).max(1)
+        (duration / self.step * (1.0 - 1e-9)) as usize + 1
     }
 
     /// Moves `x` by `duration` s under the held input `u`.

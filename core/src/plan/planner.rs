@@ -1,13 +1,14 @@
 //! Which trials are made, in which order, and what is kept between samples.
 
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::check::{Failure, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use super::search::{Search, Trajectory};
-use super::{Plan, Requirement, whole};
+use super::{Plan, Requirement};
 use crate::lie::{DerivativeSource, Predict};
 use crate::qp::Bounds;
 
@@ -65,26 +66,22 @@ impl<'a> Planner<'a> {
     ///
     /// What the nearest trial fails at.
     pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
-        let last = self.requirements.iter().map(|r| r.from - t).filter(|d| d.is_finite()).fold(0.0, f64::max);
         let mut failure = Failure::NoRest;
-        for [before, after] in GRIDS {
-            let hold = self.hold(last, before);
-            let step = self.resolved(x, hold);
-            let model = self.model(step);
-            let holds = whole(last / hold) + after;
+        for holds in GRIDS {
+            let (hold, times) = self.grid(t, holds);
+            let model = self.model(self.resolved(x, hold));
             let Some(brake) = Brake::around(&model, x, hold) else { continue };
             let brake = Arc::new(brake);
             let search = Search {
                 model,
                 requirements: self.requirements,
                 strictness: SEARCHED,
-                t,
+                times: &times,
                 x,
-                hold,
                 size: self.size,
             };
             let mut guesses: Vec<Trajectory> = self
-                .guesses(&model, &brake, x, holds, last / hold)
+                .guesses(&model, &brake, x, &times)
                 .into_iter()
                 .map(|inputs| search.run(inputs))
                 .collect();
@@ -93,7 +90,7 @@ impl<'a> Planner<'a> {
             for guess in guesses.into_iter().take(GUESSES) {
                 let found = search.improve(guess, ITERATIONS);
                 let merit = found.violation;
-                match self.finish(&model, t, x, hold, found, &brake) {
+                match self.finish(&model, &times, x, found, &brake) {
                     Ok(plan) => return Ok(plan),
                     Err(found) if merit < nearest => (nearest, failure) = (merit, found),
                     Err(_) => (),
@@ -103,47 +100,46 @@ impl<'a> Planner<'a> {
         Err(failure)
     }
 
-    /// The length of a hold in s: a number of periods, since inputs change at samples only. At least `holds` of them lead to
-    /// the deadline `last`, and a node is as soon after it as can be.
-    fn hold(&self, last: f64, holds: usize) -> f64 {
-        if last <= 0.0 {
-            return 5.0 * self.period;
+    /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
+    /// deadline, `after` of them past it. The last sample before each deadline is a node.
+    fn grid(&self, t: f64, [before, after]: [usize; 2]) -> (f64, Vec<f64>) {
+        // Round-off of a deadline that is a number of periods leaves it one.
+        let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-6).max(0.0) as usize;
+        let mut deadlines: Vec<usize> =
+            self.requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
+        deadlines.sort_unstable();
+        deadlines.dedup();
+        let last = deadlines.last().copied().unwrap_or(0);
+        let hold = if last > 0 { last.div_ceil(before) } else { 5 };
+        let (mut samples, mut from) = (vec![0], 0);
+        for deadline in deadlines {
+            let (length, holds) = (deadline - from, (deadline - from).div_ceil(hold));
+            samples.extend((1..=holds).map(|k| from + length * k / holds));
+            from = deadline;
         }
-        let (most, mut nearest) =
-            ((last / holds as f64 / self.period).max(1.0), (f64::INFINITY, self.period));
-        let mut periods = most as usize;
-        while periods >= 1 && periods as f64 >= 0.6 * most {
-            let hold = periods as f64 * self.period;
-            // Round-off of a deadline that is a number of holds is no further hold.
-            let after = whole(last / hold * (1.0 - 1e-9)) as f64 * hold - last;
-            if after < nearest.0 - 1e-9 * last {
-                nearest = (after, hold);
-            }
-            periods -= 1;
-        }
-        nearest.1
+        samples.extend((1..=after).map(|k| from + hold * k));
+        (hold as f64 * self.period, samples.into_iter().map(|k| t + k as f64 * self.period).collect())
     }
 
     /// The plan along `found`, checked.
     fn finish(
         &self,
         model: &Model<'a>,
-        t: f64,
+        times: &[f64],
         x: &[f64],
-        hold: f64,
         found: Trajectory,
         brake: &Arc<Brake>,
     ) -> Result<Plan, Failure> {
         let mut inputs = found.inputs;
         inputs.pop();
-        let reference = Reference::along(model, t, x, hold, inputs).ok_or(Failure::Singular)?;
+        let reference = Reference::along(model, times, x, inputs).ok_or(Failure::Singular)?;
         let mut plan = Plan {
             reference: Some(Arc::new(reference)),
             brake: Some(brake.clone()),
             witness: Witness::default(),
             step: model.step,
         };
-        plan.witness = self.walk(&plan, 1.0, t, x, None, true)?;
+        plan.witness = self.walk(&plan, 1.0, times[0], x, None, true)?;
         Ok(plan)
     }
 
@@ -234,14 +230,7 @@ impl<'a> Planner<'a> {
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.
-    fn guesses(
-        &self,
-        model: &Model<'_>,
-        brake: &Brake,
-        x: &[f64],
-        holds: usize,
-        deadline: f64,
-    ) -> Vec<Vec<Vec<f64>>> {
+    fn guesses(&self, model: &Model<'_>, brake: &Brake, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
         let nu = model.inputs();
         let mut sides: Vec<Vec<f64>> = vec![vec![0.0; nu]];
         if nu <= 2 {
@@ -264,7 +253,10 @@ impl<'a> Planner<'a> {
                 }
             }
         }
-        let pushed = whole(GUESS[1] * deadline).clamp(1, holds);
+        let holds = times.len() - 1;
+        let last =
+            self.requirements.iter().map(|r| r.from).filter(|t| t.is_finite()).fold(times[0], f64::max);
+        let pushed = times[0] + GUESS[1] * (last - times[0]);
         sides
             .iter()
             .enumerate()
@@ -272,7 +264,7 @@ impl<'a> Planner<'a> {
                 let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
                 let mut inputs = Vec::with_capacity(holds + 1);
                 for k in 0..holds {
-                    if number > 0 && k < pushed {
+                    if number > 0 && (k == 0 || times[k] < pushed) {
                         for i in 0..nu {
                             u[i] = brake.input[i] + side[i] * GUESS[0] * model.reach(i, self.size);
                         }
@@ -280,7 +272,7 @@ impl<'a> Planner<'a> {
                     } else {
                         brake.input(model, &x, &mut u);
                     }
-                    model.flow(&mut x, &u, brake.hold);
+                    model.flow(&mut x, &u, times[k + 1] - times[k]);
                     inputs.push(u.clone());
                 }
                 inputs.push(brake.input.clone());

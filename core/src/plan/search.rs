@@ -36,10 +36,9 @@ pub(super) struct Search<'a> {
     pub(super) requirements: &'a [Requirement<'a>],
     /// What margins are multiplied by: larger than in the check.
     pub(super) strictness: f64,
-    pub(super) t: f64,
+    /// The beginning of every hold in s, and the end of the last.
+    pub(super) times: &'a [f64],
     pub(super) x: &'a [f64],
-    /// The length of a hold in s.
-    pub(super) hold: f64,
     /// The size of each input, where it has no bounds.
     pub(super) size: f64,
 }
@@ -72,6 +71,11 @@ struct Answer {
 }
 
 impl Search<'_> {
+    /// The length of hold `k` in s.
+    fn hold(&self, k: usize) -> f64 {
+        self.times[k + 1] - self.times[k]
+    }
+
     fn width(&self, i: usize) -> f64 {
         self.model.reach(i, self.size).max(f64::MIN_POSITIVE)
     }
@@ -81,16 +85,16 @@ impl Search<'_> {
         let (holds, nx) = (inputs.len() - 1, self.x.len());
         let mut states = vec![self.x.to_vec()];
         let mut rates = vec![0.0_f64; nx];
-        for u in &inputs[..holds] {
-            let from = &states[states.len() - 1];
+        for (k, u) in inputs[..holds].iter().enumerate() {
+            let (from, hold) = (&states[k], self.hold(k));
             let mut x = from.clone();
-            self.model.flow(&mut x, u, self.hold);
+            self.model.flow(&mut x, u, hold);
             for (rate, (x, from)) in rates.iter_mut().zip(x.iter().zip(from)) {
-                *rate = rate.max((x - from).abs() / self.hold);
+                *rate = rate.max((x - from).abs() / hold);
             }
             states.push(x);
         }
-        let rate = self.model.rate(&states[holds], &inputs[holds], self.hold).as_slice().to_vec();
+        let rate = self.model.rate(&states[holds], &inputs[holds], self.hold(holds - 1)).as_slice().to_vec();
         // A state that hardly moves is measured by its own size.
         let fastest = rates.iter().fold(1e-3, |m: f64, r| m.max(*r));
         rates.iter_mut().for_each(|r| *r = r.max(0.05 * fastest));
@@ -98,12 +102,13 @@ impl Search<'_> {
         let mut derivatives = Derivatives::ZERO;
         for (i, requirement) in self.requirements.iter().enumerate() {
             for (k, x) in states.iter().enumerate() {
-                let t = self.t + self.hold * k as f64;
+                let t = self.times[k];
                 requirement.source.evaluate(t, x, &mut derivatives);
                 let h = derivatives.drift[0];
                 sizes[i] = sizes[i].max(h.abs());
-                // A deadline between two nodes is asked for at the one before, too, where that is near.
-                let begun = requirement.from <= t + 0.5 * self.hold && t < requirement.until;
+                // A deadline between two nodes is asked for at the one before.
+                let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-6 * (next - t));
+                let begun = requirement.from < next && t < requirement.until;
                 if k > 0 && begun {
                     values.push((i, k, h - self.strictness * requirement.margin));
                 }
@@ -196,7 +201,7 @@ impl Search<'_> {
         };
         // The linear model, as equations.
         for k in 0..holds {
-            let Linear { a, b: by } = self.model.linear(&at.states[k], &at.inputs[k], self.hold);
+            let Linear { a, b: by } = self.model.linear(&at.states[k], &at.inputs[k], self.hold(k));
             for i in 0..nx {
                 entry(b.len(), state(k + 1, i), 1.0);
                 for j in 0..nx {
@@ -223,9 +228,10 @@ impl Search<'_> {
             b.push(value / size);
         }
         // The rest at the end.
-        let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], self.hold);
-        let a = (a - DMatrix::identity(nx, nx)) / self.hold;
-        let by = by / self.hold;
+        let hold = self.hold(holds - 1);
+        let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], hold);
+        let a = (a - DMatrix::identity(nx, nx)) / hold;
+        let by = by / hold;
         for i in 0..nx {
             for sign in [1.0, -1.0] {
                 let scale = sign / at.rates[i];
@@ -341,7 +347,7 @@ impl Search<'_> {
     /// ∂h/∂x of requirement `i` at node `k`, by central differences.
     fn gradient(&self, i: usize, k: usize, x: &[f64], out: &mut [f64]) {
         let source = self.requirements[i].source;
-        let (t, mut moved, mut derivatives) = (self.t + self.hold * k as f64, x.to_vec(), Derivatives::ZERO);
+        let (t, mut moved, mut derivatives) = (self.times[k], x.to_vec(), Derivatives::ZERO);
         for (j, out) in out.iter_mut().enumerate() {
             let size = 1e-6 * (1.0 + x[j].abs());
             let mut ends = [0.0; 2];
