@@ -128,8 +128,8 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
             }
         }
     }
-    // Not all can be had: some bounds are too tight for their deadline.
-    assert!(accepted.iter().all(|&n| (8..20).contains(&n)), "accepted: {accepted:?}");
+    // Two of 40 are too tight for their deadline.
+    assert!(accepted.iter().all(|&n| n >= 15), "accepted: {accepted:?}");
     assert!(plans > 0, "the plan never had to drive: the cases are too easy");
 }
 

@@ -11,6 +11,7 @@ use punctual_fmu::configuration::{
 use serde::Serialize;
 
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
+use super::witness::{self, WitnessReport};
 use crate::coupling::Kept;
 use crate::error::Error;
 use crate::output::{self, number};
@@ -63,6 +64,9 @@ struct FilterReport {
     /// every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     with_damping: Option<LoopReport>,
+    /// The plan that keeps every promise whatever u_ref is, where every input has bounds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    witness: Option<WitnessReport>,
     /// Inputs that profiles and rates need, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
@@ -302,6 +306,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
     let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
     let damped = simulated.filter(|_| failed && *wanted == Wanted::None && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
+    let witness = simulated.map(|x0| witness::find(c, x0)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
     let degrees: Vec<usize> = filter.relative_degrees().collect();
@@ -415,6 +420,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
         warnings,
         closed_loop,
         with_damping,
+        witness,
         effort: None,
     })
 }
@@ -533,6 +539,7 @@ fn filter_text(report: &FilterReport) -> String {
     if let Some(run) = &report.with_damping {
         lines.push(run.head());
     }
+    lines.extend(report.witness.iter().map(WitnessReport::text));
     if let Some(ratings) = &report.effort {
         let wanted = report.closed_loop.as_ref().map_or("", |run| &run.u_ref);
         lines.push(closed_loop::ratings_text(ratings, wanted));

@@ -11,3 +11,4 @@ pub mod replay;
 pub mod reproduce;
 pub mod run;
 pub mod validate;
+mod witness;

@@ -1,0 +1,139 @@
+//! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
+
+use punctual_core::filter::AssuredFilter;
+use punctual_core::plan::{Failure, Witness};
+use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::output::number;
+
+/// The longest deadlines looked for, in units of the configured ones.
+const LONGEST: f64 = 16.0;
+
+/// The finding on plans from the start.
+#[derive(Serialize)]
+pub(super) struct WitnessReport {
+    /// Whether a plan was found and checked.
+    pub(super) found: bool,
+    /// What no plan accounts for yet, or what the nearest one fails at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+    /// The least factor of all deadlines with which a plan was found.
+    soonest_factor: Option<f64>,
+    /// The soonest deadlines in s, by barrier.
+    soonest: Vec<(String, f64)>,
+    /// The plan with the configured deadlines, or else with the soonest.
+    plan: Option<PlanReport>,
+}
+
+/// A plan that was checked.
+#[derive(Serialize)]
+struct PlanReport {
+    /// Time in s from which the plant is at rest.
+    rest: f64,
+    /// The largest size of each input, with its unit and bounds.
+    inputs: Vec<(String, f64, String, [f64; 2])>,
+    /// The barrier with the least h above its margin, the time in s, and that h.
+    tightest: Option<(String, f64, f64, String)>,
+}
+
+/// The finding for the start `x0`; `None` where an input has no bounds, so that nothing is ruled out.
+pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<WitnessReport>, Error> {
+    let inputs = c.plant.inputs();
+    let bounds = |name: &str| c.bounds.get(name).copied().filter(|b| b.iter().all(|b| b.abs() < UNBOUNDED));
+    if inputs.iter().any(|input| bounds(&input.name).is_none()) {
+        return Ok(None);
+    }
+    let refused = |reason: String| WitnessReport {
+        found: false,
+        reason: Some(reason),
+        soonest_factor: None,
+        soonest: Vec::new(),
+        plan: None,
+    };
+    if c.integrator.is_some() {
+        return Ok(Some(refused("an integrator is before the plant, which no plan accounts for yet".into())));
+    }
+    let filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
+        Ok(filter) => filter,
+        Err(error) => return Ok(Some(refused(error.to_string()))),
+    };
+    let t = c.experiment.start_time;
+    let unit = |i: usize| c.barrier[i].unit(&c.plant);
+    let plan = |witness: &Witness| PlanReport {
+        rest: witness.inputs.last().map_or(t, |(end, _)| *end),
+        inputs: inputs
+            .iter()
+            .enumerate()
+            .map(|(i, input)| {
+                let peak = witness.inputs.iter().fold(0.0_f64, |peak, (_, u)| peak.max(u[i].abs()));
+                let given = bounds(&input.name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                (input.name.clone(), peak, input.unit.clone(), given)
+            })
+            .collect(),
+        tightest: witness
+            .tightest
+            .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
+    };
+    let configured = filter.foresee(t, x0, 1.0);
+    let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
+    let soonest = if has_deadline { filter.soonest(t, x0, LONGEST) } else { None };
+    let reason = configured.as_ref().err().map(|failure| match *failure {
+        Failure::Broken { barrier, time, slack } => format!(
+            "{} is not met at {} s, by {} {}",
+            c.barrier[barrier].name,
+            number(time),
+            number(-slack),
+            unit(barrier)
+        ),
+        Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
+        _ => "the model is not finite on the way".to_owned(),
+    });
+    let deadlines = |factor: f64| {
+        let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
+        given.collect::<Vec<_>>()
+    };
+    Ok(Some(WitnessReport {
+        found: configured.is_ok(),
+        reason,
+        soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
+        soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
+        plan: configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness)).map(plan),
+    }))
+}
+
+impl WitnessReport {
+    pub(super) fn text(&self) -> String {
+        let mut lines = vec![match (self.found, &self.reason) {
+            (true, _) => {
+                "\nwitness: a plan within the bounds keeps every promise, whatever u_ref is".to_owned()
+            }
+            (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
+            (false, None) => "\nwitness: NONE was found".to_owned(),
+        }];
+        let soonest: Vec<_> =
+            self.soonest.iter().map(|(name, deadline)| format!("{name} {} s", number(*deadline))).collect();
+        if !soonest.is_empty() {
+            lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
+        } else if !self.found && self.plan.is_none() {
+            lines.push("no longer deadline with a plan was found".to_owned());
+        }
+        if let Some(plan) = &self.plan {
+            let inputs: Vec<_> = plan
+                .inputs
+                .iter()
+                .map(|(name, peak, unit, [min, max])| {
+                    format!("{name} {} {unit} (bounds {} to {})", number(*peak), number(*min), number(*max))
+                })
+                .collect();
+            let of = if self.found { "the plan" } else { "the plan for that" };
+            lines.push(format!("{of}: at rest from {} s; {}", number(plan.rest), inputs.join(", ")));
+            if let Some((barrier, time, slack, unit)) = &plan.tightest {
+                let (slack, time) = (number(*slack), number(*time));
+                lines.push(format!("its tightest place: {barrier} at {time} s, {slack} {unit} inside"));
+            }
+        }
+        lines.join("\n")
+    }
+}
