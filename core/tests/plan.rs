@@ -91,8 +91,9 @@ fn wanted(vehicle: Vehicle, kind: u64, x: [f64; 4], bounds: [f64; 2], random: &m
 
 #[test]
 fn what_is_promised_is_kept_whatever_is_wanted() {
-    let (mut accepted, mut plans) = ([0; 2], 0);
-    for seed in 1..=40_u64 {
+    let seeds = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 4000 } else { 40 };
+    let (mut accepted, mut plans) = ([0; 2], 0_u64);
+    for seed in 1..=seeds {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let vehicle = if seed % 2 == 0 { Vehicle::PointMass } else { Vehicle::Unicycle };
         let deadline = random.between(3.0, 9.0);
@@ -117,7 +118,7 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
             }
             assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
             assert!(u.iter().zip(bounds).all(|(u, b)| u.abs() <= b), "{seed} at {t}: {u:?}");
-            plans += usize::from(assurance.driver == Driver::Plan);
+            plans += u64::from(assurance.driver == Driver::Plan);
             // Ten instants of the hold, each with the distances themselves.
             for part in 1..=10 {
                 x = vehicle.move_by(x, u, PERIOD / 10.0);
@@ -128,8 +129,11 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
             }
         }
     }
-    // Two of 40 are too tight for their deadline.
-    assert!(accepted.iter().all(|&n| n >= 15), "accepted: {accepted:?}");
+    println!(
+        "{seeds} starts: accepted {accepted:?} unicycles and point masses, the plan drove {plans} steps"
+    );
+    // Two of the first 40 are too tight for their deadline.
+    assert!(accepted.iter().all(|&n| 3 * n >= seeds), "accepted: {accepted:?}");
     assert!(plans > 0, "the plan never had to drive: the cases are too easy");
 }
 
