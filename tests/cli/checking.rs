@@ -232,3 +232,46 @@ fn the_least_effort_from_a_start() {
         "{checked:#?}"
     );
 }
+
+/// A plan is searched for where every input has bounds, and found where there is time enough.
+#[test]
+fn a_plan_keeps_every_promise_or_is_not_found() {
+    let with = |a: &str, more: &str| {
+        let bounds = format!("[bounds]\na = [-{a}, {a}]\nomega = [-2.0, 2.0]\n[experiment]");
+        let margin = format!("margin = 0.02 {more}");
+        let edits = [
+            ("[experiment]", &*bounds),
+            ("step_size = 0.001", "step_size = 0.05"),
+            ("margin = 0.02 ", &margin),
+        ];
+        let workshop = workshop(&edits);
+        let words = ["check", "filter.toml", "--x0", "theta=0.3"];
+        let report = workshop.punctual(words.iter().chain(&["--json"])).stdout;
+        let report: Value = serde_json::from_str(&report).expect("JSON");
+        (report["witness"].clone(), workshop.punctual(words).stdout)
+    };
+    // Ample bounds: a plan, and a sooner one. At rest past the deadline, within the bounds.
+    let (witness, text) = with("8.0", "");
+    assert!(
+        text.contains("witness: a plan within the bounds keeps every promise, whatever u_ref is\n"),
+        "{text}"
+    );
+    assert_eq!(witness["found"], true);
+    let factor = |witness: &Value| witness["soonest_factor"].as_f64();
+    assert!(factor(&witness).is_some_and(|f| f < 1.0), "{witness}");
+    let plan = &witness["plan"];
+    assert!(plan["rest"].as_f64() > Some(10.0), "{witness}");
+    assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{witness}");
+    // At 0.8 m/s² the edge, 61.6 m away, is passed after 14.95 s at the earliest by who can still stop inside.
+    let (witness, text) = with("0.8", "");
+    assert!(text.contains("witness: NONE was found: goal is not met at "), "{text}");
+    assert_eq!(witness["found"], false);
+    assert!(factor(&witness).is_some_and(|f| (1.49..1.65).contains(&f)), "{witness}");
+    let soonest = witness["soonest"][0][1].as_f64();
+    assert!(soonest.zip(factor(&witness)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9), "{witness}");
+    // What no plan accounts for is said.
+    let (witness, text) = with("8.0", "\ndisturbance = 0.1 #");
+    let reason = "goal.disturbance: is not 0, which no plan accounts for yet";
+    assert_eq!((&witness["found"], &witness["reason"]), (&false.into(), &reason.into()), "{witness}");
+    assert!(text.contains(&format!("witness: NONE was found: {reason}\n")), "{text}");
+}

@@ -7,17 +7,19 @@ use alloc::vec::Vec;
 use super::check::{Failure, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
-use super::search::{Search, Trajectory};
+use super::search::{Descent, Search, Trajectory};
 use super::{Plan, Requirement};
 use crate::lie::{DerivativeSource, Predict};
 use crate::qp::Bounds;
 
-/// Holds of a grid until the last deadline and after it: first for a plant that stops soon, then for one that does not.
-const GRIDS: [[usize; 2]; 2] = [[32, 12], [16, 28]];
-/// Guesses that are improved, the nearest ones.
-const GUESSES: usize = 4;
-/// Quadratic programs for each of them.
-const ITERATIONS: u32 = 15;
+/// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
+/// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
+/// deadlines that leave much time, where long holds are too coarse.
+const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
+/// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
+const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
+/// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
+const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
 const SEARCHED: f64 = 3.0;
 /// Margins for the rest of a plan that was checked before: the model differs from the plant by round-off at least.
@@ -26,8 +28,8 @@ const KEPT: f64 = 0.5;
 const RESOLVED: f64 = 1e-8;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
-/// Input of a first guess, as a part of its bounds, and the part of the time for which it is held.
-const GUESS: [f64; 2] = [0.4, 0.35];
+/// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
+const GUESSES: [[f64; 2]; 3] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0]];
 
 /// The plant, its bounds and the requirements at a sample, from which plans are made.
 #[derive(Clone, Copy)]
@@ -67,33 +69,41 @@ impl<'a> Planner<'a> {
     /// What the nearest trial fails at.
     pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let mut failure = Failure::NoRest;
-        for holds in GRIDS {
-            let (hold, times) = self.grid(t, holds);
+        for (part, holds) in GRIDS {
+            let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
+            let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
+            let (hold, times) = self.grid(t, &requirements, holds);
             let model = self.model(self.resolved(x, hold));
             let Some(brake) = Brake::around(&model, x, hold) else { continue };
             let brake = Arc::new(brake);
             let search = Search {
                 model,
-                requirements: self.requirements,
+                requirements: &requirements,
                 strictness: SEARCHED,
                 times: &times,
                 x,
                 size: self.size,
             };
-            let mut guesses: Vec<Trajectory> = self
-                .guesses(&model, &brake, x, &times)
-                .into_iter()
-                .map(|inputs| search.run(inputs))
-                .collect();
-            guesses.sort_by(|a, b| a.merit.total_cmp(&b.merit));
-            let mut nearest = f64::INFINITY;
-            for guess in guesses.into_iter().take(GUESSES) {
-                let found = search.improve(guess, ITERATIONS);
-                let merit = found.violation;
-                match self.finish(&model, &times, x, found, &brake) {
-                    Ok(plan) => return Ok(plan),
-                    Err(found) if merit < nearest => (nearest, failure) = (merit, found),
-                    Err(_) => (),
+            let guesses = self.guesses(&model, &brake, x, &times);
+            let mut descents: Vec<Descent> =
+                guesses.into_iter().map(|inputs| Descent::from(search.run(inputs))).collect();
+            // A few steps show which guesses lead somewhere.
+            for (most, iterations) in ROUNDS {
+                let merit = |d: &Descent| d.best.merit;
+                descents.sort_by(|a, b| merit(a).total_cmp(&merit(b)));
+                descents.truncate(most);
+                let mut nearest = f64::INFINITY;
+                for descent in &mut descents {
+                    search.improve(descent, iterations);
+                    let violation = descent.best.violation;
+                    if violation > WORTH && violation >= nearest {
+                        continue;
+                    }
+                    match self.finish(&model, &times, x, &descent.best, &brake) {
+                        Ok(plan) => return Ok(plan),
+                        Err(found) if violation < nearest => (nearest, failure) = (violation, found),
+                        Err(_) => (),
+                    }
                 }
             }
         }
@@ -102,11 +112,11 @@ impl<'a> Planner<'a> {
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
     /// deadline, `after` of them past it. The last sample before each deadline is a node.
-    fn grid(&self, t: f64, [before, after]: [usize; 2]) -> (f64, Vec<f64>) {
+    fn grid(&self, t: f64, requirements: &[Requirement<'_>], [before, after]: [usize; 2]) -> (f64, Vec<f64>) {
         // Round-off of a deadline that is a number of periods leaves it one.
         let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-6).max(0.0) as usize;
         let mut deadlines: Vec<usize> =
-            self.requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
+            requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
         deadlines.sort_unstable();
         deadlines.dedup();
         let last = deadlines.last().copied().unwrap_or(0);
@@ -127,10 +137,10 @@ impl<'a> Planner<'a> {
         model: &Model<'a>,
         times: &[f64],
         x: &[f64],
-        found: Trajectory,
+        found: &Trajectory,
         brake: &Arc<Brake>,
     ) -> Result<Plan, Failure> {
-        let mut inputs = found.inputs;
+        let mut inputs = found.inputs.clone();
         inputs.pop();
         let reference = Reference::along(model, times, x, inputs).ok_or(Failure::Singular)?;
         let mut plan = Plan {
@@ -256,28 +266,29 @@ impl<'a> Planner<'a> {
         let holds = times.len() - 1;
         let last =
             self.requirements.iter().map(|r| r.from).filter(|t| t.is_finite()).fold(times[0], f64::max);
-        let pushed = times[0] + GUESS[1] * (last - times[0]);
-        sides
-            .iter()
-            .enumerate()
-            .map(|(number, side)| {
-                let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
-                let mut inputs = Vec::with_capacity(holds + 1);
-                for k in 0..holds {
-                    if number > 0 && (k == 0 || times[k] < pushed) {
-                        for i in 0..nu {
-                            u[i] = brake.input[i] + side[i] * GUESS[0] * model.reach(i, self.size);
-                        }
-                        model.clamp(&mut u);
-                    } else {
-                        brake.input(model, &x, &mut u);
+        let run = |side: &[f64], [size, part]: [f64; 2]| {
+            let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
+            let mut inputs = Vec::with_capacity(holds + 1);
+            for k in 0..holds {
+                if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
+                {
+                    for i in 0..nu {
+                        u[i] = brake.input[i] + side[i] * size * model.reach(i, self.size);
                     }
-                    model.flow(&mut x, &u, times[k + 1] - times[k]);
-                    inputs.push(u.clone());
+                    model.clamp(&mut u);
+                } else {
+                    brake.input(model, &x, &mut u);
                 }
-                inputs.push(brake.input.clone());
-                inputs
-            })
-            .collect()
+                model.flow(&mut x, &u, times[k + 1] - times[k]);
+                inputs.push(u.clone());
+            }
+            inputs.push(brake.input.clone());
+            inputs
+        };
+        let mut guesses = vec![run(&sides[0], GUESSES[0])];
+        for guess in GUESSES {
+            guesses.extend(sides[1..].iter().map(|side| run(side, guess)));
+        }
+        guesses
     }
 }

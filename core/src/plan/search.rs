@@ -30,6 +30,8 @@ const PENALTY: f64 = 300.0;
 const TRUST: f64 = 0.7;
 /// Its least size.
 const LEAST_TRUST: f64 = 1e-3;
+/// Part of a trajectory's change that its curvature may be for the linear model to count.
+const BENT: f64 = 0.2;
 /// A search: the start, the grid and what has to be met there.
 pub(super) struct Search<'a> {
     pub(super) model: Model<'a>,
@@ -59,6 +61,24 @@ pub(super) struct Trajectory {
     pub(super) merit: f64,
     /// The largest violation in parts of its size.
     pub(super) violation: f64,
+}
+
+/// The best trajectory from a guess so far, and where its next step begins.
+pub(super) struct Descent {
+    pub(super) best: Trajectory,
+    /// The trust region of each input, in parts of half the width of its bounds.
+    trust: Vec<f64>,
+    /// The price of each row: where it is violated at first, that of its slack, then its multiplier.
+    prices: Vec<f64>,
+}
+
+impl Descent {
+    pub(super) fn from(guess: Trajectory) -> Self {
+        let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { PENALTY } else { 0.0 };
+        let prices = guess.values.iter().map(price).collect();
+        let trust = vec![TRUST; guess.inputs[0].len()];
+        Self { best: guess, trust, prices }
+    }
 }
 
 /// The answer of a quadratic program.
@@ -147,42 +167,67 @@ impl Search<'_> {
         of.violation = most;
     }
 
-    /// Improves `guess`; at most `iterations` quadratic programs.
-    pub(super) fn improve(&self, guess: Trajectory, iterations: u32) -> Trajectory {
-        let (mut best, mut trust) = (guess, TRUST);
-        // The price of each row: where it is violated, that of its slack.
-        let mut prices: Vec<f64> =
-            best.values.iter().map(|&(.., value)| if value < 0.0 { PENALTY } else { 0.0 }).collect();
+    /// Improves the best of `descent`; at most `iterations` quadratic programs.
+    pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
         for _ in 0..iterations {
-            if !best.merit.is_finite() || trust < LEAST_TRUST {
+            let Descent { best, trust, prices } = descent;
+            if !best.merit.is_finite() || trust.iter().all(|t| *t < LEAST_TRUST) {
                 break;
             }
-            let Some(answer) = self.program(&best, &prices, trust) else {
-                trust *= 0.3;
+            let Some(answer) = self.program(best, prices, trust) else {
+                trust.iter_mut().for_each(|t| *t *= 0.3);
                 continue;
             };
             let next = self.run(answer.inputs);
             let (gain, expected) = (best.merit - next.merit, best.merit - answer.merit);
+            if gain > 0.7 * expected {
+                trust.iter_mut().for_each(|t| *t = (2.0 * *t).min(2.0));
+            } else if gain < 0.3 * expected {
+                self.shrink(trust, best, &next, if gain > 0.0 { 0.5 } else { 0.3 });
+            }
             if gain > 0.0 {
                 let settled = next.violation <= 0.0 && gain <= 1e-2 * best.merit;
-                best = next;
-                prices = answer.prices;
+                (*best, *prices) = (next, answer.prices);
                 if settled {
-                    break;
+                    // Nothing is left to gain.
+                    trust.fill(0.0);
                 }
             }
-            trust = match gain / expected {
-                r if r > 0.7 => (2.0 * trust).min(2.0),
-                r if r > 0.3 => trust,
-                r if r > 0.0 => 0.5 * trust,
-                _ => 0.3 * trust,
-            };
         }
-        best
+    }
+
+    /// Shrinks the trust in those inputs whose change from `from` to `to` bends the trajectory: an input that turns a vehicle
+    /// bends it, one that drives it does not. Where none does, in all.
+    fn shrink(&self, trust: &mut [f64], from: &Trajectory, to: &Trajectory, by: f64) {
+        let end = |input: usize, part: f64| {
+            let mut x = self.x.to_vec();
+            for k in 0..from.inputs.len() - 1 {
+                let mut u = from.inputs[k].clone();
+                u[input] += part * (to.inputs[k][input] - u[input]);
+                self.model.flow(&mut x, &u, self.hold(k));
+            }
+            x
+        };
+        let bends = |input: usize| {
+            let (half, full) = (end(input, 0.5), end(input, 1.0));
+            let unchanged = &from.states[from.states.len() - 1];
+            let ends = unchanged.iter().zip(&half).zip(&full).zip(&from.rates);
+            let (bent, moved) = ends.fold((0.0_f64, 0.0_f64), |(bent, moved), (((a, b), c), rate)| {
+                (bent.max((a - 2.0 * b + c).abs() / rate), moved.max((c - a).abs() / rate))
+            });
+            bent > BENT * moved
+        };
+        let bent: Vec<bool> = (0..trust.len()).map(bends).collect();
+        let none = !bent.contains(&true);
+        for (trust, bent) in trust.iter_mut().zip(bent) {
+            if bent || none {
+                *trust *= by;
+            }
+        }
     }
 
     /// The answer of the quadratic program around `at`.
-    fn program(&self, at: &Trajectory, prices: &[f64], trust: f64) -> Option<Answer> {
+    fn program(&self, at: &Trajectory, prices: &[f64], trust: &[f64]) -> Option<Answer> {
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
         // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the rest.
@@ -252,7 +297,7 @@ impl Search<'_> {
         }
         for (k, u) in at.inputs.iter().enumerate() {
             for (i, &u) in u.iter().enumerate() {
-                let room = trust * self.width(i);
+                let room = trust[i] * self.width(i);
                 entry(b.len(), input(k, i), 1.0);
                 b.push((self.model.bounds.max[i] - u).min(room));
                 entry(b.len(), input(k, i), -1.0);
