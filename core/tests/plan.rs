@@ -1,5 +1,7 @@
 //! A filter with a witness keeps what it has promised, whatever u_ref is; judged by an integrator of its own.
 
+#![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
+
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Driver, FilterBuilder, SafetyFilter, Sampling, Standing,
