@@ -6,6 +6,7 @@ use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Driver, FilterBuilder, SafetyFilter, Sampling, Standing,
 };
+use punctual_core::plan::Failure;
 use punctual_reference::plants::{PointMass, Unicycle};
 
 const PERIOD: f64 = 0.02;
@@ -268,4 +269,123 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     let disturbed = refused(BarrierSettings { disturbance: 0.1, ..within }, |b| b);
     assert_eq!(disturbed, "goal.disturbance: is not 0, which no plan accounts for yet");
     assert_eq!(refused(within, |b| b), "");
+}
+
+#[test]
+fn one_plan_is_of_one_plant() {
+    let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, disc(), BarrierSettings::within(5.0))
+        .and_then(|b| b.barrier("also", Unicycle, disc(), BarrierSettings::within(5.0)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let error = AssuredFilter::new(filter, PERIOD).err().map(|e| e.to_string()).unwrap_or_default();
+    let message = "also.source: moves the state in another way than that of goal; a plan needs one plant for all barriers";
+    assert_eq!(error, message);
+}
+
+/// Long holds and fast vehicles: an obstacle between two nodes is seen.
+#[test]
+fn a_plan_does_not_jump_over_an_obstacle() {
+    let mut found = 0;
+    for (deadline, radius) in [(60.0, 1.0), (40.0, 0.3), (30.0, 0.05)] {
+        let disc = |centre, radius, b| DistanceDisc::new(centre, radius, b).expect("valid disc");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, disc([500.0, 0.0], 3.0, 1.0), BarrierSettings::within(deadline))
+            .and_then(|b| {
+                let clear = Outside(disc([251.3, 0.0], radius, radius));
+                b.barrier("clear", PointMass, clear, BarrierSettings::keeping())
+            })
+            .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        // Headed for its middle; where a plan is found, it goes around.
+        let mut x = [0.0, 0.0, 20.0, 0.0];
+        let Ok(witness) = filter.foresee(0.0, &x, 1.0) else { continue };
+        found += 1;
+        let (mut t, mut nearest) = (0.0, f64::INFINITY);
+        for (end, u) in &witness.inputs {
+            let steps = ((end - t) / 1e-3).round().max(1.0);
+            for _ in 0..steps as usize {
+                x = Vehicle::PointMass.move_by(x, [u[0], u[1]], (end - t) / steps);
+                nearest = (x[0] - 251.3).hypot(x[1]).min(nearest);
+            }
+            t = *end;
+        }
+        assert!(nearest >= radius, "{deadline}: {nearest} m from the centre of {radius} m");
+        assert!((x[0] - 500.0).hypot(x[1]) <= 3.0, "{deadline}: {x:?}");
+    }
+    assert!(found >= 2, "{found} plans: the cases show nothing");
+}
+
+/// Seconds since 1970 are no multiples of a period in binary.
+#[test]
+fn any_time_is_a_time_to_begin() {
+    let vehicle = Vehicle::PointMass;
+    for (begin, period) in [(1.7e9, 0.005), (-4.1e5, 0.05)] {
+        let disc = DistanceDisc::new([6.0, 3.0], 1.0, 1.0).expect("valid disc");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, disc, BarrierSettings::within(4.0))
+            .and_then(|b| b.bounds(&[-5.0; 2], &[5.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, period).expect("a filter that can be assured");
+        let (mut x, mut u) = ([0.0, 0.0, -1.0, 0.5], [0.0; 2]);
+        for k in 0..(6.0 / period) as usize {
+            let t = k as f64 * period;
+            let assurance = filter.step(begin + t, &x, &[-50.0, -50.0], &mut u).expect("right dimensions");
+            assert!(assurance.is_assured(), "{begin} + {t}: {assurance:?}");
+            x = vehicle.move_by(x, u, period);
+            let outside = (x[0] - 6.0).hypot(x[1] - 3.0) - 1.0;
+            assert!(t + period < 4.0 || outside <= 0.0, "{begin} + {t}: {outside} m outside");
+        }
+    }
+    // Where times cannot tell samples apart, nothing is promised.
+    let mut filter = vehicle.assured(8.0, [8.0; 2]);
+    let mut u = [0.0; 2];
+    let first = filter.step(1e16, &[0.0; 4], &[0.0; 2], &mut u).map(|a| a.is_assured());
+    let next = filter.step(1e16, &[0.0; 4], &[0.0; 2], &mut u).map(|a| a.is_assured());
+    assert!(!(first.expect("right dimensions") && next.expect("right dimensions")));
+}
+
+#[test]
+fn what_cannot_be_promised_is_not() {
+    // Outside without a deadline nothing is promised, so nothing is assured.
+    let filter = |settings| {
+        let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, disc, settings)
+            .and_then(|b| b.bounds(&[-8.0; 2], &[8.0; 2]))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured")
+    };
+    let mut u = [0.0; 2];
+    let mut keeping = filter(BarrierSettings::keeping());
+    let assurance = *keeping.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert_eq!(assurance.standing, Standing::Refused(Failure::Nothing));
+    assert!(!keeping.promises_barrier(0));
+    // A search that has no end is ended, with or without something to find.
+    assert_eq!(keeping.soonest(0.0, &[0.0; 4], f64::INFINITY), None);
+    let reached = filter(BarrierSettings::within(1e-3)).soonest(0.0, &[0.0; 4], f64::INFINITY);
+    assert!(reached.is_some_and(|(factor, _)| (2.0e3..2.0e4).contains(&factor)));
+    assert!(filter(BarrierSettings::within(1e30)).foresee(0.0, &[0.0; 4], 1.0).is_err());
+    // A state of another plant, or with inputs of other bounds, is refused or kept within its own.
+    let state = Vehicle::PointMass.assured(8.0, [8.0; 2]).state().clone();
+    assert!(filter(BarrierSettings::within(5.0)).restore(&state).is_err());
+    let mut wide = Vehicle::PointMass.assured(8.0, [12.0; 2]);
+    wide.step(0.0, &[0.0, 0.0, -3.0, 2.0], &[0.0; 2], &mut u).expect("right dimensions");
+    let mut narrow = Vehicle::PointMass.assured(8.0, [1.0; 2]);
+    narrow.restore(wide.state()).expect("as many barriers");
+    for k in 1..200 {
+        narrow.step(f64::from(k) * PERIOD, &[f64::NAN; 4], &[0.0; 2], &mut u).expect("right dimensions");
+        assert!(u.iter().all(|u| u.abs() <= 1.0), "{u:?}");
+    }
+    // The report is that of what was restored, or of nothing.
+    assert!(narrow.report().is_assured());
+    narrow.rearm();
+    assert!(!narrow.report().is_assured());
 }

@@ -1,6 +1,6 @@
 //! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
 
-use punctual_core::filter::AssuredFilter;
+use punctual_core::filter::{AssuredFilter, Standing};
 use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
@@ -19,6 +19,8 @@ pub(super) struct WitnessReport {
     /// What no plan accounts for yet, or what the nearest one fails at.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
+    /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
+    left_out: Vec<String>,
     /// The least factor of all deadlines with which a plan was found.
     soonest_factor: Option<f64>,
     /// The soonest deadlines in s, by barrier.
@@ -48,6 +50,7 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
     let refused = |reason: String| WitnessReport {
         found: false,
         reason: Some(reason),
+        left_out: Vec::new(),
         soonest_factor: None,
         soonest: Vec::new(),
         plan: None,
@@ -55,7 +58,10 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
     if c.integrator.is_some() {
         return Ok(Some(refused("an integrator is before the plant, which no plan accounts for yet".into())));
     }
-    let filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
+    if !c.barrier_inputs().is_empty() {
+        return Ok(Some(refused("a barrier follows inputs that others move, which no plan foresees".into())));
+    }
+    let mut filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
         Ok(filter) => filter,
         Err(error) => return Ok(Some(refused(error.to_string()))),
     };
@@ -76,7 +82,16 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
             .tightest
             .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
     };
-    let configured = filter.foresee(t, x0, 1.0);
+    // The first sample decides.
+    let mut u = vec![0.0; inputs.len()];
+    let refused = |e: punctual_core::Error| Error::configuration(e.field(), e.message());
+    let standing = filter.step(t, x0, &vec![0.0; inputs.len()], &mut u).map_err(refused)?.standing;
+    let configured = match standing {
+        Standing::Refused(failure) => Err(failure),
+        _ => filter.plan().cloned().ok_or(Failure::Nothing),
+    };
+    let names = c.barrier.iter().enumerate().filter(|(i, _)| !filter.promises_barrier(*i));
+    let left_out = names.map(|(_, barrier)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let soonest = if has_deadline { filter.soonest(t, x0, LONGEST) } else { None };
     let reason = configured.as_ref().err().map(|failure| match *failure {
@@ -88,7 +103,8 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
             unit(barrier)
         ),
         Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
-        _ => "the model is not finite on the way".to_owned(),
+        Failure::Nothing => "nothing is promised from there".to_owned(),
+        _ => "the model is not finite, or no step resolves it".to_owned(),
     });
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
@@ -97,6 +113,7 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
     Ok(Some(WitnessReport {
         found: configured.is_ok(),
         reason,
+        left_out,
         soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
         soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness)).map(plan),
@@ -112,6 +129,9 @@ impl WitnessReport {
             (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
             (false, None) => "\nwitness: NONE was found".to_owned(),
         }];
+        if !self.left_out.is_empty() {
+            lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
+        }
         let soonest: Vec<_> =
             self.soonest.iter().map(|(name, deadline)| format!("{name} {} s", number(*deadline))).collect();
         if !soonest.is_empty() {

@@ -19,8 +19,10 @@ const MARGIN: f64 = 1e-4;
 const COMFORTABLE: f64 = 0.5;
 /// Halvings between the input of the plan and the one that is preferred.
 const BISECTIONS: u32 = 4;
-/// Difference of a sample from its time that counts as none, as a part of the period and of the time.
-const ON_TIME: [f64; 2] = [1e-6, 1e-15];
+/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
+const ON_TIME: f64 = 1e-6;
+/// The largest round-off of a time, as a part of the period.
+const ROUND_OFF: f64 = 1e-2;
 
 /// Who chose the input of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -96,15 +98,16 @@ struct Promise {
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
 ///
-/// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier is
-/// promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on by its rows. From then on
+/// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier
+/// that can be is promised ([`Self::promises_barrier`]), for whatever u_ref comes. Not found: the promise is refused, and the filter goes on by its rows. From then on
 /// every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a compromise, or where nothing
 /// else keeps the promise the next input of the plan itself.
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
 /// again at the same time. Where x is not finite, the plan goes on as it is. A filter with bounds on disturbance or
-/// measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by [`Self::new`]. A set that
-/// moves is refused at the first sample.
+/// measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by [`Self::new`]. Sets must
+/// not move: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. States
+/// must be those of the plant, not of something that others move.
 ///
 /// The search allocates, as do the plans.
 ///
@@ -135,8 +138,8 @@ impl AssuredFilter {
     ///
     /// # Errors
     ///
-    /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, a window, a
-    /// recovery; a bound on disturbance or measurement errors; a delay.
+    /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
+    /// than the first one; one that begins later; a bound on disturbance or measurement errors; a delay.
     pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
         positive("period", period)?;
         let refuse = |field: &str, message: &str| {
@@ -166,6 +169,7 @@ impl AssuredFilter {
                 return Err(named(Error::new(ErrorKind::Unsupported, "source", message)));
             }
         }
+        one_plant(&filter, period)?;
         let state = AssuredState { filter: filter.state().clone(), ..AssuredState::default() };
         Ok(Self { filter, period, state, report: Assurance::default() })
     }
@@ -195,10 +199,18 @@ impl AssuredFilter {
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers.
+    /// A state with another number of barriers, or of a plant of other dimensions.
     pub fn restore(&mut self, state: &AssuredState) -> Result<(), Error> {
+        if !state.promises.is_empty() {
+            length("promises", state.promises.len(), self.filter.slots.len())?;
+        }
+        if !state.plan.fits(self.filter.state_dim, self.filter.input_dim) {
+            let message = "is of a plant of other dimensions";
+            return Err(Error::new(ErrorKind::Dimension, "plan", message));
+        }
         self.filter.restore(&state.filter)?;
         self.state.clone_from(state);
+        self.report = Assurance { driver: Driver::Rows, ..self.standing() };
         Ok(())
     }
 
@@ -206,6 +218,7 @@ impl AssuredFilter {
     pub fn rearm(&mut self) {
         self.filter.rearm();
         self.state = AssuredState { filter: self.filter.state().clone(), ..AssuredState::default() };
+        self.report = Assurance { until: f64::NAN, ..Assurance::default() };
     }
 
     /// Computes the safe input at time `t` in s and remembers the sample; arguments as for [`SafetyFilter::step`]. The
@@ -219,8 +232,10 @@ impl AssuredFilter {
         self.filter.step(t, x, u_ref, u)?;
         let is_valid = t.is_finite() && all_finite(x);
         let since = t - self.state.time;
-        let tolerance = ON_TIME[0] * self.period + ON_TIME[1] * t.abs();
-        let regular = since == 0.0 || (since - self.period).abs() <= tolerance;
+        let round_off = 2.0 * f64::EPSILON * t.abs();
+        let tolerance = ON_TIME * self.period + round_off;
+        let regular = round_off <= ROUND_OFF * self.period
+            && (since == 0.0 || (since - self.period).abs() <= tolerance);
         match self.state.standing {
             Standing::Undecided if is_valid => self.decide(t, x, u),
             // Also where t is not a number.
@@ -234,29 +249,54 @@ impl AssuredFilter {
                 false => self.go_on(t, u),
             };
             self.filter.state.input[..u.len()].copy_from_slice(u);
+            if self.report.driver != Driver::Rows {
+                self.disown_rows();
+            }
         }
         self.state.time = t;
-        self.report.standing = self.state.standing;
-        self.report.until = match self.state.standing {
-            Standing::Assured => self.state.plan.witness.until,
-            _ => f64::NAN,
-        };
+        self.report = Assurance { driver: self.report.driver, ..self.standing() };
         Ok(&self.report)
     }
 
-    /// The report of the rows at the last step.
+    fn standing(&self) -> Assurance {
+        let standing = self.state.standing;
+        let until = if standing == Standing::Assured { self.state.plan.witness.until } else { f64::NAN };
+        Assurance { standing, driver: Driver::Rows, until }
+    }
+
+    /// The report of the rows at the last step, about their own answer. No guarantee of theirs holds where another input
+    /// was applied.
     pub fn rows(&self) -> &Report {
         self.filter.report()
     }
 
     /// Goes on with the plan as it is, where nobody knows where the plant is.
-    fn go_on(&self, t: f64, u: &mut [f64]) -> Driver {
-        let inputs = &self.state.plan.witness.inputs;
-        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * self.period).or(inputs.last());
-        if let Some((_, input)) = next {
-            u.copy_from_slice(&input[..u.len()]);
+    fn go_on(&mut self, t: f64, u: &mut [f64]) -> Driver {
+        let plan = &self.state.plan;
+        let inputs = &plan.witness.inputs;
+        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * self.period);
+        if next.is_none() && !plan.stays() {
+            // Only feedback holds it there.
+            self.state.standing = Standing::Withdrawn(Failure::NoRest);
+        }
+        if let Some((_, input)) = next.or(inputs.last()) {
+            for (i, u) in u.iter_mut().enumerate() {
+                *u = self.filter.bounds.clamp(i, input[i]);
+            }
         }
         Driver::Plan
+    }
+
+    /// Takes back what the rows say of their own answer, where another input is applied.
+    fn disown_rows(&mut self) {
+        self.filter.state.barriers.iter_mut().for_each(|promise| promise.guaranteed = false);
+        self.filter.workspace.report.barriers.iter_mut().for_each(|barrier| barrier.guaranteed = false);
+    }
+
+    /// Whether barrier number `index` is promised: not where it is soft, ends before its deadline, or was left at the first
+    /// sample without a deadline.
+    pub fn promises_barrier(&self, index: usize) -> bool {
+        self.state.promises.get(index).is_some_and(Option::is_some)
     }
 
     /// The promises from `x` at `t`, with every deadline `factor` times as long.
@@ -267,8 +307,10 @@ impl AssuredFilter {
             slot.source.evaluate(t, x, &mut derivatives);
             let h = derivatives.drift[0];
             let from = match slot.promise.settings().deadline {
-                _ if h >= 0.0 => t,
-                Some(deadline) => t + factor * deadline,
+                // Not-a-number is asked for at once, and found by the check.
+                _ if h.is_nan() || h >= 0.0 => t,
+                // A little earlier, so that round-off of a time is no gap.
+                Some(deadline) => t + factor * deadline - ON_TIME * self.period,
                 None => return None,
             };
             let until = match slot.end {
@@ -297,7 +339,9 @@ impl AssuredFilter {
     /// twentieth, and that plan. None is looked for beyond `longest` times the deadlines.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
         const FINE: f64 = 1.05;
+        const MOST_LONGER: f64 = 1e6;
         // Twice as long until there is one, or half as long until there is none.
+        let longest = longest.min(MOST_LONGER);
         let (mut low, mut high) = (1.0, 1.0);
         let mut found = self.foresee(t, x, high).ok();
         if found.is_some() {
@@ -348,6 +392,9 @@ impl AssuredFilter {
                 Some(Requirement { barrier, source: &*slot.source, from, until, margin })
             })
             .collect();
+        if requirements.is_empty() {
+            return Err(Failure::Nothing);
+        }
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
         let source = &*self.filter.slots[0].source;
         let planner = Planner::new(source, &self.filter.bounds, &requirements, self.period, size);
@@ -411,4 +458,35 @@ impl AssuredFilter {
             },
         }
     }
+}
+
+/// Checks that every barrier runs the same plant ahead, at some states: a plan is one of all of them.
+fn one_plant(filter: &SafetyFilter, period: f64) -> Result<(), Error> {
+    const TRIALS: usize = 4;
+    let (nx, nu) = (filter.state_dim, filter.input_dim);
+    let moved = |slot: &BarrierSlot, trial: usize| {
+        // Numbers that no model treats apart.
+        let number = |i: usize| ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2;
+        let mut x: Vec<f64> = (0..nx).map(number).collect();
+        let u: Vec<f64> = (0..nu).map(|i| filter.bounds.clamp(i, number(i + nx))).collect();
+        if let Some(plant) = slot.source.predict() {
+            plant.flow(&mut x, &u, period);
+        }
+        x
+    };
+    for slot in &filter.slots[1..] {
+        for trial in 0..TRIALS {
+            let ends = [moved(&filter.slots[0], trial), moved(slot, trial)];
+            let same =
+                |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()) || a.is_nan() && b.is_nan();
+            if !ends[0].iter().zip(&ends[1]).all(same) {
+                let message = format!(
+                    "moves the state in another way than that of {}; a plan needs one plant for all barriers",
+                    filter.slots[0].name
+                );
+                return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
+            }
+        }
+    }
+    Ok(())
 }

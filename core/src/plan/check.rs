@@ -1,10 +1,11 @@
 //! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
 //!
-//! Between two nodes a time σ apart under one input, h lies above its chord by at least −M σ²/8, where M is the largest
-//! second derivative there. M is taken from both ends, widened by as much as it differs between them; for n = 1 it is three
-//! times the difference quotient of ḣ. Where that is not enough to decide, the piece is halved. So the bound assumes that
-//! the second derivative changes no faster between two nodes than the nodes show. That is what the step of the model is
-//! chosen for.
+//! Between two nodes a time σ apart under one input, h is looked at in the middle too. Both halves then have a lower bound,
+//! which is the least of three: the chord less M (σ/2)²/8, where M is the largest second derivative at the three points,
+//! widened by as much as it differs there (for n = 1 three times the difference quotient of ḣ); the point where the tangents
+//! of a half cross; and all of it less the error that the cubic through the ends makes in the middle. Where that does not
+//! decide, the piece is halved. So it is assumed that a dip of h between two points shows at them: as a value, a slope, a
+//! second derivative, or as a middle that is not where it was expected.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -18,12 +19,16 @@ use crate::scalar::all_finite;
 
 /// Halvings of a piece whose bound does not decide.
 const HALVINGS: u32 = 6;
-/// Rate of the state that counts as rest, as a part of the largest on the way and of its size.
+/// Rate of the state that counts as rest, as a part of the largest on the way.
 const AT_REST: f64 = 1e-6;
+/// Change of a state over a hold that is round-off, as a part of its size.
+pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// Number of holds for which a drift at rest has to leave every set where it is.
+const DRIFT: f64 = 1e3;
 /// Most holds of the braking law after a reference.
 const BRAKING: usize = 200;
-/// Later times, in units of the plan's length, at which a set that does not move has the same h.
-const LATER: [f64; 4] = [0.1234, 0.618, 1.7, 3.3];
+/// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
+const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 86413.0]];
 
 /// A list of held inputs that meets every requirement, from a state on.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,8 +66,10 @@ pub enum Failure {
         /// h − margin there, < 0.
         slack: f64,
     },
-    /// The plant does not come to rest within the horizon, or a set that moves is to be kept after it.
+    /// The plant does not come to rest, or a set moves.
     NoRest,
+    /// Nothing is promised that could be kept.
+    Nothing,
     /// The model is not finite on the way.
     Singular,
 }
@@ -176,8 +183,11 @@ impl<'a> Walk<'a> {
         if !all_finite(&self.x) {
             return Err(Failure::Singular);
         }
-        for (rate, (x, before)) in self.rates.iter_mut().zip(self.x.iter().zip(&self.before)) {
-            *rate = rate.max((x - before).abs() / dt);
+        // In a piece of some round-offs of time there is no rate.
+        if dt > 1e-6 * self.model.step {
+            for (rate, (x, before)) in self.rates.iter_mut().zip(self.x.iter().zip(&self.before)) {
+                *rate = rate.max((x - before).abs() / dt);
+            }
         }
         self.t = time;
         for i in 0..self.requirements.len() {
@@ -212,33 +222,50 @@ impl<'a> Walk<'a> {
             true => d.drift[k],
             false => d.drift[k] + d.row.iter().zip(u).map(|(a, u)| a * u).sum::<f64>(),
         };
-        let least = ends[0].drift[0].min(ends[1].drift[0]);
-        let second = match n {
-            1 => 3.0 * (derivative(ends[1], 1) - derivative(ends[0], 1)).abs() / dt,
-            _ => {
-                let [a, b] = ends.map(|d| derivative(d, 2));
-                a.max(b) + (a - b).abs()
-            }
-        };
-        let bound = least - second.max(0.0) * dt * dt / 8.0;
-        if bound >= self.margin(i) || halvings == 0 || least < self.margin(i) {
-            return bound;
-        }
+        let margin = self.margin(i);
         let mut middle = (x.to_vec(), Derivatives::ZERO);
         self.model.plant.flow(&mut middle.0, u, dt / 2.0);
         source.evaluate(from + dt / 2.0, &middle.0, &mut middle.1);
         if !middle.1.is_finite() {
             return f64::NEG_INFINITY;
         }
-        let half = |ends, from, x: &[f64]| self.least_between(i, u, ends, (from, dt / 2.0), x, halvings - 1);
-        let left = half([ends[0], &middle.1], from, x);
-        left.min(half([&middle.1, ends[1]], from + dt / 2.0, &middle.0))
+        let points = [ends[0], &middle.1, ends[1]];
+        let h = points.map(|d| d.drift[0]);
+        let slope = points.map(|d| derivative(d, 1));
+        let half = dt / 2.0;
+        let least = h[0].min(h[1]).min(h[2]);
+        let second = match n {
+            1 => 3.0 * (slope[1] - slope[0]).abs().max((slope[2] - slope[1]).abs()) / half,
+            _ => {
+                let second = points.map(|d| derivative(d, 2));
+                let (low, high) =
+                    (second[0].min(second[1]).min(second[2]), second[0].max(second[1]).max(second[2]));
+                high + (high - low)
+            }
+        };
+        let chord = least - second.max(0.0) * half * half / 8.0;
+        // Where a falling tangent and a rising one cross.
+        let crossing = |a: usize, b: usize| match slope[a] < 0.0 && slope[b] > 0.0 {
+            true => {
+                let time = ((h[b] - h[a] - slope[b] * half) / (slope[a] - slope[b])).clamp(0.0, half);
+                h[a] + slope[a] * time
+            }
+            false => least,
+        };
+        let expected = 0.5 * (h[0] + h[2]) + (slope[0] - slope[2]) * dt / 8.0;
+        let bound = chord.min(crossing(0, 1)).min(crossing(1, 2)) - (h[1] - expected).abs();
+        if bound >= margin || halvings == 0 || least < margin {
+            return bound;
+        }
+        let part = |ends, from, x: &[f64]| self.least_between(i, u, ends, (from, half), x, halvings - 1);
+        let left = part([ends[0], &middle.1], from, x);
+        left.min(part([&middle.1, ends[1]], from + half, &middle.0))
     }
 
     /// Follows the rest of `reference`.
-    pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
+    pub(super) fn follow(&mut self, reference: &Reference, period: f64) -> Result<(), Failure> {
         let mut u = vec![0.0; self.model.inputs()];
-        while let Some(k) = reference.hold_at(self.t) {
+        while let Some(k) = reference.hold_at(self.t, period) {
             reference.input(&self.model, k, self.t, &self.x, &mut u);
             self.hold(&u, reference.times[k + 1] - self.t)?;
         }
@@ -252,10 +279,9 @@ impl<'a> Walk<'a> {
             brake.input(&self.model, &self.x, &mut u);
             let rate = self.model.rate(&self.x, &u, brake.hold);
             let still = |(i, rate): (usize, &f64)| {
-                rate.abs() * brake.hold
-                    <= AT_REST * (self.rates[i] * brake.hold).max(1e-3 * (1.0 + self.x[i].abs()))
+                rate.abs() <= AT_REST * self.rates[i] + ROUND_OFF * self.x[i].abs() / brake.hold
             };
-            if rate.iter().enumerate().all(still) && self.rests()? {
+            if rate.iter().enumerate().all(still) && self.rests(brake.hold)? {
                 self.hold(&u, brake.hold)?;
                 return Ok(self.witness);
             }
@@ -269,7 +295,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Whether every set is still, so that a plant at rest here stays in all that are or will be asked for.
-    fn rests(&mut self) -> Result<bool, Failure> {
+    fn rests(&mut self, hold: f64) -> Result<bool, Failure> {
         let length = (self.t - self.started).max(self.model.step);
         for i in 0..self.requirements.len() {
             let requirement = &self.requirements[i];
@@ -279,14 +305,19 @@ impl<'a> Walk<'a> {
             requirement.source.evaluate(self.t, &self.x, &mut self.at[i]);
             let h = self.at[i].drift[0];
             let mut later = Derivatives::ZERO;
-            for part in LATER {
-                requirement.source.evaluate(self.t + part * length, &self.x, &mut later);
+            let spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
+            for span in spans {
+                requirement.source.evaluate(self.t + span, &self.x, &mut later);
                 if (later.drift[0] - h).abs() > 1e-12 * (1.0 + h.abs()) {
                     return Ok(false);
                 }
             }
             if requirement.until == f64::INFINITY || requirement.from > self.t {
-                self.note(i, self.t.max(requirement.from), h)?;
+                let drift = match requirement.source.relative_degree() {
+                    1 => 0.0,
+                    _ => self.at[i].drift[1].abs() * DRIFT * hold,
+                };
+                self.note(i, self.t.max(requirement.from), h - drift)?;
             }
         }
         Ok(true)

@@ -23,7 +23,12 @@ pub(super) struct Brake {
     pub(super) gain: DMatrix<f64>,
     /// The length of a hold in s.
     pub(super) hold: f64,
+    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
+    pub(super) stays: bool,
 }
+
+/// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
+const STAYS: f64 = 1.0 + 1e-4;
 
 impl Brake {
     /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
@@ -50,7 +55,8 @@ impl Brake {
             }
         }
         let (_, gain) = riccati(&p, &a, &b, &q, &r)?;
-        Some(Self { state, input, gain, hold })
+        let stays = a.complex_eigenvalues().iter().all(|v| v.norm_sqr() <= STAYS * STAYS);
+        Some(Self { state, input, gain, hold, stays })
     }
 
     /// Writes the input at `x`.
@@ -109,13 +115,11 @@ impl Reference {
         finite.then_some(Self { times: times.to_vec(), inputs, states, gains })
     }
 
-    /// The number of the hold that `t` lies in, if one is left.
-    pub(super) fn hold_at(&self, t: f64) -> Option<usize> {
-        // A time that is a sum of steps counts as the instant it is meant to be.
-        let begun = |k: usize| self.times[k] <= t + 1e-6 * (self.times[k + 1] - self.times[k]);
-        let k = (0..self.inputs.len()).rev().find(|&k| begun(k)).unwrap_or(0);
-        let end = self.times.get(k + 1)?;
-        (*end > t + 1e-6 * (end - self.times[k])).then_some(k)
+    /// The number of the hold that the sample at `t` begins or lies in, if one is left; samples are `period` s apart.
+    pub(super) fn hold_at(&self, t: f64, period: f64) -> Option<usize> {
+        // A time that is a sum of steps counts as the sample it is meant to be.
+        let ends = self.times.get(1..)?;
+        ends.iter().position(|end| *end > t + 0.5 * period)
     }
 
     /// Writes the input for the rest of hold `k`, at time `t` and `x`.

@@ -60,3 +60,17 @@ pub struct Plan {
     /// The longest step in s in which the model is run ahead.
     step: f64,
 }
+
+impl Plan {
+    /// Whether the last input alone holds the plant at the rest of the plan, without feedback.
+    pub fn stays(&self) -> bool {
+        self.brake.as_ref().is_some_and(|brake| brake.stays)
+    }
+
+    /// Whether it is one of a plant with so many states and inputs, or none at all.
+    pub fn fits(&self, states: usize, inputs: usize) -> bool {
+        let brake = self.brake.as_ref().is_none_or(|b| b.gain.shape() == (inputs, states));
+        let mut gains = self.reference.iter().flat_map(|r| &r.gains);
+        brake && gains.all(|gain| gain.shape() == (inputs, states))
+    }
+}

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::check::ROUND_OFF;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
@@ -112,7 +113,8 @@ impl Model<'_> {
             if !rate.iter().all(|r| r.is_finite()) {
                 return None;
             }
-            if rate.amax() <= 1e-9 * (1.0 + at.iter().fold(0.0, |m: f64, x| m.max(x.abs()))) {
+            let still = |(x, r): (&f64, &f64)| r.abs() <= 1e-9 + ROUND_OFF * x.abs() / duration;
+            if at.iter().zip(rate.iter()).all(still) {
                 return Some((at, u));
             }
             let Linear { a, b } = self.linear(&at, &u, duration);

@@ -26,6 +26,10 @@ const SEARCHED: f64 = 3.0;
 const KEPT: f64 = 0.5;
 /// Error of the model over a hold, as a part of the size of a state.
 const RESOLVED: f64 = 1e-8;
+/// The longest step of the model, in sampling periods.
+const COARSE: f64 = 4.0;
+/// The most samples until a deadline.
+const MOST_SAMPLES: usize = 100_000_000;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
@@ -72,8 +76,12 @@ impl<'a> Planner<'a> {
         for (part, holds) in GRIDS {
             let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let (hold, times) = self.grid(t, &requirements, holds);
-            let model = self.model(self.resolved(x, hold));
+            let Some((hold, times)) = self.grid(t, &requirements, holds) else { continue };
+            let Some(step) = self.resolved(x, hold) else {
+                failure = Failure::Singular;
+                continue;
+            };
+            let model = self.model(step);
             let Some(brake) = Brake::around(&model, x, hold) else { continue };
             let brake = Arc::new(brake);
             let search = Search {
@@ -111,24 +119,32 @@ impl<'a> Planner<'a> {
     }
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
-    /// deadline, `after` of them past it. The last sample before each deadline is a node.
-    fn grid(&self, t: f64, requirements: &[Requirement<'_>], [before, after]: [usize; 2]) -> (f64, Vec<f64>) {
+    /// deadline, `after` of them past it. The last sample before each deadline is a node. `None` for too many samples.
+    fn grid(
+        &self,
+        t: f64,
+        requirements: &[Requirement<'_>],
+        [before, after]: [usize; 2],
+    ) -> Option<(f64, Vec<f64>)> {
         // Round-off of a deadline that is a number of periods leaves it one.
-        let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-6).max(0.0) as usize;
+        let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-5).max(0.0) as usize;
         let mut deadlines: Vec<usize> =
             requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
         deadlines.sort_unstable();
         deadlines.dedup();
         let last = deadlines.last().copied().unwrap_or(0);
+        if last > MOST_SAMPLES {
+            return None;
+        }
         let hold = if last > 0 { last.div_ceil(before) } else { 5 };
         let (mut samples, mut from) = (vec![0], 0);
         for deadline in deadlines {
             let (length, holds) = (deadline - from, (deadline - from).div_ceil(hold));
-            samples.extend((1..=holds).map(|k| from + length * k / holds));
+            samples.extend((1..=holds).map(|k| from + (length as u64 * k as u64 / holds as u64) as usize));
             from = deadline;
         }
         samples.extend((1..=after).map(|k| from + hold * k));
-        (hold as f64 * self.period, samples.into_iter().map(|k| t + k as f64 * self.period).collect())
+        Some((hold as f64 * self.period, samples.into_iter().map(|k| t + k as f64 * self.period).collect()))
     }
 
     /// The plan along `found`, checked.
@@ -161,7 +177,8 @@ impl<'a> Planner<'a> {
     /// What the first of these fails at.
     pub fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
         let first = Some((u, self.period));
-        let has_reference = plan.reference.as_ref().is_some_and(|r| r.hold_at(t + self.period).is_some());
+        let has_reference =
+            plan.reference.as_ref().is_some_and(|r| r.hold_at(t + self.period, self.period).is_some());
         if !has_reference {
             return self.walk(plan, 1.0, t, x, first, false);
         }
@@ -182,7 +199,9 @@ impl<'a> Planner<'a> {
             let mut walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
             let mut at = t;
             for (end, u) in &plan.witness.inputs {
-                if *end > at + 1e-6 * self.period {
+                if *end > at + 0.5 * self.period {
+                    let mut u = *u;
+                    self.model(plan.step).clamp(&mut u[..nu]);
                     walk.hold(&u[..nu], end - at)?;
                     at = *end;
                 }
@@ -209,16 +228,16 @@ impl<'a> Planner<'a> {
             walk.hold(u, duration)?;
         }
         if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
-            walk.follow(reference)?;
+            walk.follow(reference, self.period)?;
         }
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         walk.stop(brake, f64::INFINITY)
     }
 
-    /// A step of the model with which a hold from `x` is resolved, with inputs at both bounds.
-    fn resolved(&self, x: &[f64], hold: f64) -> f64 {
+    /// A step of the model with which a hold from `x` is resolved, with inputs at both bounds, if there is one.
+    fn resolved(&self, x: &[f64], hold: f64) -> Option<f64> {
         let nu = self.dims[1];
-        let mut step = self.period.max(hold / 8.0);
+        let mut step = self.period.max((hold / 8.0).min(COARSE * self.period));
         for _ in 0..HALVINGS {
             let error = |sign: f64| {
                 let mut u: Vec<f64> = (0..nu).map(|i| sign * self.model(step).reach(i, self.size)).collect();
@@ -232,11 +251,11 @@ impl<'a> Planner<'a> {
                 coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs() / (1.0 + b.abs())).fold(0.0, f64::max)
             };
             if error(1.0).max(error(-1.0)) <= RESOLVED {
-                break;
+                return Some(step);
             }
             step /= 2.0;
         }
-        step
+        None
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.

@@ -127,7 +127,7 @@ impl Search<'_> {
                 let h = derivatives.drift[0];
                 sizes[i] = sizes[i].max(h.abs());
                 // A deadline between two nodes is asked for at the one before.
-                let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-6 * (next - t));
+                let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - t));
                 let begun = requirement.from < next && t < requirement.until;
                 if k > 0 && begun {
                     values.push((i, k, h - self.strictness * requirement.margin));
