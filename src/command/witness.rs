@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::output::number;
 
 /// The longest deadlines looked for, in units of the configured ones.
-const LONGEST: f64 = 16.0;
+const LONGEST: f64 = 4.0;
 
 /// The finding on plans from the start.
 #[derive(Serialize)]

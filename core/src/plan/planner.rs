@@ -24,8 +24,11 @@ const WORTH: f64 = 0.01;
 const SEARCHED: f64 = 3.0;
 /// Margins for the rest of a plan that was checked before: the model differs from the plant by round-off at least.
 const KEPT: f64 = 0.5;
-/// Error of the model over a hold, as a part of the size of a state.
-const RESOLVED: f64 = 1e-8;
+/// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
+const TIGHTENED: u32 = 4;
+const TIGHTENING: u32 = 4;
+/// Error of the model over a hold, as a part of the size of a state: in the search, and in the check.
+const RESOLVED: [f64; 2] = [1e-5, 1e-8];
 /// The longest step of the model, in sampling periods.
 const COARSE: f64 = 4.0;
 /// The most samples until a deadline.
@@ -77,22 +80,23 @@ impl<'a> Planner<'a> {
             let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
             let Some((hold, times)) = self.grid(t, &requirements, holds) else { continue };
-            let Some(step) = self.resolved(x, hold) else {
+            let resolved = RESOLVED.map(|error| self.resolved(x, hold, error));
+            let [Some(coarse), Some(fine)] = resolved else {
                 failure = Failure::Singular;
                 continue;
             };
-            let model = self.model(step);
+            let (sketch, model) = (self.model(coarse), self.model(fine));
             let Some(brake) = Brake::around(&model, x, hold) else { continue };
             let brake = Arc::new(brake);
-            let search = Search {
-                model,
-                requirements: &requirements,
+            let mut search = Search {
+                model: sketch,
+                requirements,
                 strictness: SEARCHED,
                 times: &times,
                 x,
                 size: self.size,
             };
-            let guesses = self.guesses(&model, &brake, x, &times);
+            let guesses = self.guesses(&sketch, &brake, x, &times);
             let mut descents: Vec<Descent> =
                 guesses.into_iter().map(|inputs| Descent::from(search.run(inputs))).collect();
             // A few steps show which guesses lead somewhere.
@@ -107,10 +111,23 @@ impl<'a> Planner<'a> {
                     if violation > WORTH && violation >= nearest {
                         continue;
                     }
-                    match self.finish(&model, &times, x, &descent.best, &brake) {
-                        Ok(plan) => return Ok(plan),
-                        Err(found) if violation < nearest => (nearest, failure) = (violation, found),
-                        Err(_) => (),
+                    // What is broken between the nodes is asked for with more margin at them.
+                    for _ in 0..TIGHTENED {
+                        let found = match self.finish(&model, &times, x, &descent.best, &brake) {
+                            Ok(plan) => return Ok(plan),
+                            Err(found) => found,
+                        };
+                        if violation < nearest {
+                            (nearest, failure) = (violation, found);
+                        }
+                        match found {
+                            Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
+                                search.tighten(barrier, slack);
+                                *descent = Descent::from(search.run(descent.best.inputs.clone()));
+                                search.improve(descent, TIGHTENING);
+                            }
+                            _ => break,
+                        }
                     }
                 }
             }
@@ -234,8 +251,8 @@ impl<'a> Planner<'a> {
         walk.stop(brake, f64::INFINITY)
     }
 
-    /// A step of the model with which a hold from `x` is resolved, with inputs at both bounds, if there is one.
-    fn resolved(&self, x: &[f64], hold: f64) -> Option<f64> {
+    /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one.
+    fn resolved(&self, x: &[f64], hold: f64, allowed: f64) -> Option<f64> {
         let nu = self.dims[1];
         let mut step = self.period.max((hold / 8.0).min(COARSE * self.period));
         for _ in 0..HALVINGS {
@@ -250,7 +267,7 @@ impl<'a> Planner<'a> {
                 let (coarse, fine) = (run(step), run(step / 2.0));
                 coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs() / (1.0 + b.abs())).fold(0.0, f64::max)
             };
-            if error(1.0).max(error(-1.0)) <= RESOLVED {
+            if error(1.0).max(error(-1.0)) <= allowed {
                 return Some(step);
             }
             step /= 2.0;

@@ -30,12 +30,14 @@ const PENALTY: f64 = 300.0;
 const TRUST: f64 = 0.7;
 /// Its least size.
 const LEAST_TRUST: f64 = 1e-3;
+/// Margin that is added for what was missing, in units of it.
+const TIGHTER: f64 = 1.5;
 /// Part of a trajectory's change that its curvature may be for the linear model to count.
 const BENT: f64 = 0.2;
 /// A search: the start, the grid and what has to be met there.
 pub(super) struct Search<'a> {
     pub(super) model: Model<'a>,
-    pub(super) requirements: &'a [Requirement<'a>],
+    pub(super) requirements: Vec<Requirement<'a>>,
     /// What margins are multiplied by: larger than in the check.
     pub(super) strictness: f64,
     /// The beginning of every hold in s, and the end of the last.
@@ -91,6 +93,13 @@ struct Answer {
 }
 
 impl Search<'_> {
+    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes.
+    pub(super) fn tighten(&mut self, barrier: usize, slack: f64) {
+        for requirement in self.requirements.iter_mut().filter(|r| r.barrier == barrier) {
+            requirement.margin -= TIGHTER * slack / self.strictness;
+        }
+    }
+
     /// The length of hold `k` in s.
     fn hold(&self, k: usize) -> f64 {
         self.times[k + 1] - self.times[k]
