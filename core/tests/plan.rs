@@ -142,8 +142,8 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
 
 #[test]
 fn what_no_input_can_keep_is_refused() {
-    // 23 m from rest within 2 s: reached at 12 m/s² at the earliest, and then much too fast to stay.
-    let mut filter = Vehicle::PointMass.assured(2.0, [12.0; 2]);
+    // From rest 12 m/s² lead 17.3 m far along x in 1.7 s, and the goal begins at 18 m.
+    let mut filter = Vehicle::PointMass.assured(1.7, [12.0; 2]);
     let mut u = [0.0; 2];
     let assurance = *filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
     assert!(matches!(assurance.standing, Standing::Refused(_)), "{assurance:?}");
