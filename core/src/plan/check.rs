@@ -39,6 +39,9 @@ pub struct Witness {
     pub until: f64,
     /// The place on the way where h − margin is least.
     pub tightest: Option<Tightest>,
+    /// The largest rate of each state on the way, and on the way of the plan before it: what rest is small against. It never
+    /// falls, so what was a rest stays one.
+    rates: Vec<f64>,
     /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
 }
@@ -85,8 +88,6 @@ pub(super) struct Walk<'a> {
     before: Vec<f64>,
     /// Derivatives of h at (t, x) for the requirements that are or come into force.
     at: Vec<Derivatives>,
-    /// The largest rate of each state so far.
-    rates: Vec<f64>,
     witness: Witness,
     started: f64,
 }
@@ -108,14 +109,21 @@ impl<'a> Walk<'a> {
             x: x.to_vec(),
             before: x.to_vec(),
             at: vec![Derivatives::ZERO; requirements.len()],
-            rates: vec![0.0; x.len()],
-            witness: Witness { until: f64::INFINITY, ..Witness::default() },
+            witness: Witness { until: f64::INFINITY, rates: vec![0.0; x.len()], ..Witness::default() },
             started: t,
         };
         for i in 0..requirements.len() {
             walk.evaluate(i)?;
         }
         Ok(walk)
+    }
+
+    /// Takes over the rates of the plan before.
+    pub(super) fn after(mut self, before: &Witness) -> Self {
+        for (rate, before) in self.witness.rates.iter_mut().zip(&before.rates) {
+            *rate = rate.max(*before);
+        }
+        self
     }
 
     fn margin(&self, i: usize) -> f64 {
@@ -185,7 +193,7 @@ impl<'a> Walk<'a> {
         }
         // In a piece of some round-offs of time there is no rate.
         if dt > 1e-6 * self.model.step {
-            for (rate, (x, before)) in self.rates.iter_mut().zip(self.x.iter().zip(&self.before)) {
+            for (rate, (x, before)) in self.witness.rates.iter_mut().zip(self.x.iter().zip(&self.before)) {
                 *rate = rate.max((x - before).abs() / dt);
             }
         }
@@ -279,7 +287,7 @@ impl<'a> Walk<'a> {
             brake.input(&self.model, &self.x, &mut u);
             let rate = self.model.rate(&self.x, &u, brake.hold);
             let still = |(i, rate): (usize, &f64)| {
-                rate.abs() <= AT_REST * self.rates[i] + ROUND_OFF * self.x[i].abs() / brake.hold
+                rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / brake.hold
             };
             if rate.iter().enumerate().all(still) && self.rests(brake.hold)? {
                 self.hold(&u, brake.hold)?;

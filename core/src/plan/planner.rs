@@ -213,7 +213,8 @@ impl<'a> Planner<'a> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
         let replay = || {
-            let mut walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
+            let walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
+            let mut walk = walk.after(&plan.witness);
             let mut at = t;
             for (end, u) in &plan.witness.inputs {
                 if *end > at + 0.5 * self.period {
@@ -240,7 +241,8 @@ impl<'a> Planner<'a> {
         first: Option<(&[f64], f64)>,
         follows: bool,
     ) -> Result<Witness, Failure> {
-        let mut walk = Walk::new(self.model(plan.step), self.requirements, strictness, t, x)?;
+        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, t, x)?;
+        let mut walk = walk.after(&plan.witness);
         if let Some((u, duration)) = first {
             walk.hold(u, duration)?;
         }
