@@ -60,7 +60,7 @@ mod tape;
 
 pub use error::Error;
 pub use model::{Barrier, Model};
-pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_identifier, is_in_name, is_reserved};
+pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved};
 
 /// Most states of a model.
 pub const MAX_STATES: usize = 32;

@@ -82,7 +82,7 @@ pub fn is_in_name(character: char) -> bool {
 }
 
 /// Whether `name` is a C identifier: ASCII letters, digits and underscores, not starting with a digit.
-pub fn is_identifier(name: &str) -> bool {
+pub(crate) fn is_identifier(name: &str) -> bool {
     name.starts_with(is_first_in_name) && name.chars().all(is_in_name)
 }
 

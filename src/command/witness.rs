@@ -1,6 +1,6 @@
 //! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
 
-use punctual_core::filter::{AssuredFilter, Standing};
+use punctual_core::filter::AssuredFilter;
 use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
@@ -61,7 +61,7 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
     if !c.barrier_inputs().is_empty() {
         return Ok(Some(refused("a barrier follows inputs that others move, which no plan foresees".into())));
     }
-    let mut filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
+    let filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
         Ok(filter) => filter,
         Err(error) => return Ok(Some(refused(error.to_string()))),
     };
@@ -82,16 +82,9 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
             .tightest
             .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
     };
-    // The first sample decides.
-    let mut u = vec![0.0; inputs.len()];
-    let refused = |e: punctual_core::Error| Error::configuration(e.field(), e.message());
-    let standing = filter.step(t, x0, &vec![0.0; inputs.len()], &mut u).map_err(refused)?.standing;
-    let configured = match standing {
-        Standing::Refused(failure) => Err(failure),
-        _ => filter.plan().cloned().ok_or(Failure::Nothing),
-    };
-    let names = c.barrier.iter().enumerate().filter(|(i, _)| !filter.promises_barrier(*i));
-    let left_out = names.map(|(_, barrier)| barrier.name.clone()).collect();
+    let configured = filter.foresee(t, x0, 1.0);
+    let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
+    let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let soonest = if has_deadline { filter.soonest(t, x0, LONGEST) } else { None };
     let reason = configured.as_ref().err().map(|failure| match *failure {

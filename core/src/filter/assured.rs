@@ -64,8 +64,6 @@ pub struct Assurance {
     pub standing: Standing,
     /// Who chose the input.
     pub driver: Driver,
-    /// Time in s until which every promise is kept whatever comes; infinite for ever, not a number without promise.
-    pub until: f64,
 }
 
 impl Assurance {
@@ -98,10 +96,10 @@ struct Promise {
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
 ///
-/// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier
-/// that can be is promised ([`Self::promises_barrier`]), for whatever u_ref comes. Not found: the promise is refused, and the filter goes on by its rows. From then on
-/// every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a compromise, or where nothing
-/// else keeps the promise the next input of the plan itself.
+/// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier that
+/// [can be](Self::promised) is promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on
+/// by its rows. Once promised, every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a
+/// compromise, or where nothing else keeps the promise the next input of the plan itself.
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
 /// again at the same time. Where x is not finite, the plan goes on as it is. A filter with bounds on disturbance or
@@ -210,7 +208,7 @@ impl AssuredFilter {
         }
         self.filter.restore(&state.filter)?;
         self.state.clone_from(state);
-        self.report = Assurance { driver: Driver::Rows, ..self.standing() };
+        self.report = Assurance { standing: state.standing, driver: Driver::Rows };
         Ok(())
     }
 
@@ -218,7 +216,7 @@ impl AssuredFilter {
     pub fn rearm(&mut self) {
         self.filter.rearm();
         self.state = AssuredState { filter: self.filter.state().clone(), ..AssuredState::default() };
-        self.report = Assurance { until: f64::NAN, ..Assurance::default() };
+        self.report = Assurance::default();
     }
 
     /// Computes the safe input at time `t` in s and remembers the sample; arguments as for [`SafetyFilter::step`]. The
@@ -254,14 +252,8 @@ impl AssuredFilter {
             }
         }
         self.state.time = t;
-        self.report = Assurance { driver: self.report.driver, ..self.standing() };
+        self.report.standing = self.state.standing;
         Ok(&self.report)
-    }
-
-    fn standing(&self) -> Assurance {
-        let standing = self.state.standing;
-        let until = if standing == Standing::Assured { self.state.plan.witness.until } else { f64::NAN };
-        Assurance { standing, driver: Driver::Rows, until }
     }
 
     /// The report of the rows at the last step, about their own answer. No guarantee of theirs holds where another input
@@ -293,10 +285,10 @@ impl AssuredFilter {
         self.filter.workspace.report.barriers.iter_mut().for_each(|barrier| barrier.guaranteed = false);
     }
 
-    /// Whether barrier number `index` is promised: not where it is soft, ends before its deadline, or was left at the first
-    /// sample without a deadline.
-    pub fn promises_barrier(&self, index: usize) -> bool {
-        self.state.promises.get(index).is_some_and(Option::is_some)
+    /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
+    /// deadline, or one without a deadline whose set `x` is outside of.
+    pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> {
+        self.promises(t, x, 1.0).into_iter().map(|promise| promise.is_some())
     }
 
     /// The promises from `x` at `t`, with every deadline `factor` times as long.

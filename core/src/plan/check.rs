@@ -33,10 +33,8 @@ const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 864
 /// A list of held inputs that meets every requirement, from a state on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Witness {
-    /// The end of each hold in s, and its input. The last is held for ever where `until` is infinite.
+    /// The end of each hold in s, and its input. The plant is at rest under the last, which is held for ever.
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
-    /// Time in s until which the requirements are known to be met; infinite where the plan ends at rest.
-    pub until: f64,
     /// The place on the way where h − margin is least.
     pub tightest: Option<Tightest>,
     /// The largest rate of each state on the way, and on the way of the plan before it: what rest is small against. It never
@@ -109,7 +107,7 @@ impl<'a> Walk<'a> {
             x: x.to_vec(),
             before: x.to_vec(),
             at: vec![Derivatives::ZERO; requirements.len()],
-            witness: Witness { until: f64::INFINITY, rates: vec![0.0; x.len()], ..Witness::default() },
+            witness: Witness { rates: vec![0.0; x.len()], ..Witness::default() },
             started: t,
         };
         for i in 0..requirements.len() {
@@ -280,8 +278,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Brakes until the plant is at rest where it can stay for ever, or until `horizon` (s) where sets move.
-    pub(super) fn stop(mut self, brake: &Brake, horizon: f64) -> Result<Witness, Failure> {
+    /// Brakes until the plant is at rest where it can stay for ever.
+    pub(super) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
         for _ in 0..BRAKING {
             brake.input(&self.model, &self.x, &mut u);
@@ -291,10 +289,6 @@ impl<'a> Walk<'a> {
             };
             if rate.iter().enumerate().all(still) && self.rests(brake.hold)? {
                 self.hold(&u, brake.hold)?;
-                return Ok(self.witness);
-            }
-            if self.t >= horizon && self.requirements.iter().all(|r| r.from <= self.t) {
-                self.witness.until = self.t;
                 return Ok(self.witness);
             }
             self.hold(&u, brake.hold)?;

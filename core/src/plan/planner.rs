@@ -224,7 +224,7 @@ impl<'a> Planner<'a> {
                     at = *end;
                 }
             }
-            walk.stop(brake, f64::INFINITY)
+            walk.stop(brake)
         };
         replay().or_else(|failure| {
             let follow = |follows| self.walk(plan, KEPT, t, x, None, follows);
@@ -250,7 +250,7 @@ impl<'a> Planner<'a> {
             walk.follow(reference, self.period)?;
         }
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
-        walk.stop(brake, f64::INFINITY)
+        walk.stop(brake)
     }
 
     /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one.

@@ -34,6 +34,7 @@ const LEAST_TRUST: f64 = 1e-3;
 const TIGHTER: f64 = 1.5;
 /// Part of a trajectory's change that its curvature may be for the linear model to count.
 const BENT: f64 = 0.2;
+
 /// A search: the start, the grid and what has to be met there.
 pub(super) struct Search<'a> {
     pub(super) model: Model<'a>,
