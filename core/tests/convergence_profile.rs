@@ -117,7 +117,7 @@ fn a_wrong_profile_is_refused_and_replaced() {
     for (t, h) in [(0.0, [-20.0, 0.0]), (0.5, [-19.0, 3.0])] {
         let demand = wrong.advance(&mut state, t, &h);
         assert_eq!(demand, promise.advance(&mut plain, t, &h), "at {t}");
-        assert!(state.fallback && state.guaranteed && !plain.fallback, "at {t}");
+        assert!(state.fallback && state.on_course && !plain.fallback, "at {t}");
     }
     let refusal = wrong.refusal(&state).expect("refused");
     assert_eq!(refusal, Refusal::Profile(ProfileError::Anchor { order: 1, found: 21.0, wanted: 0.0 }));

@@ -13,7 +13,7 @@ struct Run {
     arrival: f64,
     /// The least h at the samples after it.
     least_after: f64,
-    guaranteed: bool,
+    on_course: bool,
 }
 
 /// Runs from `h` for twice the deadline; h⁽ⁿ⁾ is whatever the floor asks for, or 0 if that is more.
@@ -21,11 +21,11 @@ fn run(settings: FixedTimeSettings, mut h: Vec<f64>, step: f64) -> Run {
     let (n, deadline) = (h.len(), settings.deadline.expect("one"));
     let promise = FixedTime::new(n, settings).expect("valid settings");
     let mut state = FixedTimeState::default();
-    let mut run = Run { arrival: f64::INFINITY, least_after: f64::INFINITY, guaranteed: true };
+    let mut run = Run { arrival: f64::INFINITY, least_after: f64::INFINITY, on_course: true };
     for k in 0..=(2.0 * deadline / step) as usize {
         let t = k as f64 * step;
         let floor = promise.advance(&mut state, t, &h).floor;
-        run.guaranteed &= state.guaranteed;
+        run.on_course &= state.on_course;
         if h[0] >= 0.0 {
             run.arrival = run.arrival.min(t);
         }
@@ -78,7 +78,7 @@ fn without_an_admissible_rate_nothing_is_promised() {
     let demand = promise.advance(&mut state, 0.0, &[-10.0, 0.0, 0.0]);
     let none = no_rate(&promise, &state).expect("none from rest");
     assert_eq!((none.reason, none.deadlines), (Reason::NoRealRoot, Deadlines::None));
-    assert_eq!((state.phase, state.guaranteed, state.rate), (Phase::Approach, false, 4.0));
+    assert_eq!((state.phase, state.on_course, state.rate), (Phase::Approach, false, 4.0));
     // (D + 4)³ h ≥ 0: the stay rate 20/T takes the place of the root.
     assert_eq!(demand.floor, 640.0);
 
@@ -86,13 +86,13 @@ fn without_an_admissible_rate_nothing_is_promised() {
     promise.advance(&mut state, 0.0, &[-10.0, 1.0, 0.0]);
     let none = no_rate(&promise, &state).expect("T = 5 is too short");
     assert_eq!(none.deadlines, Deadlines::From(10.0));
-    assert!(!state.guaranteed);
+    assert!(!state.on_course);
 
     // With one, it is the rate of the state.
     let mut state = FixedTimeState::default();
     promise.advance(&mut state, 0.0, &[-10.0, 3.0, 0.0]);
     assert_eq!(promise.refusal(&state), None);
-    assert!(state.guaranteed);
+    assert!(state.on_course);
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn the_first_order_condition_arrives_at_the_deadline() {
             // method, a few steps, and never late; then no chattering: not one sample outside.
             let early = (5.0 - run.arrival) / step;
             assert!((-1e-9..=20.0).contains(&early), "p = {p}, h = {h}: {}", run.arrival);
-            assert!(run.least_after >= 0.0 && run.guaranteed, "p = {p}, h = {h}");
+            assert!(run.least_after >= 0.0 && run.on_course, "p = {p}, h = {h}");
         }
     }
 }

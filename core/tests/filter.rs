@@ -59,7 +59,7 @@ fn phases_follow_one_another() {
             }
             assert_eq!((b.arrived, b.arrival_time), (arrival.is_some(), arrival), "at {t}");
             assert_eq!(b.time_left, (5.0 - t).max(0.0), "at {t}");
-            assert!(b.guaranteed, "at {t}");
+            assert!(b.on_course, "at {t}");
         },
     )
     .expect("valid schedule");
@@ -75,7 +75,7 @@ fn late_stay_left_and_back() {
     let phase = |filter: &mut SafetyFilter, t: f64, x: &[f64; 4]| {
         step(filter, t, x);
         let b = filter.report().barriers[0];
-        (b.phase, b.guaranteed, b.arrival_time)
+        (b.phase, b.on_course, b.arrival_time)
     };
     assert_eq!(phase(&mut filter, 3.0, &outside), (Phase::Approach, true, None));
     // Where the profile asked it to be it is not, and no time is left to start anew.
@@ -103,7 +103,7 @@ fn a_start_inside_stays() {
         let schedule = Schedule { step: 0.01, steps: 800, substeps: 1 };
         closed_loop(&mut filter, &PointMass, x0, schedule, damping, |t, _, _, report| {
             let b = &report.barriers[0];
-            assert_eq!((b.phase, b.arrival_time, b.guaranteed), (Phase::Stay, Some(0.0), true), "at {t}");
+            assert_eq!((b.phase, b.arrival_time, b.on_course), (Phase::Stay, Some(0.0), true), "at {t}");
             assert!(b.h >= 0.0, "h = {} at {t}", b.h);
         })
         .expect("valid schedule");
@@ -116,7 +116,7 @@ fn a_start_inside_that_cannot_stay_is_not_promised() {
     let mut filter = goal(BarrierSettings::within(5.0));
     step(&mut filter, 0.0, &[43.01, 45.0, -30.0, 0.0]);
     let b = filter.report().barriers[0];
-    assert_eq!((b.phase, b.arrived, b.guaranteed), (Phase::Stay, true, false));
+    assert_eq!((b.phase, b.arrived, b.on_course), (Phase::Stay, true, false));
 }
 
 #[test]
@@ -154,10 +154,10 @@ fn anchoring_waits_for_the_first_valid_sample() {
     // A sample that is lost later takes the guarantee with it and changes nothing else; a state above
     // the profile, from which the lemma starts again, brings it back.
     step(&mut filter, 17.1, &[f64::NAN; 4]);
-    assert_eq!(filter.state().barriers[0], FixedTimeState { guaranteed: false, ..state });
-    assert!(!filter.report().barriers[0].guaranteed);
+    assert_eq!(filter.state().barriers[0], FixedTimeState { on_course: false, ..state });
+    assert!(!filter.report().barriers[0].on_course);
     step(&mut filter, 17.2, &[20.0, 20.0, 1.0, 0.0]);
-    assert!(filter.report().barriers[0].guaranteed);
+    assert!(filter.report().barriers[0].on_course);
 }
 
 #[test]
@@ -374,12 +374,12 @@ fn bounds_that_forbid_the_row_are_infeasible_and_void_the_guarantee() {
     // Both components of the row are positive: the corner nearest the goal.
     assert_eq!((u, status), ([1.0, 2.0], Status::Infeasible));
     let b = filter.report().barriers[0];
-    assert!(!b.guaranteed && b.slack < 0.0 && !status.is_satisfied());
+    assert!(!b.on_course && b.slack < 0.0 && !status.is_satisfied());
     // A guarantee that is lost stays lost until the stay constraint gives another.
     let (_, status) = step(&mut filter, 0.01, &[44.9, 45.0, 0.0, 0.0]);
     assert!(status.is_satisfied());
     assert_eq!(
-        (filter.report().barriers[0].phase, filter.report().barriers[0].guaranteed),
+        (filter.report().barriers[0].phase, filter.report().barriers[0].on_course),
         (Phase::Stay, true)
     );
 }
@@ -390,12 +390,12 @@ fn the_centre_of_the_quadratic_disc_is_ill_conditioned() {
     let mut filter = goal_quadratic(2.0);
     let (u, status) = step(&mut filter, 0.0, &[45.0, 45.0, 300.0, 0.0]);
     assert_eq!((u, status), ([0.0, 0.0], Status::NoAuthority));
-    assert!(!filter.report().barriers[0].guaranteed);
+    assert!(!filter.report().barriers[0].on_course);
     // Slower, nothing is about to be left, and nothing is asked for.
     let mut filter = goal_quadratic(2.0);
     let (u, status) = step(&mut filter, 0.0, &[45.0, 45.0, 10.0, 0.0]);
     assert_eq!((u, status), ([0.0, 0.0], Status::Unchanged));
-    assert!(filter.report().barriers[0].guaranteed);
+    assert!(filter.report().barriers[0].on_course);
     // At rest there it asks for nothing.
     let mut filter = goal_quadratic(2.0);
     let (u, status) = step(&mut filter, 0.0, &[45.0, 45.0, 0.0, 0.0]);

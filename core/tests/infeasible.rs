@@ -288,7 +288,7 @@ fn steps_that_cannot_be_met() {
         }
         for (b, violation) in report.barriers.iter().zip(&violations) {
             assert_eq!(b.unmet_steps > 0, *violation > ROUND_OFF, "{}: {report:?}", s.name);
-            assert!(b.unmet_steps == 0 || !b.guaranteed, "{}: {report:?}", s.name);
+            assert!(b.unmet_steps == 0 || !b.on_course, "{}: {report:?}", s.name);
         }
     }
 }

@@ -47,7 +47,7 @@ fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
         let t = k as f64 * PERIOD;
         let [mut u, mut wanted] = [[0.0; 2]; 2];
         let report = robust.step(t, &[x, 0.0, v, 0.0], &[-5000.0, 0.0], &mut u).expect("a valid sample");
-        assert!(report.barriers[0].guaranteed && !report.barriers[0].deadline_unreachable);
+        assert!(report.barriers[0].on_course && !report.barriers[0].deadline_unreachable);
         exact.step(t, &[x - 0.3, 0.0, v - 0.2, 0.0], &[-5000.0, 0.0], &mut wanted).expect("a valid sample");
         // The same row, with other roundings.
         assert!((u[0] - wanted[0]).abs() <= 1e-9 * wanted[0].abs(), "{u:?} for {wanted:?}");

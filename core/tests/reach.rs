@@ -187,7 +187,7 @@ fn a_deadline_out_of_reach_is_postponed_and_kept() {
         .expect("valid schedule");
         let last = last.expect("a sample");
         assert!(arrival.is_some_and(|t| (3.0..=6.0).contains(&t)), "{arrival:?}");
-        assert!(last.phase == Phase::Stay && last.guaranteed && last.postponed == 1, "{last:?}");
+        assert!(last.phase == Phase::Stay && last.on_course && last.postponed == 1, "{last:?}");
     }
     // Reported only: the deadline stays.
     let mut reported = filter(BarrierSettings::within(1.0), 2.0);

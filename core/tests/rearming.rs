@@ -32,7 +32,7 @@ fn leaving_rearms_with_the_recovery_time() {
         let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
         let since = t - f64::from(300 * gusts) * step;
         // The sample that shows it outside breaks the old promise; the new one is given at the next.
-        assert_eq!((b.recoveries, b.guaranteed), (gusts, gusts == 0 || since > 0.0), "at {t}");
+        assert_eq!((b.recoveries, b.on_course), (gusts, gusts == 0 || since > 0.0), "at {t}");
         if gusts > 0 && b.phase == Phase::Approach && !b.arrived {
             assert!((b.time_left - (recovery - since)).abs() < 1e-9, "at {t}");
         }
@@ -48,7 +48,7 @@ fn without_a_recovery_time_leaving_is_reported() {
     for (t, x, phase) in [(0.0, 45.0, Phase::Stay), (0.1, 40.0, Phase::Left), (0.2, 45.0, Phase::Stay)] {
         let report = filter.step(t, &[x, 45.0, 0.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
         let b = report.barriers[0];
-        assert_eq!((b.phase, b.guaranteed, b.recoveries), (phase, phase == Phase::Stay, 0), "at {t}");
+        assert_eq!((b.phase, b.on_course, b.recoveries), (phase, phase == Phase::Stay, 0), "at {t}");
     }
 }
 
@@ -68,16 +68,16 @@ fn a_deadline_in_the_past_is_late_at_once() {
     for deadline in [0.0, -2.0] {
         let mut state = FixedTimeState::default();
         promise.anchor(&mut state, 7.0, &[-4.0, 1.0], deadline, 0.0);
-        assert!(!state.guaranteed);
+        assert!(!state.on_course);
         let demand = promise.advance(&mut state, 7.0, &[-4.0, 1.0]);
-        assert_eq!((state.phase, state.guaranteed), (Phase::Late, false));
+        assert_eq!((state.phase, state.on_course), (Phase::Late, false));
         assert_eq!((demand.time_left, demand.profile), (0.0, 0.0));
         // (D + a)² h ≥ 0 with a = 20/3: the target is h = 0 at once.
         let a: f64 = 20.0 / 3.0;
         assert!((demand.floor - (4.0 * a * a - 2.0 * a)).abs() < 1e-9, "{}", demand.floor);
         // Inside, with a stay constraint that holds from there, all is well again.
         promise.advance(&mut state, 8.0, &[1.0, 0.0]);
-        assert_eq!((state.phase, state.guaranteed), (Phase::Stay, true));
+        assert_eq!((state.phase, state.on_course), (Phase::Stay, true));
     }
 }
 
@@ -145,7 +145,7 @@ fn a_start_inside() {
             |t, x, _, r| {
                 let b = r.barriers[0];
                 assert_eq!((b.phase, b.arrival_time), (Phase::Stay, Some(0.0)), "at {t}: {b:?}");
-                assert_eq!(b.guaranteed, at_once || t > 0.0, "at {t}: {b:?}");
+                assert_eq!(b.on_course, at_once || t > 0.0, "at {t}: {b:?}");
                 assert!(x[0] >= 0.0, "{} at {t}", x[0]);
                 if t >= 4.0 {
                     least_late = least_late.min(x[0]);
@@ -174,7 +174,7 @@ fn a_new_deadline_on_the_way() {
             let u_ref = [-x[2], -x[3]];
             let b =
                 filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
-            assert!(b.guaranteed, "at {t}: {b:?}");
+            assert!(b.on_course, "at {t}: {b:?}");
             if t >= changed_at && b.phase == Phase::Approach {
                 assert!((b.time_left - (end - t)).abs() < 1e-9, "at {t}");
             }
@@ -203,7 +203,7 @@ fn a_moved_set_on_the_way() {
         }
         let u_ref = [-x[2], -x[3]];
         let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
-        assert!(b.guaranteed, "at {t}: {b:?}");
+        assert!(b.on_course, "at {t}: {b:?}");
         let promised = (5.0..moved_at - 1e-9).contains(&t) || t >= moved_at + 5.0;
         assert!(!promised || b.h >= 0.0, "h = {} at {t}", b.h);
         x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
@@ -226,7 +226,7 @@ fn a_method_that_fails_at_the_anchor_is_reported() {
         .expect("valid filter");
     assert_eq!(filter.refusal(0), None);
     let report = filter.step(0.0, &[-3.0, 0.0, 0.0], &[0.0], &mut [0.0]).expect("right dimensions");
-    assert!(report.barriers[0].fallback && !report.barriers[0].guaranteed);
+    assert!(report.barriers[0].fallback && !report.barriers[0].on_course);
     let reason = filter.refusal(0).expect("no rate from rest");
     let wanted = "no admissible rate: the polynomial of the repeated root has no real root for any deadline";
     assert_eq!(reason.to_string(), wanted);

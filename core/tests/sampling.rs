@@ -195,8 +195,8 @@ fn a_margin_that_is_used_up_is_no_guarantee() {
             let b = &r.barriers[0];
             // The profile is reported with the margin.
             let below = b.h < b.profile - 0.02 - 1e-9;
-            claimed_below += usize::from(below && b.guaranteed);
-            lost += usize::from(!b.guaranteed);
+            claimed_below += usize::from(below && b.on_course);
+            lost += usize::from(!b.on_course);
         })
         .expect("valid schedule");
         (claimed_below, lost)

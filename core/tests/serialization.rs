@@ -159,7 +159,7 @@ prop_compose! {
             period: n[8],
             fallback: flags[0],
             arrival: options[1],
-            guaranteed: flags[1],
+            on_course: flags[1],
             unmet: options[2].map(|since| Unmet { steps: counts[2], since, h: n[9] }),
         }
     }

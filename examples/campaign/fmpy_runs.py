@@ -12,6 +12,7 @@ from fmpy import extract, fmi2, read_model_description
 
 KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 BARRIER = ["h", "phase", "unmet_steps", "slack", "deadline_unreachable"]
+ABSTENTIONS = ["invalid_input", "singular", "wrong_relative_degree", "solver_failed"]  # nothing was enforced
 SAME_TIME = 1e-9  # round-off of a time, as a part of it where that is more than 1 s
 TOLERANCE, LEAST_TOLERANCE = 1e-9, 1e-12  # round-off of h, as a part of the largest |h| seen, and at least
 WHOLE = 1e-6  # steps by which an experiment may differ from a whole number of them
@@ -61,7 +62,7 @@ class Block:
         self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
         self.barriers = [n.removesuffix(".unmet_steps") for n in self.variables if n.endswith(".unmet_steps")]
         self.efforts = [n for n in self.variables if n.startswith("u.") and self.barriers]
-        read = {f"{b}.{field}" for b in self.barriers for field in BARRIER} | set(self.efforts) | {"status"}
+        read = {f"{b}.{field}" for b in self.barriers for field in BARRIER} | set(self.efforts) | {"status", "assurance"}
         read |= {link["from"][1] for link in links if link["from"][0] == self.name}
         outputs = {n for n in read if n in self.variables and self.variables[n].causality == "output"}
         direct = feedthrough(description)
@@ -229,7 +230,10 @@ class Filter:
     def __init__(self, block, values):
         self.block = block
         self.statuses = items(block, "status")
+        self.standings = items(block, "assurance") if "assurance" in block.outputs else {}
+        self.abstentions = {self.statuses[name] for name in ABSTENTIONS}
         self.counts = dict.fromkeys(self.statuses.values(), 0)
+        self.stood = dict.fromkeys(self.standings.values(), 0)
         self.peaks = dict.fromkeys(block.efforts, 0.0)
         self.barriers = {}
         for name in block.barriers:
@@ -247,17 +251,20 @@ class Filter:
         array, i = outputs["status"]
         status = array[i]
         self.counts[status] += 1
+        if self.stood:
+            array, i = outputs["assurance"]
+            self.stood[array[i]] += 1
         for name, peak in self.peaks.items():
             array, i = outputs[name]
             if abs(array[i]) > peak:
                 self.peaks[name] = abs(array[i])
         for kept, slots, phases in self.barriers.values():
             h, phase, unmet, slack, late = [array[i] for array, i in slots]
-            kept["started"] |= status < self.statuses["invalid_input"]
+            kept["started"] |= status not in self.abstentions
             if kept["started"]:
                 standing = {phases["released"]: "released", phases["waiting"]: "waiting"}.get(phase, "in force")
                 kept["judge"].see(time, h, standing, bool(late) or phase == phases["late"])
-            if unmet > 0 or status >= self.statuses["invalid_input"]:
+            if unmet > 0 or status in self.abstentions:
                 kept["unmet"] += 1
                 kept["row"] += 1
                 kept["longest"] = max(kept["longest"], kept["row"])
@@ -269,6 +276,7 @@ class Filter:
         """The filter's part of the row, and by barrier what `campaign.success` may ask for."""
         block = self.block.name
         cells = {f"{block}.status.{name}": self.counts[number] for name, number in self.statuses.items()}
+        cells |= {f"{block}.assurance.{name}": self.stood[number] for name, number in self.standings.items()}
         cells |= {f"{block}.peak.{name.removeprefix('u.')}": peak for name, peak in self.peaks.items()}
         verdicts = []
         for name, (kept, _, _) in self.barriers.items():

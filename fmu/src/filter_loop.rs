@@ -1,17 +1,46 @@
-//! A filter as a configuration describes it: plain, or with the integrator of an input.
+//! A filter as a configuration describes it: plain, with plans, or with the integrator of an input.
 
 use punctual_core::Error;
 use punctual_core::filter::{
-    FilterState, IntegratedFilter, NoDerivative, Report, SafetyFilter, SampleDerivative,
+    AssuredFilter, Commitment, FilterState, IntegratedFilter, NoDerivative, Report, SafetyFilter,
+    SampleDerivative, Standing,
 };
 use punctual_core::lie::Direction;
+use punctual_core::plan::{Failure, Witness};
+use punctual_reference::effort::InLoop;
 
 /// The filter of a loop.
 pub enum FilterLoop {
     /// Inputs are those of the plant.
     Plain(SafetyFilter),
+    /// The same, with a plan behind every input.
+    Assured(Box<AssuredFilter>),
     /// One input is integrated.
     Integrated(IntegratedFilter),
+}
+
+/// All that a loop remembers between samples.
+#[derive(Debug, Default, PartialEq)]
+pub struct LoopState {
+    /// The states of the promises.
+    pub filter: FilterState,
+    /// The integrated input; 0 where there is none.
+    pub integrated: f64,
+    /// The plan, where one is followed.
+    pub commitment: Option<Commitment>,
+}
+
+impl Clone for LoopState {
+    fn clone(&self) -> Self {
+        Self { filter: self.filter.clone(), integrated: self.integrated, commitment: self.commitment.clone() }
+    }
+
+    /// Reuses the memory, which a derived `Clone` would not.
+    fn clone_from(&mut self, source: &Self) {
+        self.filter.clone_from(&source.filter);
+        self.integrated = source.integrated;
+        self.commitment.clone_from(&source.commitment);
+    }
 }
 
 impl FilterLoop {
@@ -19,14 +48,39 @@ impl FilterLoop {
     pub fn filter(&self) -> &SafetyFilter {
         match self {
             Self::Plain(filter) => filter,
+            Self::Assured(assured) => assured.filter(),
             Self::Integrated(integrated) => integrated.filter(),
+        }
+    }
+
+    /// Where the promise stands, and why there is no plan, where plans are followed.
+    pub fn standing(&self) -> Option<(Standing, Option<Failure>)> {
+        match self {
+            Self::Assured(assured) => Some((assured.assurance().standing, assured.assurance().failure)),
+            Self::Plain(_) | Self::Integrated(_) => None,
+        }
+    }
+
+    /// The plan that keeps the promise after the last step, where there is one.
+    pub fn plan(&self) -> Option<&Witness> {
+        match self {
+            Self::Assured(assured) => assured.plan(),
+            Self::Plain(_) | Self::Integrated(_) => None,
+        }
+    }
+
+    /// How long in s the last input was held, as far as it is known.
+    pub fn last_hold(&self) -> Option<f64> {
+        match self {
+            Self::Assured(assured) => assured.last_hold(),
+            Self::Plain(_) | Self::Integrated(_) => self.filter().state().period,
         }
     }
 
     /// The number of the input that is integrated, if one is.
     pub fn integrated_input(&self) -> Option<usize> {
         match self {
-            Self::Plain(_) => None,
+            Self::Plain(_) | Self::Assured(_) => None,
             Self::Integrated(integrated) => Some(integrated.input()),
         }
     }
@@ -34,7 +88,7 @@ impl FilterLoop {
     /// The integral of that input after the last step; 0 where there is none.
     pub fn integrated(&self) -> f64 {
         match self {
-            Self::Plain(_) => 0.0,
+            Self::Plain(_) | Self::Assured(_) => 0.0,
             Self::Integrated(integrated) => integrated.value(),
         }
     }
@@ -42,12 +96,12 @@ impl FilterLoop {
     /// Puts back an [integral](Self::integrated).
     pub fn set_integrated(&mut self, value: f64) {
         match self {
-            Self::Plain(_) => {}
+            Self::Plain(_) | Self::Assured(_) => {}
             Self::Integrated(integrated) => integrated.set_value(value),
         }
     }
 
-    /// [`SafetyFilter::step`]; an integrated input is held for `hold` seconds, > 0.
+    /// [`SafetyFilter::step`]; the input is held for `hold` seconds, > 0, where it is integrated or has a plan behind it.
     ///
     /// # Errors
     ///
@@ -62,6 +116,11 @@ impl FilterLoop {
     ) -> Result<&Report, Error> {
         match self {
             Self::Plain(filter) => filter.step(t, x, u_ref, u),
+            Self::Assured(assured) => {
+                assured.expect_hold(Some(hold))?;
+                assured.step(t, x, u_ref, u)?;
+                Ok(assured.report())
+            }
             Self::Integrated(integrated) => integrated.step(t, hold, x, u_ref, u),
         }
     }
@@ -74,6 +133,10 @@ impl FilterLoop {
     pub fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<f64, Error> {
         match self {
             Self::Plain(filter) => filter.peek(t, x, u_ref, u).map(|_| 0.0),
+            Self::Assured(assured) => {
+                assured.expect_hold(Some(hold))?;
+                assured.peek(t, x, u_ref, u).map(|_| 0.0)
+            }
             Self::Integrated(integrated) => integrated.peek(t, hold, x, u_ref, u),
         }
     }
@@ -94,6 +157,10 @@ impl FilterLoop {
     ) -> Result<Option<NoDerivative>, Error> {
         match self {
             Self::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
+            Self::Assured(assured) => {
+                assured.expect_hold(Some(hold))?;
+                assured.differentiate(t, x, u_ref, direction, out)
+            }
             Self::Integrated(integrated) => integrated.differentiate(t, hold, x, u_ref, direction, out),
         }
     }
@@ -102,19 +169,61 @@ impl FilterLoop {
     pub fn rearm(&mut self) {
         match self {
             Self::Plain(filter) => filter.rearm(),
+            Self::Assured(assured) => assured.rearm(),
             Self::Integrated(integrated) => integrated.rearm(),
         }
     }
 
-    /// Puts back the state of the [filter](Self::filter) and the [integral](Self::integrated).
+    /// What is remembered.
+    pub fn state(&self) -> LoopState {
+        let mut state = LoopState::default();
+        self.save(&mut state);
+        state
+    }
+
+    /// Writes what is remembered to `state`; only a plan allocates.
+    pub fn save(&self, state: &mut LoopState) {
+        state.filter.clone_from(self.filter().state());
+        state.integrated = self.integrated();
+        match self {
+            Self::Assured(assured) => match &mut state.commitment {
+                Some(commitment) => commitment.clone_from(assured.commitment()),
+                none => *none = Some(assured.commitment().clone()),
+            },
+            Self::Plain(_) | Self::Integrated(_) => state.commitment = None,
+        }
+    }
+
+    /// Puts back what [`Self::save`] wrote.
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers.
-    pub fn restore(&mut self, state: &FilterState, integrated: f64) -> Result<(), Error> {
+    /// The state of another filter.
+    pub fn restore(&mut self, state: &LoopState) -> Result<(), Error> {
         match self {
-            Self::Plain(filter) => filter.restore(state),
-            Self::Integrated(own) => own.restore(state, integrated),
+            Self::Plain(filter) => filter.restore(&state.filter),
+            Self::Assured(assured) => match &state.commitment {
+                Some(commitment) => assured.restore(&state.filter, commitment),
+                None => assured.restore(&state.filter, &Commitment::default()),
+            },
+            Self::Integrated(own) => own.restore(&state.filter, state.integrated),
         }
+    }
+}
+
+impl InLoop for FilterLoop {
+    fn sample(
+        &mut self,
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &mut [f64],
+    ) -> Result<&Report, Error> {
+        self.step(t, hold, x, u_ref, u)
+    }
+
+    fn filter(&self) -> &SafetyFilter {
+        Self::filter(self)
     }
 }

@@ -384,6 +384,11 @@ impl Instance {
         done
     }
 
+    /// What the user should know of the last step, if there is anything; said once.
+    pub fn notice(&mut self) -> Option<String> {
+        self.block.notice()
+    }
+
     fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         let same = SAME_TIME + TIME_ROUND_OFF * t.abs();
         if !t.is_finite() || t < self.time - same {

@@ -29,4 +29,4 @@ pub mod product;
 pub mod state;
 
 pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2};
-pub use filter_loop::FilterLoop;
+pub use filter_loop::{FilterLoop, LoopState};

@@ -7,7 +7,7 @@ mod outputs;
 
 pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 
-use punctual_core::filter::{Phase, Status};
+use punctual_core::filter::{Phase, Standing, Status};
 use punctual_modeldescription::{
     Causality, CoSimulation, DefaultExperiment, EnumerationItem, Integer, LogCategory, ModelDescription,
     NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
@@ -21,9 +21,10 @@ use crate::configuration::{
 };
 
 /// Log categories: name and meaning.
-pub const LOG_CATEGORIES: [(&str, &str); 2] = [
+pub const LOG_CATEGORIES: [(&str, &str); 3] = [
     ("logStatusError", "calls that failed, with the reason"),
     ("logEvents", "what happened: instantiation, initialization, reset"),
+    ("logStatusWarning", "promises that were refused or withdrawn, with the reason"),
 ];
 
 /// Everything derived from one configuration.
@@ -111,7 +112,11 @@ impl Product {
             },
             units: units(&self.variables),
             types: match &self.configuration {
-                Configuration::Filter(_) => vec![status_type(), phase_type()],
+                Configuration::Filter(c) => {
+                    let mut types = vec![status_type(), phase_type()];
+                    types.extend(c.is_assured().then(assurance_type));
+                    types
+                }
                 Configuration::Plant(_) | Configuration::Controller(_) => Vec::new(),
             },
             log_categories: LOG_CATEGORIES
@@ -176,6 +181,14 @@ fn status_type() -> SimpleType {
 fn phase_type() -> SimpleType {
     let items = Phase::ALL.map(|phase| (phase.name(), phase as i32, phase.meaning()));
     enumeration(PHASE, "Where a barrier stands with its promise", &items)
+}
+
+/// The enumeration type of `assurance`.
+const ASSURANCE: &str = "Assurance";
+
+fn assurance_type() -> SimpleType {
+    let items = Standing::ALL.map(|standing| (standing.name(), standing as i32, standing.meaning()));
+    enumeration(ASSURANCE, "Where the promise of a filter that follows plans stands", &items)
 }
 
 /// Collects variables; the value reference is the index.
@@ -292,7 +305,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
 
     let outputs = table.variables.len();
     let output = Causality::Output;
-    // Outputs: the safe input and the status, those of each barrier, the integrated state.
+    // Outputs: the safe input and the status, those of each barrier, the assurance, the integrated state.
     for input in inputs {
         table.signal("u", input, "safe ", output);
     }
@@ -309,6 +322,9 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
             };
             table.add(format!("{}.{}", barrier.name, row.name), row.description, output, kind);
         }
+    }
+    if c.is_assured() {
+        table.add("assurance".into(), "where the promise stands", output, enumerated(ASSURANCE));
     }
     if let Some(integrator) = &c.integrator {
         let (name, inputs) = (&integrator.state, c.commanded());

@@ -7,15 +7,17 @@
 //! | 38 | the GUID of the FMU, as in its model description |
 //! | 8 | length of all |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
+//! | 8 + … | where plans are followed: the length of the commitment, and that in the format of the crate postcard |
 //! | 4 | CRC-32 of all before |
 //!
 //! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
-//! keep theirs. Damaged bytes, and those of another FMU, are refused by the name of the field.
+//! keep theirs. Only a plan has no fixed length, and it comes last. Damaged bytes, and those of another FMU, are refused by the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
-use punctual_core::filter::FilterState;
+use punctual_core::filter::{Commitment, FilterState};
 use punctual_modeldescription::BaseType;
 
+use crate::LoopState;
 use crate::block::{BlockState, Values};
 use crate::configuration::Configuration;
 use crate::instance::{Failure, Mode, State};
@@ -25,14 +27,37 @@ const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// Version of the layout, to be raised with every change of it. (The GUID changes with the version of the
 /// library.)
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
 const CHECKSUM: usize = u32::SIZE;
 
-/// The number of bytes of every state of `product`.
-pub fn size(product: &Product) -> usize {
+/// The number of bytes of `state`, a state of `product`: that of all of them, but for a plan.
+///
+/// # Errors
+///
+/// None in practice: a commitment is plain data.
+pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
+    let plan = if follows_plans(product) { u64::SIZE + commitment(state)?.len() } else { 0 };
+    Ok(fixed_size(product) + plan)
+}
+
+fn follows_plans(product: &Product) -> bool {
+    matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
+}
+
+/// The bytes of the commitment in `state`.
+fn commitment(state: &State) -> Result<Vec<u8>, Failure> {
+    let commitment = match &state.block {
+        BlockState::Filter { memory, .. } => memory.commitment.clone().unwrap_or_default(),
+        _ => Commitment::default(),
+    };
+    postcard::to_stdvec(&commitment).map_err(|e| e.to_string())
+}
+
+/// The number of bytes of every state of `product`, but for plans.
+fn fixed_size(product: &Product) -> usize {
     let flags = Mode::SIZE + 2 * f64::SIZE + 3 * bool::SIZE;
     let value = |base| match base {
         BaseType::Real => f64::SIZE,
@@ -62,7 +87,8 @@ pub fn size(product: &Product) -> usize {
 /// Too few bytes; the state of another product. Nothing was written.
 pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
     let State { guid, mode, time, stepped, last_step, fresh, configured, values, block } = state;
-    let size = size(product);
+    let plan = follows_plans(product).then(|| commitment(state)).transpose()?;
+    let size = fixed_size(product) + plan.as_ref().map_or(0, |plan| u64::SIZE + plan.len());
     if bytes.len() < size {
         return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
     }
@@ -90,7 +116,8 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     }
     // The memory of the block.
     match block {
-        BlockState::Filter { rearm_seen, filter, integrated } => {
+        BlockState::Filter { rearm_seen, memory } => {
+            let LoopState { filter, integrated, commitment: _ } = &**memory;
             let FilterState { barriers, time, period, input } = filter;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
@@ -98,6 +125,10 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
             period.write(&mut out);
             input.write(&mut out);
             integrated.write(&mut out);
+            if let Some(plan) = plan {
+                (plan.len() as u64).write(&mut out);
+                out.extend_from_slice(&plan);
+            }
         }
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
         BlockState::Controller { waypoint } => waypoint.write(&mut out),
@@ -121,7 +152,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
 /// Bytes that are not such a state: the field, the value found and those allowed.
 pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     // The header: does it belong to a state of this product, and is all of it there?
-    let size = size(product);
+    let fixed = fixed_size(product);
     let mut input = Reader { rest: bytes };
     if input.take("magic number", MAGIC.len())? != MAGIC {
         return Err("the bytes do not begin as a state does, with \"PUNCTUAL\"".to_owned());
@@ -132,13 +163,15 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     }
     check_guid(product, input.take("GUID", GUID)?)?;
     let length: u64 = input.field("length")?;
-    if length != size as u64 {
-        return Err(format!("the length is {length} bytes, must be {size}"));
+    let has_plan = follows_plans(product);
+    if !has_plan && length != fixed as u64 || length < fixed as u64 {
+        let least = if has_plan { "at least " } else { "" };
+        return Err(format!("the length is {length} bytes, must be {least}{fixed}"));
     }
-    if bytes.len() < size {
-        return Err(format!("the state is cut off: there are {} bytes, must be {size}", bytes.len()));
-    }
-    let (state, rest) = bytes.split_at(size);
+    let size = usize::try_from(length).unwrap_or(usize::MAX);
+    let (state, rest) = bytes
+        .split_at_checked(size)
+        .ok_or_else(|| format!("the state is cut off: there are {} bytes, must be {size}", bytes.len()))?;
     if let Some(at) = rest.iter().position(|byte| *byte != 0) {
         return Err(format!("byte {} after the state is {}, must be 0", size + at, rest[at]));
     }
@@ -173,7 +206,9 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 period: input.field("period")?,
                 input: input.field("input")?,
             };
-            BlockState::Filter { rearm_seen, filter, integrated: input.finite("integrated")? }
+            let integrated = input.finite("integrated")?;
+            let commitment = has_plan.then(|| read_commitment(&mut input)).transpose()?;
+            BlockState::Filter { rearm_seen, memory: Box::new(LoopState { filter, integrated, commitment }) }
         }
         Configuration::Plant(_) => {
             let x = (0..product.layout.states).map(|_| input.finite("x")).collect::<Result<_, _>>()?;
@@ -189,6 +224,19 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     };
     let guid = product.guid.clone();
     Ok(State { guid, mode, time, stepped, last_step, fresh, configured, values, block })
+}
+
+/// The commitment that comes last. Whether it is one of this filter is found when it is restored.
+fn read_commitment(input: &mut Reader) -> Result<Commitment, Failure> {
+    let length: u64 = input.field("length of the plan")?;
+    if length != input.rest.len() as u64 {
+        return Err(format!("the length of the plan is {length} bytes, must be {}", input.rest.len()));
+    }
+    match postcard::take_from_bytes(input.rest) {
+        Ok((commitment, [])) => Ok(commitment),
+        Ok((_, rest)) => Err(format!("the plan is followed by {} bytes, must be 0", rest.len())),
+        Err(error) => Err(format!("the plan cannot be read: {error}")),
+    }
 }
 
 fn read_values(product: &Product, input: &mut Reader) -> Result<Values, Failure> {
@@ -395,7 +443,7 @@ structure!(FixedTimeState {
     period: f64,
     fallback: bool,
     arrival: Option<f64>,
-    guaranteed: bool,
+    on_course: bool,
     unmet: Option<Unmet>,
     postponed: u32,
 });

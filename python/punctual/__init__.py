@@ -8,20 +8,22 @@
 
 from ._command import run_cli
 from ._configuration import Configuration
-from ._enumerations import Phase, Status
+from ._enumerations import Assurance, Phase, Status
 from ._error import Error
 from ._fmu import Variable, build, check, variables
-from ._punctual import BarrierReport, Filter, FilterBatch, Step, __version__
+from ._punctual import BarrierReport, Filter, FilterBatch, Plan, Step, __version__
 from ._promise import Promise, promise
 from ._simulate import simulate
 
 __all__ = [
+    "Assurance",
     "BarrierReport",
     "Configuration",
     "Error",
     "Filter",
     "FilterBatch",
     "Phase",
+    "Plan",
     "Promise",
     "Status",
     "Step",

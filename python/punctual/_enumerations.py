@@ -22,6 +22,23 @@ class Status(IntEnum):
     """An input enters a derivative of h too early, so the constraint would be wrong: the input nearest 0."""
     SOLVER_FAILED = 7
     """The solver did not converge: u_ref within its bounds."""
+    BACKUP = 8
+    """The constraints are not met, or lead where no way on is left: a plan decides, and keeps every promise."""
+
+
+class Assurance(IntEnum):
+    """Where the promise of a filter that follows plans stands."""
+
+    UNDECIDED = 0
+    """No step with a valid state yet."""
+    ASSURED = 1
+    """A plan keeps every promise, whatever u_ref is."""
+    REFUSED = 2
+    """No plan was found at the start: nothing is promised."""
+    WITHDRAWN = 3
+    """Was assured: the plant is not where the model led."""
+    IRREGULAR = 4
+    """Was assured: a step came late, or early without a plan from there."""
 
 
 class Phase(IntEnum):

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use punctual_fmu::LoopState;
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -10,7 +11,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::loading::{Interface, Signals, configuration, refused};
-use crate::sample::{Loop, Memory};
+use crate::sample::Loop;
 use crate::{arrays, pool};
 
 /// Rows go to threads in parts of equal size. There are more parts than threads, since some rows take longer than
@@ -32,8 +33,8 @@ type Rows<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'p
 pub(crate) struct FilterBatch {
     configuration: FilterConfiguration,
     interface: Interface,
-    memories: Vec<Memory>,
-    fresh: Memory,
+    memories: Vec<LoopState>,
+    fresh: LoopState,
     /// Loops, one for each part. The memory of a row is put into its loop before each row.
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     loops: Mutex<Vec<Loop>>,
@@ -180,7 +181,7 @@ impl FilterBatch {
 /// Rows that one loop computes, one after the other.
 struct Part<'a> {
     own: &'a mut Loop,
-    memories: &'a mut [Memory],
+    memories: &'a mut [LoopState],
     x: &'a [f64],
     u_ref: &'a [f64],
     u: &'a mut [f64],

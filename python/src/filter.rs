@@ -2,13 +2,16 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use punctual_fmu::LoopState;
+use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::loading::{Interface, configuration, refused};
+use crate::plan::Plan;
 use crate::report::Step;
-use crate::sample::{Loop, Memory};
+use crate::sample::Loop;
 
 /// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
 /// same bits.
@@ -20,14 +23,17 @@ use crate::sample::{Loop, Memory};
 /// Raises `punctual.Error` for a configuration that cannot be used, with the field, the value and what is allowed.
 #[pyclass(module = "punctual")]
 pub(crate) struct Filter {
+    configuration: FilterConfiguration,
     interface: Interface,
     names: Arc<[String]>,
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     own: Mutex<Loop>,
-    fresh: Memory,
+    fresh: LoopState,
     x: Vec<f64>,
     u_ref: Vec<f64>,
     u: Vec<f64>,
+    /// Time of the last step, in s.
+    t: f64,
 }
 
 #[pymethods]
@@ -45,7 +51,9 @@ impl Filter {
             x: vec![0.0; states],
             u_ref: vec![0.0; inputs],
             u: vec![0.0; inputs],
+            t: 0.0,
             interface,
+            configuration,
         })
     }
 
@@ -90,8 +98,25 @@ impl Filter {
             None => self.u_ref.fill(0.0),
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let report = own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
-        Ok(Step::new(py, &self.u, report, &self.names))
+        own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
+        self.t = t;
+        let (report, standing) = (own.filter().filter().report(), own.filter().standing());
+        Ok(Step::new(py, &self.u, report, standing.map(|(standing, _)| standing), &self.names))
+    }
+
+    /// The plan that keeps every promise from the last step on; `None` without one, or without `assurance = "on"`.
+    #[getter]
+    fn plan(&mut self, py: Python<'_>) -> PyResult<Option<Plan>> {
+        let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+        Plan::of(py, own.filter(), (self.t, &self.x), self.u.len())
+    }
+
+    /// Why there is no plan, where the promise was refused or withdrawn.
+    #[getter]
+    fn refusal(&mut self) -> Option<String> {
+        let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let (_, failure) = own.filter().standing()?;
+        failure.map(|failure| self.configuration.failure(failure))
     }
 
     /// Starts every deadline anew at the next step.

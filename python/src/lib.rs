@@ -11,6 +11,7 @@
 //! | `sample` | one loop: a filter, and its memory |
 //! | `promise` | the verdict on a promise in a recorded run |
 //! | `report` | the report of a step, as Python objects |
+//! | `plan` | the plan of a filter that follows plans |
 //! | `filter` | `Filter`: one loop |
 //! | `pool` | the threads, one set for each process |
 //! | `batch` | `FilterBatch`: many loops, a row each |
@@ -20,6 +21,7 @@ mod arrays;
 mod batch;
 mod filter;
 mod loading;
+mod plan;
 mod pool;
 mod promise;
 mod report;
@@ -32,6 +34,7 @@ use pyo3::prelude::*;
 fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<filter::Filter>()?;
     module.add_class::<batch::FilterBatch>()?;
+    module.add_class::<plan::Plan>()?;
     module.add_class::<report::Step>()?;
     module.add_class::<report::BarrierReport>()?;
     module.add_function(wrap_pyfunction!(promise::judge, module)?)?;

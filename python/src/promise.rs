@@ -24,7 +24,7 @@ pub(crate) fn judge<'py>(
     let mut judge = Judge::new(deadline, if straight { Course::Straight } else { Course::Smooth });
     let mut started = false;
     for (t, h, phase, lost, status) in rows {
-        started |= status < Status::InvalidInput as i32;
+        started |= !Status::from_number(status).is_some_and(Status::is_abstention);
         let is = |wanted: Phase| phase == wanted as i32;
         let standing = match () {
             () if is(Phase::Released) => Standing::Released,

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use punctual_core::filter::{self, Phase, Report, Status};
+use punctual_core::filter::{self, Phase, Report, Standing, Status};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 
-/// `punctual.Status` and `punctual.Phase`, after their first use.
+/// `punctual.Status`, `punctual.Phase` and `punctual.Assurance`, after their first use.
 static STATUS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 static PHASE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static ASSURANCE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// The member with this number of the enumeration called `name`.
 fn member<'py>(
@@ -40,9 +41,12 @@ pub(crate) struct BarrierReport {
     /// Whether h >= 0 has been reached since the deadline began to count.
     #[pyo3(get)]
     arrived: bool,
-    /// Whether the theorem behind the present phase applies.
+    /// Whether a plan in hand keeps the promise whatever u_ref is; needs `assurance = "on"`.
     #[pyo3(get)]
     guaranteed: bool,
+    /// Whether the theorem behind the present phase applies so far.
+    #[pyo3(get)]
+    on_course: bool,
     phase: Phase,
     /// The margin in force, in the unit of h.
     #[pyo3(get)]
@@ -86,6 +90,7 @@ impl From<&filter::BarrierReport> for BarrierReport {
             slack: b.slack,
             arrived: b.arrived,
             guaranteed: b.guaranteed,
+            on_course: b.on_course,
             phase: b.phase,
             margin_used: b.margin,
             sampling_loss: b.sampling_loss,
@@ -104,15 +109,23 @@ pub(crate) struct Step {
     #[pyo3(get)]
     u: Py<PyArray1<f64>>,
     status: Status,
+    standing: Option<Standing>,
     barriers: Vec<filter::BarrierReport>,
     names: Arc<[String]>,
 }
 
 impl Step {
-    pub(crate) fn new(py: Python<'_>, u: &[f64], report: &Report, names: &Arc<[String]>) -> Self {
+    pub(crate) fn new(
+        py: Python<'_>,
+        u: &[f64],
+        report: &Report,
+        standing: Option<Standing>,
+        names: &Arc<[String]>,
+    ) -> Self {
         Self {
             u: PyArray1::from_slice(py, u).unbind(),
             status: report.status,
+            standing,
             barriers: report.barriers.clone(),
             names: Arc::clone(names),
         }
@@ -127,7 +140,13 @@ impl Step {
         member(py, &STATUS, "Status", self.status as i32)
     }
 
-    /// Whether `u` satisfies every constraint.
+    /// Where the promise stands; `None` without `assurance = "on"`.
+    #[getter]
+    fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()
+    }
+
+    /// Whether `u` satisfies every constraint, or has a plan behind it that keeps every promise.
     #[getter]
     fn satisfied(&self) -> bool {
         self.status.is_satisfied()

@@ -1,18 +1,11 @@
 //! One loop: a filter, and all that it remembers between samples.
 
-use punctual_core::filter::{FilterState, Report};
-use punctual_fmu::FilterLoop;
+use punctual_core::filter::Report;
 use punctual_fmu::configuration::FilterConfiguration;
+use punctual_fmu::{FilterLoop, LoopState};
 use pyo3::prelude::*;
 
 use crate::loading::refused;
-
-/// All that a loop remembers between samples.
-#[derive(Clone)]
-pub(crate) struct Memory {
-    filter: FilterState,
-    integrated: f64,
-}
 
 /// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {
@@ -26,6 +19,11 @@ impl Loop {
     pub(crate) fn new(configuration: &FilterConfiguration) -> PyResult<Self> {
         let filter = configuration.build_loop().map_err(|e| refused(&e))?;
         Ok(Self { filter, hold: configuration.experiment.step_size })
+    }
+
+    /// The filter: to look at.
+    pub(crate) fn filter(&self) -> &FilterLoop {
+        &self.filter
     }
 
     /// Computes the sample at `t` and remembers it.
@@ -49,14 +47,13 @@ impl Loop {
     }
 
     /// What is remembered.
-    pub(crate) fn memory(&self) -> Memory {
-        Memory { filter: self.filter.filter().state().clone(), integrated: self.filter.integrated() }
+    pub(crate) fn memory(&self) -> LoopState {
+        self.filter.state()
     }
 
-    /// Writes the memory to `memory`, without an allocation.
-    pub(crate) fn save(&self, memory: &mut Memory) {
-        memory.filter.clone_from(self.filter.filter().state());
-        memory.integrated = self.filter.integrated();
+    /// Writes the memory to `memory`; only a plan allocates.
+    pub(crate) fn save(&self, memory: &mut LoopState) {
+        self.filter.save(memory);
     }
 
     /// Goes back to a memory: every bit that follows is the same.
@@ -64,7 +61,7 @@ impl Loop {
     /// # Errors
     ///
     /// The memory of another configuration.
-    pub(crate) fn restore(&mut self, memory: &Memory) -> Result<(), punctual_core::Error> {
-        self.filter.restore(&memory.filter, memory.integrated)
+    pub(crate) fn restore(&mut self, memory: &LoopState) -> Result<(), punctual_core::Error> {
+        self.filter.restore(memory)
     }
 }

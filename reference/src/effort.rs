@@ -8,8 +8,38 @@ use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::error::{Error, non_negative, positive};
-use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter};
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+
+/// A filter in a closed loop: a [`SafetyFilter`], or what has one inside.
+pub trait InLoop {
+    /// Computes and remembers the sample at `t` (s), whose input is held for `hold` s.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a time to hold that is out of range.
+    fn sample(
+        &mut self,
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &mut [f64],
+    ) -> Result<&Report, Error>;
+
+    /// The filter with the barriers, and the report of the last sample.
+    fn filter(&self) -> &SafetyFilter;
+}
+
+impl InLoop for SafetyFilter {
+    fn sample(&mut self, t: f64, _: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
+        self.step(t, x, u_ref, u)
+    }
+
+    fn filter(&self) -> &SafetyFilter {
+        self
+    }
+}
 
 /// A closed loop to run.
 #[derive(Clone, Copy)]
@@ -76,7 +106,7 @@ impl Running<'_> {
         for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
             judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
             let enforced = standing(b.phase) == Standing::InForce;
-            if b.unmet_steps > 0 || enforced && report.status as u8 >= Status::InvalidInput as u8 {
+            if b.unmet_steps > 0 || enforced && report.status.is_abstention() {
                 seen.unmet += 1;
                 seen.first_unmet.get_or_insert(t);
             }
@@ -89,7 +119,7 @@ impl Running<'_> {
     }
 
     /// Takes an instant between two samples.
-    fn instant(&mut self, filter: &mut SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
+    fn instant(&mut self, filter: &SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
         filter.barrier_values(t, x, &mut self.h)?;
         let barriers = &filter.report().barriers;
         for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
@@ -119,7 +149,7 @@ impl Running<'_> {
     /// Moves the plant over the period that begins at `t`; `last` is the input of the period before.
     fn advance(
         &mut self,
-        filter: &mut SafetyFilter,
+        filter: &SafetyFilter,
         t: f64,
         x: &mut [f64],
         [last, u]: [&[f64]; 2],
@@ -158,7 +188,7 @@ fn standing(phase: Phase) -> Standing {
 ///
 /// A step that is not finite or ≤ 0, and misuse of the filter.
 pub fn run(
-    filter: &mut SafetyFilter,
+    filter: &mut impl InLoop,
     setting: &Loop<'_>,
     mut nominal: impl FnMut(&[f64], &mut [f64]),
 ) -> Result<Run, Error> {
@@ -184,13 +214,13 @@ pub fn run(
     for k in 0..=setting.schedule.steps {
         let t = t0 + k as f64 * step;
         nominal(&x, &mut u_ref);
-        let report = filter.step(t, &x, &u_ref, &mut u)?;
+        let report = filter.sample(t, step, &x, &u_ref, &mut u)?;
         running.sample(t, &x, &u, report);
         let lost = t - t0 >= setting.until && running.is_broken();
         if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
             break;
         }
-        running.advance(filter, t, &mut x, [&last, &u])?;
+        running.advance(filter.filter(), t, &mut x, [&last, &u])?;
         last.copy_from_slice(&u);
     }
     let mut run = running.run;

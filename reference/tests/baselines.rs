@@ -66,7 +66,7 @@ fn follow<const N: usize>(
         |_, _| vector![-1e5],
         |_, x, _, report| {
             assert!(report.status == Status::Filtered && !report.predicted, "{report:?}");
-            assert!(!report.barriers[0].guaranteed);
+            assert!(!report.barriers[0].on_course);
             h.push(x[0]);
             (phase, arrival) = (report.barriers[0].phase, report.barriers[0].arrival_time);
         },
@@ -220,10 +220,10 @@ fn a_condition_that_is_a_method() {
     for k in 0..500 {
         let report = filter.step(f64::from(k) * 0.01, x.as_slice(), &[-1.0], u.as_mut_slice()).unwrap();
         assert!(report.predicted, "enforced over the period");
-        assert_eq!(report.barriers[0].guaranteed, report.barriers[0].phase == Phase::Stay);
+        assert_eq!(report.barriers[0].on_course, report.barriers[0].phase == Phase::Stay);
         x = rk4_step(&Integrators::<2>, &x, &u, 0.01);
     }
     let b = &filter.report().barriers[0];
-    assert_eq!((b.phase, b.guaranteed), (Phase::Stay, true));
+    assert_eq!((b.phase, b.on_course), (Phase::Stay, true));
     assert!(b.h >= 0.05, "{}", b.h);
 }

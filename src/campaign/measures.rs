@@ -1,6 +1,6 @@
 //! The row of a run, from the values at the communication points and from its promises.
 
-use punctual_core::filter::Status;
+use punctual_core::filter::{Standing, Status};
 use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
@@ -14,6 +14,8 @@ struct FilterPlan {
     component: String,
     /// Names and units of its inputs to the plant.
     inputs: Vec<(String, String)>,
+    /// Whether it follows plans.
+    assured: bool,
     barriers: Vec<BarrierPlan>,
 }
 
@@ -35,6 +37,8 @@ pub struct Measures {
 struct Seen {
     /// Number of steps by filter and status.
     counts: Vec<[u64; Status::ALL.len()]>,
+    /// Number of steps by filter and standing of its promise.
+    standings: Vec<[u64; Standing::ALL.len()]>,
     /// Largest size by filter and input.
     peaks: Vec<f64>,
 }
@@ -53,6 +57,7 @@ impl Measures {
             };
             filters.push(FilterPlan {
                 component: component.name.clone(),
+                assured: filter.is_assured(),
                 inputs: filter
                     .plant
                     .inputs()
@@ -88,6 +93,7 @@ impl Measures {
         let mut signals = Vec::new();
         for filter in &self.filters {
             signals.push(format!("{}.status", filter.component));
+            signals.extend(filter.assured.then(|| format!("{}.assurance", filter.component)));
             signals.extend(filter.inputs.iter().map(|(name, _)| format!("{}.u.{name}", filter.component)));
         }
         signals
@@ -109,6 +115,7 @@ impl Measures {
     fn nothing(&self) -> Seen {
         Seen {
             counts: vec![[0; Status::ALL.len()]; self.filters.len()],
+            standings: vec![[0; Standing::ALL.len()]; self.filters.len()],
             peaks: vec![0.0; self.filters.iter().map(|filter| filter.inputs.len()).sum()],
         }
     }
@@ -118,8 +125,15 @@ impl Measures {
         let mut values = values.iter().copied();
         let mut next = || values.next().unwrap_or(f64::NAN);
         let mut peaks = seen.peaks.iter_mut();
-        for (filter, counts) in self.filters.iter().zip(&mut seen.counts) {
+        for ((filter, counts), standings) in
+            self.filters.iter().zip(&mut seen.counts).zip(&mut seen.standings)
+        {
             if let Some(count) = counts.get_mut(next() as usize) {
+                *count += 1;
+            }
+            if filter.assured
+                && let Some(count) = standings.get_mut(next() as usize)
+            {
                 *count += 1;
             }
             for peak in peaks.by_ref().take(filter.inputs.len()) {
@@ -142,8 +156,9 @@ impl Measures {
         row.extend(choice.values.iter().map(|value| Cell::Number(Some(*value))));
         let verdict = row.len();
         let mut peaks = seen.peaks.iter();
-        for (filter, counts) in self.filters.iter().zip(&seen.counts) {
+        for ((filter, counts), standings) in self.filters.iter().zip(&seen.counts).zip(&seen.standings) {
             row.extend(counts.iter().map(|count| Cell::Count(*count)));
+            row.extend(standings.iter().filter(|_| filter.assured).map(|count| Cell::Count(*count)));
             row.extend(peaks.by_ref().take(filter.inputs.len()).map(|peak| Cell::Number(Some(*peak))));
             for plan in &filter.barriers {
                 let promise = promises.iter().find(|promise| promise.barrier == plan.name);
@@ -208,6 +223,11 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
             let name = status.name();
             let meaning = format!("communication points with status {name}");
             add(format!("{}.status.{name}", filter.component), Kind::Count, "", &meaning);
+        }
+        for standing in Standing::ALL.into_iter().filter(|_| filter.assured) {
+            let name = standing.name();
+            let meaning = format!("communication points at which the promise was {name}");
+            add(format!("{}.assurance.{name}", filter.component), Kind::Count, "", &meaning);
         }
         for (input, unit) in &filter.inputs {
             let meaning = format!("largest size of u.{input} at a communication point");

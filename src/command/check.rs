@@ -95,10 +95,10 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
-    /// Whether the theorem applies from the start, and the closed loop keeps its promise.
+    /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
     /// Whether the theorem applies to the first step.
-    first_step: bool,
+    on_course: bool,
     /// Verdict of the closed loop, where the plant is known.
     simulated: Option<Kept>,
     /// Limits that the input bounds set, where there are any.
@@ -108,14 +108,20 @@ struct StartReport {
 impl StartReport {
     /// The first step and the closed loop together, in words.
     fn words(&self) -> &'static str {
-        match (self.first_step, self.simulated) {
-            (true, Some(Kept::Kept)) => "guaranteed",
-            (true, None) => "guaranteed at the first step; without a model nothing is simulated",
+        match (self.on_course, self.simulated) {
+            _ if self.guaranteed => "guaranteed, whatever u_ref is",
+            (true, Some(Kept::Kept)) => "on course, and the closed loop keeps it",
+            (true, None) => "on course at the first step; without a model nothing is simulated",
             (_, Some(Kept::NothingPromised)) => "nothing is promised without a deadline",
-            (true, Some(_)) => "the first step is met, but the closed loop does not keep it",
-            (false, Some(Kept::Kept)) => "not guaranteed, though the closed loop keeps it",
-            (false, _) => "not guaranteed",
+            (true, Some(_)) => "on course at the first step, but the closed loop does not keep it",
+            (false, Some(Kept::Kept)) => "not on course, though the closed loop keeps it",
+            (false, _) => "not on course",
         }
+    }
+
+    /// Whether nothing speaks against the promise: a plan, or the first step and the closed loop.
+    fn is_promised(&self) -> bool {
+        self.guaranteed || self.on_course && self.simulated.is_none_or(|seen| seen == Kept::Kept)
     }
 }
 
@@ -207,7 +213,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
             let lost = |s: &StartReport| s.reach.as_ref().is_some_and(|r| r.deadline == Verdict::CannotBeMet);
             let kept = report.closed_loop.as_ref().is_none_or(|run| run.kept);
-            let promised = kept && starts.all(|start| start.guaranteed && !lost(start));
+            let promised = kept && starts.all(|start| start.is_promised() && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Configuration::Controller(configuration) => {
@@ -381,8 +387,8 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
         let start = report.map(|b| StartReport {
             h: b.h,
             inside: b.h >= -ROUND_OFF,
-            guaranteed: b.guaranteed && simulated.is_none_or(|seen| seen == Kept::Kept),
-            first_step: b.guaranteed,
+            guaranteed: c.is_assured() && witness.as_ref().is_some_and(|witness| witness.keeps(name)),
+            on_course: b.on_course,
             simulated,
             reach,
         });
@@ -391,8 +397,8 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
                 "outside at the start and without a deadline: nothing is promised; give it a deadline"
                     .to_owned(),
             );
-        } else if start.as_ref().is_some_and(|s| !s.guaranteed) {
-            warn("nothing is guaranteed from this start".to_owned());
+        } else if start.as_ref().is_some_and(|s| !s.is_promised()) {
+            warn("not to be relied on from this start".to_owned());
         }
         barriers.push(BarrierReport {
             name: name.clone(),

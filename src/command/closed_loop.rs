@@ -2,6 +2,7 @@
 //! is kept, the soonest deadline, and the smallest bounds.
 
 use punctual_core::filter::{ProfileKind, SafetyFilter};
+use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::{Automatic, FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
 use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_reference::nominal::damping;
@@ -221,7 +222,9 @@ fn watched(c: &FilterConfiguration) -> f64 {
 
 /// The closed loop of the configuration from `x0`, well past every deadline.
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
-    let (mut filter, plant) = (c.build()?, c.plant.build()?);
+    // An integrator is part of the plant here.
+    let mut filter = if c.is_assured() { c.build_loop()? } else { FilterLoop::Plain(c.build()?) };
+    let plant = c.plant.build()?;
     let (length, deadlines) = (watched(c), deadlines(c));
     // The closed loop, finely enough.
     let step = c.experiment.step_size.max(length / MOST_SAMPLES);

@@ -1,7 +1,6 @@
 //! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
 
-use punctual_core::filter::AssuredFilter;
-use punctual_core::plan::{Failure, Witness};
+use punctual_core::plan::Witness;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
@@ -55,15 +54,9 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
         soonest: Vec::new(),
         plan: None,
     };
-    if c.integrator.is_some() {
-        return Ok(Some(refused("an integrator is before the plant, which no plan accounts for yet".into())));
-    }
-    if !c.barrier_inputs().is_empty() {
-        return Ok(Some(refused("a barrier follows inputs that others move, which no plan foresees".into())));
-    }
-    let filter = match AssuredFilter::new(c.build()?, c.experiment.step_size) {
+    let filter = match c.assured(c.build()?) {
         Ok(filter) => filter,
-        Err(error) => return Ok(Some(refused(error.to_string()))),
+        Err(reason) => return Ok(Some(refused(reason))),
     };
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
@@ -87,18 +80,7 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let soonest = if has_deadline { filter.soonest(t, x0, LONGEST) } else { None };
-    let reason = configured.as_ref().err().map(|failure| match *failure {
-        Failure::Broken { barrier, time, slack } => format!(
-            "{} is not met at {} s, by {} {}",
-            c.barrier[barrier].name,
-            number(time),
-            number(-slack),
-            unit(barrier)
-        ),
-        Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
-        Failure::Nothing => "nothing is promised from there".to_owned(),
-        _ => "the model is not finite, or no step resolves it".to_owned(),
-    });
+    let reason = configured.as_ref().err().map(|failure| c.failure(*failure));
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
         given.collect::<Vec<_>>()
@@ -114,6 +96,11 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
 }
 
 impl WitnessReport {
+    /// Whether the plan keeps the promise of `barrier`.
+    pub(super) fn keeps(&self, barrier: &str) -> bool {
+        self.found && self.left_out.iter().all(|name| name != barrier)
+    }
+
     pub(super) fn text(&self) -> String {
         let mut lines = vec![match (self.found, &self.reason) {
             (true, _) => {

@@ -271,7 +271,7 @@ impl Watched {
         let Some(time) = at else { return };
         let [unmet, slack, h, lost, phase] = self.fields.map(|slot| values[slot]);
         let is = |number: Phase| phase == f64::from(number as i32);
-        let invalid = values[self.status] >= f64::from(Status::InvalidInput as i32);
+        let invalid = Status::from_number(values[self.status] as i32).is_some_and(Status::is_abstention);
         let run = &mut self.run;
         let rearm = self.rearm.is_some_and(|slot| values[slot] != 0.0);
         if rearm && !run.rearm && run.started {

@@ -276,6 +276,7 @@ impl<'a> Slave<'a> {
             for (field, wanted) in [
                 ("arrived", b.arrived),
                 ("guaranteed", b.guaranteed),
+                ("on_course", b.on_course),
                 ("deadline_unreachable", b.deadline_unreachable),
                 ("deadlocked", b.deadlocked),
             ] {

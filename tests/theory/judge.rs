@@ -3,7 +3,7 @@
 //! Closed loops are drawn at random ([`families`]) and run with the filter. The plant is moved by an integrator
 //! of the judge's own, from equations of its own ([`motion`], [`model`]). h is watched at all instants ([`run`]):
 //! at the ends of at least twenty parts of every hold, at the deadline itself, and at the lowest point between. A
-//! promise is broken under the flag if h < 0 in a hold at whose sample the report said `guaranteed`, while the
+//! promise is broken under the flag if h < 0 in a hold at whose sample the report said `on_course`, while the
 //! set was inside at the anchor, the deadline had passed, or the phase was `Stay`. Promises that break in a hold
 //! longer than the filter was told are counted on their own.
 

@@ -233,7 +233,7 @@ fn recovery_does_not_claim_what_was_lost() {
             let b = &report.barriers[0];
             let anew = b.recoveries > recoveries;
             recovered += usize::from(anew);
-            claimed += usize::from(anew && b.guaranteed && b.h < 0.0);
+            claimed += usize::from(anew && b.on_course && b.h < 0.0);
             recoveries = b.recoveries;
         });
     }

@@ -40,7 +40,7 @@ pub struct Sample<'a> {
     /// Whether [`Condition::anchor`] fell back on something else. Default: false.
     pub fallback: bool,
     /// Whether the theorem behind the condition applied at the sample before. Default: true.
-    pub guaranteed: bool,
+    pub on_course: bool,
 }
 
 impl<'a> Sample<'a> {
@@ -57,7 +57,7 @@ impl<'a> Sample<'a> {
             rate: 0.0,
             pull: 0.0,
             fallback: false,
-            guaranteed: true,
+            on_course: true,
         }
     }
 

@@ -243,7 +243,7 @@ impl FixedTime {
         }
         // The floor of the condition in force. Leaving the set breaks its promise, even where a new one begins here.
         let (floor, profile) = self.enforce(state, elapsed, h, &lowest, errors, means);
-        state.guaranteed &= !was_left;
+        state.on_course &= !was_left;
         let floor = floor + self.settings.disturbance;
         let has_deadline = state.deadline.is_finite() || !self.hands_over();
         let time_left = if has_deadline { (state.deadline - elapsed).max(0.0) } else { 0.0 };
@@ -273,7 +273,7 @@ impl FixedTime {
         }
         e[0] -= state.margin;
         let bound = self.approach.bound(&state.on_approach(elapsed, &e, errors));
-        state.guaranteed = state.phase == Phase::Approach && bound.applies;
+        state.on_course = state.phase == Phase::Approach && bound.applies;
         (bound.floor, bound.lower + state.margin)
     }
 
@@ -372,7 +372,7 @@ impl FixedTime {
             period,
             fallback,
             arrival: None,
-            guaranteed: applies,
+            on_course: applies,
             unmet: state.unmet,
         };
     }
@@ -385,11 +385,11 @@ impl FixedTime {
         if !self.approach.abilities().covers_holds {
             return;
         }
-        let FixedTimeState { arrival, guaranteed, phase, gain, .. } = *state;
+        let FixedTimeState { arrival, on_course, phase, gain, .. } = *state;
         let mut h = state.anchor;
         h[0] += state.margin;
         self.anchor(state, state.anchor_time, &h[..self.n], state.deadline, period);
-        (state.arrival, state.guaranteed, state.phase, state.gain) = (arrival, guaranteed, phase, gain);
+        (state.arrival, state.on_course, state.phase, state.gain) = (arrival, on_course, phase, gain);
     }
 
     /// Starts the condition anew from the sample at time `t` (s) if its theorem has been lost on the way there. `state`
@@ -403,7 +403,7 @@ impl FixedTime {
         const SAMPLES: f64 = 10.0;
         const PART: f64 = 0.05;
         let left = state.deadline - (t - state.anchor_time);
-        let lost = state.phase == Phase::Approach && !state.guaranteed && h[0] < 0.0 && t > state.anchor_time;
+        let lost = state.phase == Phase::Approach && !state.on_course && h[0] < 0.0 && t > state.anchor_time;
         // Without a period inputs are not held, or not known to be: there is no theorem to win back.
         if !lost
             || period <= 0.0

@@ -91,7 +91,7 @@ impl FixedTimeState {
             Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
             other => other,
         };
-        self.guaranteed &= !matches!(self.phase, Phase::Late | Phase::Left);
+        self.on_course &= !matches!(self.phase, Phase::Late | Phase::Left);
     }
 
     /// Moves on to the phase that h itself shows, under a condition that is enforced for ever.

@@ -242,7 +242,7 @@ impl Condition for RepeatedRoot {
         Bound {
             floor: -lower_terms(at.rate, at.e),
             lower: lower_bound(at.rate, at.anchor, at.elapsed),
-            applies: at.guaranteed && ahead >= -at.margin - scale,
+            applies: at.on_course && ahead >= -at.margin - scale,
         }
     }
 

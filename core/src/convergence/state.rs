@@ -57,7 +57,7 @@ pub struct FixedTimeState {
     pub arrival: Option<f64>,
     /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
     /// Whoever enforces the row clears it where that is not met, or the held input breaks the promise on the way.
-    pub guaranteed: bool,
+    pub on_course: bool,
     /// The steps in a row that did not meet the constraint, until now.
     pub unmet: Option<Unmet>,
 }
@@ -105,7 +105,7 @@ impl FixedTimeState {
             margin: self.margin,
             rate: self.rate,
             fallback: self.fallback,
-            guaranteed: self.guaranteed,
+            on_course: self.on_course,
             errors,
             ..Sample::new(&self.anchor[..e.len()], self.deadline, elapsed, e)
         }
@@ -118,7 +118,7 @@ impl FixedTimeState {
             margin: self.stay_margin,
             rate: self.stay_rate,
             pull: self.pull,
-            guaranteed: self.guaranteed,
+            on_course: self.on_course,
             ..Sample::new(&self.anchor[..e.len()], self.deadline, elapsed, e)
         }
     }

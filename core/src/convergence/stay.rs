@@ -207,7 +207,7 @@ impl Stay<'_> {
         (state.stay_rate, state.stay_margin, state.pull) = (chosen.rate, chosen.margin, chosen.pull);
         // Errors are bounded to first order: half of the margin has to be left for the rest.
         let is_covered = || is_kept(chosen.rate) && chosen.margin >= ENOUGH * state.margin;
-        state.guaranteed = chosen.is_invariant && (is_exact || is_covered());
+        state.on_course = chosen.is_invariant && (is_exact || is_covered());
     }
 
     /// Pulls back from outside: with the gentle rate and all of the margin. Nothing is promised.
@@ -217,7 +217,7 @@ impl Stay<'_> {
         lowest: &[f64; N],
         means: &Means,
     ) {
-        state.guaranteed = false;
+        state.on_course = false;
         (state.stay_rate, state.stay_margin, state.pull) = (self.base_rate(lowest, means), state.margin, 0.0);
     }
 
@@ -266,7 +266,7 @@ impl Stay<'_> {
 impl Condition for Stay<'_> {
     #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
-        Bound { floor: at.pull - lower_terms(at.rate, at.e), lower: 0.0, applies: at.guaranteed }
+        Bound { floor: at.pull - lower_terms(at.rate, at.e), lower: 0.0, applies: at.on_course }
     }
 
     fn rates(&self, at: &Sample) -> Option<Rates> {

@@ -5,12 +5,15 @@ use alloc::format;
 use alloc::vec::Vec;
 
 use super::slot::BarrierSlot;
-use super::{Begin, End, FilterState, Report, SafetyFilter, Strictness};
+use super::{
+    Begin, End, FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative, Status, Strictness,
+    Workspace,
+};
 use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::Derivatives;
-use crate::plan::{Failure, Plan, Planner, Requirement, Witness};
+use crate::lie::{Derivatives, Direction};
+use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Witness};
 use crate::scalar::all_finite;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
@@ -19,8 +22,6 @@ const MARGIN: f64 = 1e-4;
 const COMFORTABLE: f64 = 0.5;
 /// Halvings between the input of the plan and the one that is preferred.
 const BISECTIONS: u32 = 4;
-/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
-const ON_TIME: f64 = 1e-6;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
 
@@ -39,24 +40,57 @@ pub enum Driver {
     Plan,
 }
 
-/// Where the promise stands.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Where the promise of an [`AssuredFilter`] stands. The numbers are stable: they leave the library as the FMU's
+/// `assurance`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Standing {
     /// No sample yet.
     #[default]
-    Undecided,
+    Undecided = 0,
     /// Every promise is kept: there is a witness.
-    Assured,
+    Assured = 1,
     /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
-    Refused(Failure),
+    Refused = 2,
     /// Was assured, and is no more: the plant is not where the model led.
-    Withdrawn(Failure),
-    /// Was assured, and is no more: a sample came at another time than one period after the last.
-    Irregular,
+    Withdrawn = 3,
+    /// Was assured, and is no more: a sample came later than the hold of the one before, or earlier and no plan was found
+    /// from there.
+    Irregular = 4,
 }
 
-/// The report of a step of an [`AssuredFilter`].
+impl Standing {
+    /// Every standing, in the order of its number.
+    pub const ALL: [Self; 5] =
+        [Self::Undecided, Self::Assured, Self::Refused, Self::Withdrawn, Self::Irregular];
+
+    /// Its name, as the FMU's enumeration has it.
+    pub fn name(self) -> &'static str {
+        self.words().0
+    }
+
+    /// Its meaning, in a few words.
+    pub fn meaning(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Undecided => ("undecided", "no step with a valid state yet"),
+            Self::Assured => ("assured", "a plan keeps every promise, whatever u_ref is"),
+            Self::Refused => ("refused", "no plan was found at the start: nothing is promised"),
+            Self::Withdrawn => ("withdrawn", "was assured: the plant is not where the model led"),
+            Self::Irregular => {
+                ("irregular", "was assured: a step came late, or early without a plan from there")
+            }
+        }
+    }
+}
+
+/// What an [`AssuredFilter`] says of a step beside its [`Report`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Assurance {
@@ -64,6 +98,8 @@ pub struct Assurance {
     pub standing: Standing,
     /// Who chose the input.
     pub driver: Driver,
+    /// Why there is no plan, where the promise was refused or withdrawn.
+    pub failure: Option<Failure>,
 }
 
 impl Assurance {
@@ -73,25 +109,42 @@ impl Assurance {
     }
 }
 
-/// What is remembered between samples.
+/// What an [`AssuredFilter`] remembers between samples beside the [`FilterState`] of its rows: the promises and the plan
+/// that keeps them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct AssuredState {
-    /// The memory of the filter inside.
-    pub filter: FilterState,
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Commitment {
     /// Where the promise stands.
     pub standing: Standing,
+    /// Why there is no plan, where the promise was refused or withdrawn.
+    failure: Option<Failure>,
     /// One of each barrier; `None` where nothing is promised.
     promises: Vec<Option<Promise>>,
     plan: Plan,
-    time: f64,
+    /// Time of the last sample in s, and how long its input was to be held.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    sample: Option<[f64; 2]>,
 }
 
 /// h ≥ 0 from one time in s until another, and the margin that plans keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Promise {
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     from: f64,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     until: f64,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     margin: f64,
+}
+
+/// A sample that was looked at, and its input.
+struct Looked {
+    t: f64,
+    hold: f64,
+    x: Vec<f64>,
+    u_ref: Vec<f64>,
+    u: [f64; MAX_INPUTS],
 }
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
@@ -102,10 +155,11 @@ struct Promise {
 /// compromise, or where nothing else keeps the promise the next input of the plan itself.
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
-/// again at the same time. Where x is not finite, the plan goes on as it is. A filter with bounds on disturbance or
-/// measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by [`Self::new`]. Sets must
-/// not move: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. States
-/// must be those of the plant, not of something that others move.
+/// again at the same time. Where the time to the next sample changes and is [told](Self::expect_hold), a plan is sought for
+/// the new one; none found ends the promise. Where x is not finite, the plan goes on as it is. A filter with bounds on
+/// disturbance or measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by
+/// [`Self::new`]. Sets must not move: at a rest each is looked at at eight later times, up to a day, and no plan is found
+/// where it has. States must be those of the plant, not of something that others move.
 ///
 /// The search allocates, as do the plans.
 ///
@@ -122,13 +176,19 @@ struct Promise {
 /// let (x, mut u) = ([0.0, 0.0, 1.0, 0.0], [0.0; 2]);
 /// let assurance = filter.step(0.0, &x, &[-5.0, 0.0], &mut u)?;
 /// assert!(assurance.is_assured());
+/// assert!(filter.report().barriers[0].guaranteed);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
 pub struct AssuredFilter {
     filter: SafetyFilter,
     period: f64,
-    state: AssuredState,
-    report: Assurance,
+    /// The time in s for which the next input will be held, if somebody said so.
+    expected: Option<f64>,
+    commitment: Commitment,
+    /// The sample that the reports are of, and the commitment after it.
+    looked: Option<Looked>,
+    next: Commitment,
+    assurance: Assurance,
 }
 
 impl AssuredFilter {
@@ -168,8 +228,15 @@ impl AssuredFilter {
             }
         }
         one_plant(&filter, period)?;
-        let state = AssuredState { filter: filter.state().clone(), ..AssuredState::default() };
-        Ok(Self { filter, period, state, report: Assurance::default() })
+        Ok(Self {
+            filter,
+            period,
+            expected: None,
+            commitment: Commitment::default(),
+            looked: None,
+            next: Commitment::default(),
+            assurance: Assurance::default(),
+        })
     }
 
     /// The filter inside: to look at.
@@ -179,110 +246,253 @@ impl AssuredFilter {
 
     /// The plan that is committed, where there is one.
     pub fn plan(&self) -> Option<&Witness> {
-        (self.state.standing == Standing::Assured).then_some(&self.state.plan.witness)
+        (self.commitment.standing == Standing::Assured).then_some(&self.commitment.plan.witness)
     }
 
-    /// The report of the last step.
-    pub fn report(&self) -> &Assurance {
-        &self.report
+    /// The states on the way of `witness` from `x` at `t`, in steps of at most `step` s, finite, > 0: each with the input
+    /// that is held from there until the next. The last is the rest, with the input that holds it.
+    pub fn way(
+        &self,
+        witness: &Witness,
+        t: f64,
+        x: &[f64],
+        step: f64,
+    ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
+        let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
+        let Some(plant) = self.filter.slots.first().and_then(|slot| slot.source.predict()) else {
+            return way;
+        };
+        for (end, u) in &witness.inputs {
+            let (begin, steps) = (at, ((end - at) / step) as usize + 1);
+            for k in 1..=steps {
+                way.push((at, x.clone(), *u));
+                let next = begin + (end - begin) * k as f64 / steps as f64;
+                plant.flow(&mut x, &u[..self.filter.input_dim], next - at);
+                at = next;
+            }
+        }
+        way.extend(witness.inputs.last().map(|(_, u)| (at, x, *u)));
+        way
     }
 
-    /// The memory between samples.
-    pub fn state(&mut self) -> &AssuredState {
-        self.state.filter.clone_from(self.filter.state());
-        &self.state
+    /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.
+    pub fn report(&self) -> &Report {
+        self.filter.report()
     }
 
-    /// Restores what [`Self::state`] returned: the filter goes on exactly as it would have then.
+    /// Where the promise stands, and who chose the last input.
+    pub fn assurance(&self) -> &Assurance {
+        &self.assurance
+    }
+
+    /// The memory between samples, beside that of [`Self::filter`].
+    pub fn commitment(&self) -> &Commitment {
+        &self.commitment
+    }
+
+    /// How long in s the input of the last sample was to be held, if there was one.
+    pub fn last_hold(&self) -> Option<f64> {
+        self.commitment.sample.map(|[_, hold]| hold)
+    }
+
+    /// Restores what [`SafetyFilter::state`] and [`Self::commitment`] returned: the filter goes on exactly as it would have
+    /// then.
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers, or of a plant of other dimensions.
-    pub fn restore(&mut self, state: &AssuredState) -> Result<(), Error> {
-        if !state.promises.is_empty() {
-            length("promises", state.promises.len(), self.filter.slots.len())?;
+    /// A state or a commitment of another filter, or one that is damaged.
+    pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
+        let Commitment { standing, promises, plan, sample, .. } = commitment;
+        let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
+        if *standing != Standing::Undecided {
+            length("promises", promises.len(), self.filter.slots.len())?;
         }
-        if !state.plan.fits(self.filter.state_dim, self.filter.input_dim) {
-            let message = "is of a plant of other dimensions";
-            return Err(Error::new(ErrorKind::Dimension, "plan", message));
+        if *standing == Standing::Assured {
+            if let Some(flaw) = plan.flaw(self.filter.state_dim, self.filter.input_dim) {
+                return refuse("plan", flaw);
+            }
+            if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
+                return refuse("sample", "has no time, must have one beside a plan");
+            }
         }
-        self.filter.restore(&state.filter)?;
-        self.state.clone_from(state);
-        self.report = Assurance { standing: state.standing, driver: Driver::Rows };
+        self.filter.restore(state)?;
+        self.commitment.clone_from(commitment);
+        self.looked = None;
+        let Commitment { standing, failure, .. } = self.commitment;
+        self.assurance = Assurance { standing, driver: Driver::Rows, failure };
         Ok(())
     }
 
     /// Forgets promise and plan: the next sample decides anew.
     pub fn rearm(&mut self) {
         self.filter.rearm();
-        self.state = AssuredState { filter: self.filter.state().clone(), ..AssuredState::default() };
-        self.report = Assurance::default();
+        self.commitment = Commitment::default();
+        self.looked = None;
+        self.assurance = Assurance::default();
     }
 
-    /// Computes the safe input at time `t` in s and remembers the sample; arguments as for [`SafetyFilter::step`]. The
-    /// report of the rows is that of [`Self::filter`].
+    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` for the period. It is
+    /// for whoever is told, such as a co-simulation slave by the size of its step.
+    ///
+    /// # Errors
+    ///
+    /// A time out of range.
+    pub fn expect_hold(&mut self, hold: Option<f64>) -> Result<(), Error> {
+        self.expected = hold.map(|hold| positive("hold", hold)).transpose()?;
+        Ok(())
+    }
+
+    /// Computes the safe input at time `t` in s and remembers the sample; arguments as for [`SafetyFilter::step`].
     ///
     /// # Errors
     ///
     /// A slice of the wrong length.
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
-        length("x", x.len(), self.filter.state_dim)?;
-        self.filter.step(t, x, u_ref, u)?;
-        let is_valid = t.is_finite() && all_finite(x);
-        let since = t - self.state.time;
-        let round_off = 2.0 * f64::EPSILON * t.abs();
-        let tolerance = ON_TIME * self.period + round_off;
-        let regular = round_off <= ROUND_OFF * self.period
-            && (since == 0.0 || (since - self.period).abs() <= tolerance);
-        match self.state.standing {
-            Standing::Undecided if is_valid => self.decide(t, x, u),
-            // Also where t is not a number.
-            Standing::Assured if !regular => self.state.standing = Standing::Irregular,
-            _ => {}
-        }
-        self.report.driver = Driver::Rows;
-        if self.state.standing == Standing::Assured {
-            self.report.driver = match is_valid {
-                true => self.choose(t, x, u_ref, u),
-                false => self.go_on(t, u),
-            };
-            self.filter.state.input[..u.len()].copy_from_slice(u);
-            if self.report.driver != Driver::Rows {
-                self.disown_rows();
-            }
-        }
-        self.state.time = t;
-        self.report.standing = self.state.standing;
-        Ok(&self.report)
+        self.peek(t, x, u_ref, u)?;
+        core::mem::swap(&mut self.filter.state, &mut self.filter.workspace.next);
+        core::mem::swap(&mut self.commitment, &mut self.next);
+        self.looked = None;
+        Ok(&self.assurance)
     }
 
-    /// The report of the rows at the last step, about their own answer. No guarantee of theirs holds where another input
-    /// was applied.
-    pub fn rows(&self) -> &Report {
-        self.filter.report()
+    /// Computes what [`Self::step`] would, without remembering the sample. The same step after it is free.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::step`].
+    pub fn peek(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
+        length("x", x.len(), self.filter.state_dim)?;
+        length("u_ref", u_ref.len(), self.filter.input_dim)?;
+        length("u", u.len(), self.filter.input_dim)?;
+        let hold = self.expected.unwrap_or(self.period);
+        if let Some(looked) = &self.looked
+            && looked.is_at(t, hold, x, u_ref)
+        {
+            u.copy_from_slice(&looked.u[..u.len()]);
+            return Ok(&self.assurance);
+        }
+        self.looked = None;
+        self.filter.peek(t, x, u_ref, u)?;
+        self.sample(t, hold, x, u_ref, u);
+        let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: [0.0; MAX_INPUTS] };
+        looked.u[..u.len()].copy_from_slice(u);
+        self.looked = Some(looked);
+        Ok(&self.assurance)
+    }
+
+    /// As [`SafetyFilter::differentiate`]. There is a derivative where the input is the answer of the rows.
+    ///
+    /// # Errors
+    ///
+    /// As for [`SafetyFilter::differentiate`].
+    pub fn differentiate(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<Option<NoDerivative>, Error> {
+        let (mut u, mut rows) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
+        let (u, rows) = (&mut u[..self.filter.input_dim], &mut rows[..self.filter.input_dim]);
+        self.peek(t, x, u_ref, u)?;
+        self.looked = None;
+        self.filter.peek(t, x, u_ref, rows)?;
+        match u == rows {
+            true => self.filter.differentiate(t, x, u_ref, direction, out),
+            false => Ok(Some(NoDerivative::Plan)),
+        }
+    }
+
+    /// Goes on from the answer `u` of the rows at `t` and `x`, whose report and state are in the workspace, to that of the
+    /// whole filter.
+    fn sample(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
+        self.next.clone_from(&self.commitment);
+        let is_valid = t.is_finite() && all_finite(x);
+        if is_valid || self.next.sample.is_some() {
+            self.next.sample = Some([t, hold]);
+        }
+        match self.next.standing {
+            Standing::Undecided if is_valid => self.decide(t, hold, x, u),
+            Standing::Assured if !self.in_time(t, hold) => self.end(Standing::Irregular, None),
+            _ => {}
+        }
+        self.assurance.driver = Driver::Rows;
+        if self.next.standing == Standing::Assured {
+            self.assurance.driver = match is_valid {
+                true => self.choose(t, hold, x, u_ref, u),
+                false => self.go_on(t, hold, u),
+            };
+        }
+        (self.assurance.standing, self.assurance.failure) = (self.next.standing, self.next.failure);
+        if self.next.standing == Standing::Assured {
+            self.report_on(u);
+        }
+    }
+
+    fn end(&mut self, standing: Standing, failure: Option<Failure>) {
+        (self.next.standing, self.next.failure) = (standing, failure);
+    }
+
+    /// Whether a sample at `t` comes no later than the one before said, and times tell samples apart.
+    fn in_time(&self, t: f64, hold: f64) -> bool {
+        let Some([last, held]) = self.commitment.sample else { return false };
+        let round_off = 2.0 * f64::EPSILON * t.abs();
+        let late = ON_TIME * held + round_off;
+        // Not-a-number is out of time.
+        last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
+    }
+
+    /// Whether the sample at `t` is one for which the plan was made.
+    fn is_regular(&self, t: f64, hold: f64) -> bool {
+        self.commitment.sample.is_some_and(|[last, held]| {
+            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+            (t == last || t >= last + held - tolerance) && (hold - held).abs() <= ON_TIME * held
+        })
+    }
+
+    /// Makes the report and the state of the rows those of the input `u`, which has a plan behind it.
+    fn report_on(&mut self, u: &[f64]) {
+        let Workspace { next, report, .. } = &mut self.filter.workspace;
+        next.input[..u.len()].copy_from_slice(u);
+        let driver = self.assurance.driver;
+        report.status = match (report.status, driver) {
+            (Status::InvalidInput, _) => Status::InvalidInput,
+            (_, Driver::Reference) => Status::Unchanged,
+            (status, Driver::Rows) if status.is_satisfied() => status,
+            _ => Status::Backup,
+        };
+        for ((b, state), promise) in
+            report.barriers.iter_mut().zip(&mut next.barriers).zip(&self.next.promises)
+        {
+            if driver != Driver::Rows {
+                (b.on_course, state.on_course) = (false, false);
+                b.slack = b.row.slack(u);
+            }
+            if promise.is_some() {
+                b.guaranteed = true;
+                (b.unmet_steps, state.unmet) = (0, None);
+                (b.blocked_by, b.deadlocked) = (None, false);
+            }
+        }
     }
 
     /// Goes on with the plan as it is, where nobody knows where the plant is.
-    fn go_on(&mut self, t: f64, u: &mut [f64]) -> Driver {
-        let plan = &self.state.plan;
+    fn go_on(&mut self, t: f64, hold: f64, u: &mut [f64]) -> Driver {
+        let plan = &self.next.plan;
         let inputs = &plan.witness.inputs;
-        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * self.period);
-        if next.is_none() && !plan.stays() {
-            // Only feedback holds it there.
-            self.state.standing = Standing::Withdrawn(Failure::NoRest);
-        }
+        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * hold);
+        // Past its end, a rest that only feedback holds is left.
+        let is_over = next.is_none() && !plan.stays();
         if let Some((_, input)) = next.or(inputs.last()) {
             for (i, u) in u.iter_mut().enumerate() {
                 *u = self.filter.bounds.clamp(i, input[i]);
             }
         }
+        if is_over || !self.is_regular(t, hold) {
+            self.end(if is_over { Standing::Withdrawn } else { Standing::Irregular }, None);
+        }
         Driver::Plan
-    }
-
-    /// Takes back what the rows say of their own answer, where another input is applied.
-    fn disown_rows(&mut self) {
-        self.filter.state.barriers.iter_mut().for_each(|promise| promise.guaranteed = false);
-        self.filter.workspace.report.barriers.iter_mut().for_each(|barrier| barrier.guaranteed = false);
     }
 
     /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
@@ -324,7 +534,7 @@ impl AssuredFilter {
     /// What the nearest trial fails at.
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
         let promises = self.promises(t, x, factor);
-        self.planned(&promises, &[], |planner| planner.search(t, x)).map(|plan| plan.witness)
+        self.planned(&promises, self.period, &[], |planner| planner.search(t, x)).map(|plan| plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
@@ -358,22 +568,22 @@ impl AssuredFilter {
     }
 
     /// Decides at the first sample: what is promised, and whether a plan keeps it.
-    fn decide(&mut self, t: f64, x: &[f64], u: &[f64]) {
-        self.state.promises = self.promises(t, x, 1.0);
-        let found = self.planned(&self.state.promises, u, |planner| planner.search(t, x));
-        self.state.standing = match found {
+    fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
+        self.next.promises = self.promises(t, x, 1.0);
+        match self.planned(&self.next.promises, hold, u, |planner| planner.search(t, x)) {
             Ok(plan) => {
-                self.state.plan = plan;
-                Standing::Assured
+                self.next.plan = plan;
+                self.end(Standing::Assured, None);
             }
-            Err(failure) => Standing::Refused(failure),
-        };
+            Err(failure) => self.end(Standing::Refused, Some(failure)),
+        }
     }
 
-    /// Runs `f` with the planner of `promises`.
+    /// Runs `f` with the planner of `promises`, for samples that are `period` s apart.
     fn planned<R>(
         &self,
         promises: &[Option<Promise>],
+        period: f64,
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
@@ -389,21 +599,21 @@ impl AssuredFilter {
         }
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
         let source = &*self.filter.slots[0].source;
-        let planner = Planner::new(source, &self.filter.bounds, &requirements, self.period, size);
+        let planner = Planner::new(source, &self.filter.bounds, &requirements, period, size);
         f(&planner.ok_or(Failure::Singular)?)
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
     /// does, else the plan's own.
-    fn choose(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
-        let reached = self.state.promises.iter().flatten().all(|promise| promise.from <= t);
+    fn choose(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
+        let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let mut wanted = [0.0; MAX_INPUTS];
         let wanted = &mut wanted[..u.len()];
         for (i, w) in wanted.iter_mut().enumerate() {
             *w = self.filter.bounds.clamp(i, u_ref[i]);
         }
-        let plan = &self.state.plan;
-        let found = self.planned(&self.state.promises, u, |planner| {
+        let plan = &self.next.plan;
+        let found = self.planned(&self.next.promises, hold, u, |planner| {
             if reached
                 && wanted.iter().zip(u_ref).all(|(w, r)| w == r)
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
@@ -431,24 +641,37 @@ impl AssuredFilter {
             }
             Ok((driver, kept))
         });
-        match found {
+        let failure = match found {
             Ok((driver, witness)) => {
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
-                self.state.plan.witness = witness;
-                driver
+                self.next.plan.witness = witness;
+                return driver;
             }
-            Err(failure) => match self.planned(&self.state.promises, u, |planner| planner.search(t, x)) {
-                Ok(plan) => {
-                    u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
-                    self.state.plan = plan;
-                    Driver::Plan
-                }
-                Err(_) => {
-                    self.state.standing = Standing::Withdrawn(failure);
-                    Driver::Rows
-                }
-            },
+            Err(failure) => failure,
+        };
+        match self.planned(&self.next.promises, hold, u, |planner| planner.search(t, x)) {
+            Ok(plan) => {
+                u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
+                self.next.plan = plan;
+                Driver::Plan
+            }
+            Err(_) => {
+                let standing = match self.is_regular(t, hold) {
+                    true => Standing::Withdrawn,
+                    false => Standing::Irregular,
+                };
+                self.end(standing, Some(failure));
+                Driver::Rows
+            }
         }
+    }
+}
+
+impl Looked {
+    /// Whether it is the sample with these arguments, bit for bit.
+    fn is_at(&self, t: f64, hold: f64, x: &[f64], u_ref: &[f64]) -> bool {
+        let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
+        same(&[self.t, self.hold], &[t, hold]) && same(&self.x, x) && same(&self.u_ref, u_ref)
     }
 }
 

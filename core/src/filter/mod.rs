@@ -23,7 +23,7 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
-pub use assured::{Assurance, AssuredFilter, AssuredState, Driver, Standing};
+pub use assured::{Assurance, AssuredFilter, Commitment, Driver, Standing};
 pub use builder::FilterBuilder;
 pub use integrator::{IntegratedFilter, Integration};
 pub use report::{BarrierReport, Report, Status};
@@ -100,7 +100,7 @@ struct Workspace {
 ///
 /// The plant is control-affine and every barrier has the relative degree it was declared with;
 /// inputs are held between samples ([`Sampling`]). A barrier's guarantee
-/// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::guaranteed`] says whether
+/// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::on_course`] says whether
 /// its theorem's conditions have held so far.
 ///
 /// # References
@@ -216,9 +216,7 @@ impl SafetyFilter {
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
         let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
-        use Status::{InvalidInput, Singular, SolverFailed, WrongRelativeDegree};
-        let unsolved = matches!(report.status, InvalidInput | Singular | WrongRelativeDegree | SolverFailed);
-        if unsolved || report.time.is_nan() {
+        if report.status.is_abstention() || report.time.is_nan() {
             return Ok(None);
         }
         let count = requirements.len().max(self.slots.len());

@@ -39,11 +39,14 @@ pub enum Status {
     WrongRelativeDegree = 6,
     /// The solver for several rows did not converge: u_ref within its bounds.
     SolverFailed = 7,
+    /// The constraints are not met, or lead where no way on is left, and a plan that keeps every promise decides. Only
+    /// from a filter that follows plans (`AssuredFilter`).
+    Backup = 8,
 }
 
 impl Status {
     /// Every status, in the order of its number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Unchanged,
         Self::Filtered,
         Self::Infeasible,
@@ -52,6 +55,7 @@ impl Status {
         Self::Singular,
         Self::WrongRelativeDegree,
         Self::SolverFailed,
+        Self::Backup,
     ];
 
     /// Its name, as the FMU's enumeration has it.
@@ -76,12 +80,23 @@ impl Status {
                 ("wrong_relative_degree", "the constraint would be wrong: u nearest 0")
             }
             Self::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
+            Self::Backup => ("backup", "a plan decides, and keeps every promise"),
         }
     }
 
-    /// Whether the returned input satisfies every constraint.
+    /// The status with this number, if there is one.
+    pub fn from_number(number: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| *status as i32 == number)
+    }
+
+    /// Whether no constraint was enforced: no valid input, no finite model, no row that is one, no convergence.
+    pub fn is_abstention(self) -> bool {
+        matches!(self, Self::InvalidInput | Self::Singular | Self::WrongRelativeDegree | Self::SolverFailed)
+    }
+
+    /// Whether the returned input satisfies every constraint, or a plan that keeps every promise stands behind it.
     pub fn is_satisfied(self) -> bool {
-        matches!(self, Self::Unchanged | Self::Filtered)
+        matches!(self, Self::Unchanged | Self::Filtered | Self::Backup)
     }
 }
 
@@ -106,9 +121,12 @@ pub struct BarrierReport {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival_time: Option<f64>,
-    /// Whether the theorem behind the present phase applies: its conditions held at a sample of this
-    /// phase, and every step since then was satisfied.
+    /// Whether a witness is in hand: a plan, checked in the model, that keeps this barrier's promise within the bounds
+    /// whatever u_ref is. Only from a filter that follows plans (`AssuredFilter`).
     pub guaranteed: bool,
+    /// Whether the theorem behind the present phase applies: its conditions held at a sample of this phase, and every step
+    /// since then was satisfied. It does not say that an input will exist at later samples.
+    pub on_course: bool,
     /// μ in force since the anchor, `[h]`: the settings' margin and the expected cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
@@ -156,6 +174,7 @@ impl BarrierReport {
         arrived: false,
         arrival_time: None,
         guaranteed: false,
+        on_course: false,
         margin: 0.0,
         fallback: false,
         recoveries: 0,
@@ -179,7 +198,8 @@ impl BarrierReport {
             time_left: bound.time_left,
             arrived: promise.arrival.is_some(),
             arrival_time: promise.arrival,
-            guaranteed: promise.guaranteed,
+            guaranteed: false,
+            on_course: promise.on_course,
             margin: promise.margin,
             fallback: promise.fallback,
             recoveries: promise.recoveries,
@@ -199,7 +219,7 @@ impl BarrierReport {
         self.phase = promise.phase;
         self.arrival_time = promise.arrival;
         self.arrived = promise.arrival.is_some();
-        self.guaranteed = promise.guaranteed;
+        self.on_course = promise.on_course;
         self.margin = promise.margin;
         self.fallback = promise.fallback;
         self.recoveries = promise.recoveries;

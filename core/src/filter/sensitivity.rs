@@ -93,6 +93,8 @@ pub enum NoDerivative {
     /// The state has [measurement errors](super::FilterBuilder::measurement_errors), whose rows contain derivatives by
     /// the state already.
     MeasurementErrors,
+    /// A plan chose the input (`AssuredFilter`).
+    Plan,
 }
 
 impl fmt::Display for NoDerivative {
@@ -107,6 +109,7 @@ impl fmt::Display for NoDerivative {
             Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
             Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
             Self::MeasurementErrors => f.write_str("not with measurement errors"),
+            Self::Plan => f.write_str("a plan chose the input"),
         }
     }
 }

@@ -286,9 +286,9 @@ impl SafetyFilter {
             let met = status.is_satisfied() && !soft || row.holds(u);
             // With measurement errors, only the predicted rows contain them and are those of the theorem.
             let is_kept = slot.now.lowest.is_none() && (predicted || self.errors.is_exact());
-            promise.guaranteed &= met && is_kept;
+            promise.on_course &= met && is_kept;
             promise.unmet = (!met).then(|| Unmet::after(promise.unmet, moment.t, report.h));
-            report.guaranteed = promise.guaranteed;
+            report.on_course = promise.on_course;
             report.unmet_steps = promise.unmet.map_or(0, |unmet| unmet.steps);
             blocked |= !met;
         }
@@ -304,7 +304,7 @@ impl SafetyFilter {
         report.status = status;
         next.clone_from(&self.state);
         for (promise, b) in next.barriers.iter_mut().zip(&mut report.barriers) {
-            promise.guaranteed = false;
+            promise.on_course = false;
             b.remember(promise);
         }
         for (i, ui) in u.iter_mut().enumerate() {

@@ -25,6 +25,8 @@ const AT_REST: f64 = 1e-6;
 pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// Number of holds for which a drift at rest has to leave every set where it is.
 const DRIFT: f64 = 1e3;
+/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
+pub(crate) const ON_TIME: f64 = 1e-6;
 /// Most holds of the braking law after a reference.
 const BRAKING: usize = 200;
 /// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
@@ -32,6 +34,7 @@ const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 864
 
 /// A list of held inputs that meets every requirement, from a state on.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Witness {
     /// The end of each hold in s, and its input. The plant is at rest under the last, which is held for ever.
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
@@ -39,32 +42,39 @@ pub struct Witness {
     pub tightest: Option<Tightest>,
     /// The largest rate of each state on the way, and on the way of the plan before it: what rest is small against. It never
     /// falls, so what was a rest stays one.
-    rates: Vec<f64>,
+    pub(super) rates: Vec<f64>,
     /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
 }
 
 /// Where h − margin is least.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tightest {
     /// The number of the barrier.
     pub barrier: usize,
     /// Time in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time: f64,
     /// h − margin in the unit of h, a bound from below.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
 }
 
 /// What keeps a list of inputs from being a witness.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Failure {
     /// A requirement is not met.
     Broken {
         /// The number of its barrier.
         barrier: usize,
         /// Time in s.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         time: f64,
         /// h − margin there, < 0.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
     /// The plant does not come to rest, or a set moves.
@@ -88,16 +98,19 @@ pub(super) struct Walk<'a> {
     at: Vec<Derivatives>,
     witness: Witness,
     started: f64,
+    /// The sampling period in s: inputs change at samples.
+    period: f64,
 }
 
 impl<'a> Walk<'a> {
-    /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin.
+    /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin. Samples
+    /// are `period` s apart.
     pub(super) fn new(
         model: Model<'a>,
         requirements: &'a [Requirement<'a>],
         strictness: f64,
-        t: f64,
-        x: &[f64],
+        period: f64,
+        (t, x): (f64, &[f64]),
     ) -> Result<Self, Failure> {
         let mut walk = Self {
             model,
@@ -109,6 +122,7 @@ impl<'a> Walk<'a> {
             at: vec![Derivatives::ZERO; requirements.len()],
             witness: Witness { rates: vec![0.0; x.len()], ..Witness::default() },
             started: t,
+            period,
         };
         for i in 0..requirements.len() {
             walk.evaluate(i)?;
@@ -152,9 +166,20 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Holds `u` for `duration` s.
-    pub(super) fn hold(&mut self, u: &[f64], duration: f64) -> Result<(), Failure> {
-        let end = self.t + duration;
+    /// Holds `u` until the sample that `end` is meant to be: the nearest, where samples have come to lie elsewhere.
+    pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        let samples = ((end - self.started) / self.period + 0.5) as u64;
+        let sample = self.started + samples as f64 * self.period;
+        let end = if (sample - end).abs() <= ON_TIME * self.period { end } else { sample };
+        // Time is too large to tell samples apart.
+        if end.is_nan() || end <= self.t {
+            return Err(Failure::Singular);
+        }
+        self.hold(u, end)
+    }
+
+    /// Holds `u` until `end`.
+    fn hold(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         // Requirements begin and end at nodes.
         while self.t < end {
             let ahead = self.t + 1e-9 * (end - self.t);
@@ -269,11 +294,11 @@ impl<'a> Walk<'a> {
     }
 
     /// Follows the rest of `reference`.
-    pub(super) fn follow(&mut self, reference: &Reference, period: f64) -> Result<(), Failure> {
+    pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
         let mut u = vec![0.0; self.model.inputs()];
-        while let Some(k) = reference.hold_at(self.t, period) {
+        while let Some(k) = reference.hold_at(self.t, self.period) {
             reference.input(&self.model, k, self.t, &self.x, &mut u);
-            self.hold(&u, reference.times[k + 1] - self.t)?;
+            self.hold_until(&u, reference.times[k + 1])?;
         }
         Ok(())
     }
@@ -281,17 +306,18 @@ impl<'a> Walk<'a> {
     /// Brakes until the plant is at rest where it can stay for ever.
     pub(super) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
+        let hold = brake.hold.max(self.period);
         for _ in 0..BRAKING {
             brake.input(&self.model, &self.x, &mut u);
-            let rate = self.model.rate(&self.x, &u, brake.hold);
+            let rate = self.model.rate(&self.x, &u, hold);
             let still = |(i, rate): (usize, &f64)| {
-                rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / brake.hold
+                rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
             };
-            if rate.iter().enumerate().all(still) && self.rests(brake.hold)? {
-                self.hold(&u, brake.hold)?;
+            if rate.iter().enumerate().all(still) && self.rests(hold)? {
+                self.hold_until(&u, self.t + hold)?;
                 return Ok(self.witness);
             }
-            self.hold(&u, brake.hold)?;
+            self.hold_until(&u, self.t + hold)?;
         }
         Err(Failure::NoRest)
     }

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector};
 
 use super::model::{Linear, Model};
+use crate::scalar::all_finite;
 
 /// Price of an input against what one hold of it gains: near 0 the plant is stopped in as few holds as it can be.
 const GENTLENESS: f64 = 0.3;
@@ -17,10 +18,11 @@ const RICCATI: u32 = 2000;
 /// The gain is that of the linear-quadratic regulator at the rest, with the price ‖ẋ‖². So it asks for no place, only
 /// that nothing moves: a vehicle is braked where it is, a pendulum is held upright.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Brake {
     pub(super) state: Vec<f64>,
     pub(super) input: Vec<f64>,
-    pub(super) gain: DMatrix<f64>,
+    pub(super) gain: Gain,
     /// The length of a hold in s.
     pub(super) hold: f64,
     /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
@@ -56,7 +58,13 @@ impl Brake {
         }
         let (_, gain) = riccati(&p, &a, &b, &q, &r)?;
         let stays = a.complex_eigenvalues().iter().all(|v| v.norm_sqr() <= STAYS * STAYS);
-        Some(Self { state, input, gain, hold, stays })
+        Some(Self { state, input, gain: Gain::from(&gain), hold, stays })
+    }
+
+    /// Whether it is a law of a plant with so many states and inputs.
+    pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
+        let Self { state, input, gain, hold, stays: _ } = self;
+        is_of(state, states) && is_of(input, inputs) && is_of(&gain.0, inputs * states) && *hold > 0.0
     }
 
     /// Writes the input at `x`.
@@ -68,6 +76,7 @@ impl Brake {
 
 /// Inputs and states on a grid of holds, with the gains of a feedback along it.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Reference {
     /// The beginning of every hold in s, and the end of the last.
     pub(super) times: Vec<f64>,
@@ -75,7 +84,7 @@ pub(super) struct Reference {
     pub(super) inputs: Vec<Vec<f64>>,
     /// The state at the beginning of every hold, and at the end of the last.
     pub(super) states: Vec<Vec<f64>>,
-    pub(super) gains: Vec<DMatrix<f64>>,
+    pub(super) gains: Vec<Gain>,
 }
 
 impl Reference {
@@ -108,11 +117,23 @@ impl Reference {
             let Linear { a, b } = model.linear(&states[k], u, times[k + 1] - times[k]);
             let (next, gain) = riccati(&p, &a, &b, &q, &r)?;
             p = next;
-            gains.push(gain);
+            gains.push(Gain::from(&gain));
         }
         gains.reverse();
-        let finite = gains.iter().all(|k| k.iter().all(|v| v.is_finite()));
+        let finite = gains.iter().all(|gain| all_finite(&gain.0));
         finite.then_some(Self { times: times.to_vec(), inputs, states, gains })
+    }
+
+    /// Whether it is one of a plant with so many states and inputs.
+    pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
+        let Self { times, inputs: held, states: nodes, gains } = self;
+        is_of(times, held.len() + 1)
+            && times.is_sorted_by(|a, b| a < b)
+            && held.iter().all(|u| is_of(u, inputs))
+            && nodes.len() == times.len()
+            && nodes.iter().all(|x| is_of(x, states))
+            && gains.len() == held.len()
+            && gains.iter().all(|gain| is_of(&gain.0, inputs * states))
     }
 
     /// The number of the hold that the sample at `t` begins or lies in, if one is left; samples are `period` s apart.
@@ -131,10 +152,22 @@ impl Reference {
     }
 }
 
+/// A matrix, row by row: one for each input.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Gain(Vec<f64>);
+
+impl From<&DMatrix<f64>> for Gain {
+    fn from(matrix: &DMatrix<f64>) -> Self {
+        Self(matrix.transpose().iter().copied().collect())
+    }
+}
+
 /// `u` = `input` + `gain` · `deviation`.
-fn feedback(input: &[f64], gain: &DMatrix<f64>, deviation: impl Fn(usize) -> f64, u: &mut [f64]) {
-    for (i, u) in u.iter_mut().enumerate() {
-        *u = input[i] + (0..gain.ncols()).fold(0.0, |sum, j| sum + gain[(i, j)] * deviation(j));
+fn feedback(input: &[f64], gain: &Gain, deviation: impl Fn(usize) -> f64, u: &mut [f64]) {
+    let columns = gain.0.len() / u.len();
+    for ((u, input), row) in u.iter_mut().zip(input).zip(gain.0.chunks_exact(columns)) {
+        *u = row.iter().enumerate().fold(*input, |sum, (j, gain)| sum + gain * deviation(j));
     }
 }
 
@@ -152,6 +185,11 @@ fn riccati(
     // Symmetric but for round-off, which would grow.
     let next = (&next + next.transpose()) * 0.5;
     Some((next, gain))
+}
+
+/// Whether these are so many numbers, all finite.
+fn is_of(numbers: &[f64], count: usize) -> bool {
+    numbers.len() == count && all_finite(numbers)
 }
 
 fn square(x: f64) -> f64 {

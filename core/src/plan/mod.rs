@@ -21,6 +21,7 @@ mod model;
 mod planner;
 mod search;
 
+pub(crate) use check::ON_TIME;
 pub use check::{Failure, Tightest, Witness};
 pub use planner::Planner;
 
@@ -50,8 +51,12 @@ impl Requirement<'_> {
     }
 }
 
+/// Most steps of the model in a plan.
+const MOST_STEPS: f64 = 1e7;
+
 /// A witness, and the laws from which the next ones are made: plain data, remembered between samples.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plan {
     reference: Option<Arc<Reference>>,
     brake: Option<Arc<Brake>>,
@@ -67,10 +72,20 @@ impl Plan {
         self.brake.as_ref().is_some_and(|brake| brake.stays)
     }
 
-    /// Whether it is one of a plant with so many states and inputs, or none at all.
-    pub fn fits(&self, states: usize, inputs: usize) -> bool {
-        let brake = self.brake.as_ref().is_none_or(|b| b.gain.shape() == (inputs, states));
-        let mut gains = self.reference.iter().flat_map(|r| &r.gains);
-        brake && gains.all(|gain| gain.shape() == (inputs, states))
+    /// What is wrong with it as a plan of a plant with `states` states and `inputs` inputs; one from a file may be.
+    pub(crate) fn flaw(&self, states: usize, inputs: usize) -> Option<&'static str> {
+        if self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
+            || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))
+            || self.witness.rates.len() != states
+        {
+            return Some("is of a plant of other dimensions, or not finite");
+        }
+        let times = self.reference.iter().flat_map(|reference| &reference.times);
+        let ends = self.witness.inputs.iter().map(|(end, _)| end);
+        let span = |(first, last): (f64, f64), t: &f64| (first.min(*t), last.max(*t));
+        let (first, last) = times.chain(ends).fold((f64::INFINITY, f64::NEG_INFINITY), span);
+        let longest = (last - first).max(self.brake.as_ref().map_or(0.0, |brake| brake.hold));
+        let is_short = self.step > 0.0 && longest <= MOST_STEPS * self.step;
+        (!is_short).then_some("takes too many steps of the model")
     }
 }

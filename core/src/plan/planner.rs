@@ -193,14 +193,13 @@ impl<'a> Planner<'a> {
     ///
     /// What the first of these fails at.
     pub fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
-        let first = Some((u, self.period));
         let has_reference =
             plan.reference.as_ref().is_some_and(|r| r.hold_at(t + self.period, self.period).is_some());
         if !has_reference {
-            return self.walk(plan, 1.0, t, x, first, false);
+            return self.walk(plan, 1.0, t, x, Some(u), false);
         }
-        self.walk(plan, 1.0, t, x, first, true)
-            .or_else(|failure| self.walk(plan, 1.0, t, x, first, false).map_err(|_| failure))
+        self.walk(plan, 1.0, t, x, Some(u), true)
+            .or_else(|failure| self.walk(plan, 1.0, t, x, Some(u), false).map_err(|_| failure))
     }
 
     /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are, or the feedback along its
@@ -213,14 +212,13 @@ impl<'a> Planner<'a> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
         let replay = || {
-            let walk = Walk::new(self.model(plan.step), self.requirements, KEPT, t, x)?;
-            let mut walk = walk.after(&plan.witness);
+            let mut walk = self.begin(plan, KEPT, t, x)?;
             let mut at = t;
             for (end, u) in &plan.witness.inputs {
                 if *end > at + 0.5 * self.period {
                     let mut u = *u;
                     self.model(plan.step).clamp(&mut u[..nu]);
-                    walk.hold(&u[..nu], end - at)?;
+                    walk.hold_until(&u[..nu], *end)?;
                     at = *end;
                 }
             }
@@ -232,22 +230,26 @@ impl<'a> Planner<'a> {
         })
     }
 
+    fn begin(&self, plan: &Plan, strictness: f64, t: f64, x: &[f64]) -> Result<Walk<'a>, Failure> {
+        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, self.period, (t, x))?;
+        Ok(walk.after(&plan.witness))
+    }
+
     fn walk(
         &self,
         plan: &Plan,
         strictness: f64,
         t: f64,
         x: &[f64],
-        first: Option<(&[f64], f64)>,
+        first: Option<&[f64]>,
         follows: bool,
     ) -> Result<Witness, Failure> {
-        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, t, x)?;
-        let mut walk = walk.after(&plan.witness);
-        if let Some((u, duration)) = first {
-            walk.hold(u, duration)?;
+        let mut walk = self.begin(plan, strictness, t, x)?;
+        if let Some(u) = first {
+            walk.hold_until(u, t + self.period)?;
         }
         if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
-            walk.follow(reference, self.period)?;
+            walk.follow(reference)?;
         }
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         walk.stop(brake)

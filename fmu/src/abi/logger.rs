@@ -12,12 +12,15 @@ const ERRORS: &CStr = c"logStatusError";
 /// The category of everything else.
 const EVENTS: &CStr = c"logEvents";
 
+/// The category of what the user should know though the call succeeded.
+const WARNINGS: &CStr = c"logStatusWarning";
+
 /// The logger of one instance, copied out of the importer's structure.
 pub(super) struct Logger {
     function: Option<fmi2::Logger>,
     environment: Environment,
     instance_name: CString,
-    /// Whether events are wanted (`loggingOn` and the categories). Errors are always logged.
+    /// Whether events are wanted (`loggingOn` and the categories). Errors and warnings are always logged.
     events: bool,
 }
 
@@ -38,6 +41,11 @@ impl Logger {
     /// Logs a failed call.
     pub(super) fn error(&self, message: &str) {
         self.send(Status::ERROR, ERRORS, message);
+    }
+
+    /// Logs what the user should know.
+    pub(super) fn warning(&self, message: &str) {
+        self.send(Status::WARNING, WARNINGS, message);
     }
 
     /// Logs an event, if events are wanted.

@@ -341,7 +341,11 @@ unsafe extern "C" fn fmi2DoStep(
 ) -> Status {
     let body = |handle: &mut Handle| {
         let (t, h) = (current_communication_point, communication_step_size);
-        handle.instance.do_step(t, h).map(|()| Status::OK)
+        handle.instance.do_step(t, h)?;
+        if let Some(notice) = handle.instance.notice() {
+            handle.logger.warning(&notice);
+        }
+        Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2DoStep", body) }

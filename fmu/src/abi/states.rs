@@ -132,7 +132,7 @@ pub(super) unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *m
     unsafe { guarded(component, "fmi2FreeFMUstate", body) }
 }
 
-/// Tells the number of bytes of a state: the same for all states of an FMU.
+/// Tells the number of bytes of a state: the same for all states of an FMU that follows no plans.
 ///
 /// # Safety
 ///
@@ -144,10 +144,11 @@ pub(super) unsafe extern "C" fn fmi2SerializedFMUstateSize(
     size: *mut usize,
 ) -> Status {
     let body = |handle: &mut Handle| {
-        States::lock().find(handle, state)?;
+        let mut states = States::lock();
+        let state = states.find(handle, state)?;
         // SAFETY: the caller's contract for `size`.
         let size = unsafe { slice_mut("size", size, 1) }?;
-        size[0] = state::size(handle.instance.product());
+        size[0] = state::size(handle.instance.product(), state)?;
         Ok(Status::OK)
     };
     // SAFETY: the caller's contract for components.

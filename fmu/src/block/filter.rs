@@ -1,12 +1,12 @@
 //! A filter: it samples its inputs and remembers its promises.
 
-use punctual_core::filter::{FilterState, NoDerivative, SampleDerivative, Status};
+use punctual_core::filter::{NoDerivative, SampleDerivative, Standing, Status};
 use punctual_core::lie::Direction;
 
 use super::{Block, BlockState, Values};
-use crate::FilterLoop;
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout, Reading};
+use crate::{FilterLoop, LoopState};
 
 pub(super) struct FilterBlock {
     configuration: FilterConfiguration,
@@ -15,8 +15,10 @@ pub(super) struct FilterBlock {
     filter: FilterLoop,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
+    /// The standing of the promise that was last spoken of.
+    noticed: Option<Standing>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
-    kept: FilterState,
+    kept: LoopState,
     /// Scratch: the safe input.
     u: Vec<f64>,
     /// Scratch: the derivative of a sample.
@@ -29,9 +31,10 @@ impl FilterBlock {
         layout: Layout,
     ) -> Result<Self, ConfigurationError> {
         let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
-        let (kept, u) = (filter.filter().state().clone(), vec![0.0; layout.inputs]);
+        let (kept, u) = (filter.state(), vec![0.0; layout.inputs]);
         let change = SampleDerivative::default();
-        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, kept, u, change })
+        let noticed = None;
+        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, noticed, kept, u, change })
     }
 
     fn rearm_index(&self) -> usize {
@@ -48,7 +51,7 @@ impl FilterBlock {
     fn rearm(&mut self, values: &Values) -> bool {
         let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
-            self.kept.clone_from(self.filter.filter().state());
+            self.filter.save(&mut self.kept);
             self.filter.rearm();
         }
         rising
@@ -56,7 +59,7 @@ impl FilterBlock {
 
     /// Expected time in s for which the input is held, where no step gives it.
     fn hold(&self) -> f64 {
-        self.filter.filter().state().period.unwrap_or(self.configuration.experiment.step_size)
+        self.filter.last_hold().unwrap_or(self.configuration.experiment.step_size)
     }
 
     /// Computes one sample at `t`. With the length of a step it is remembered, else only looked at.
@@ -79,7 +82,7 @@ impl FilterBlock {
         if step.is_some() {
             self.rearm_seen = values.booleans[self.rearm_index()];
         } else if rising {
-            self.filter.restore(&self.kept, before).map_err(|e| e.to_string())?;
+            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
         }
         let integrated = done.map_err(|e| e.to_string())?;
         self.write(values, integrated);
@@ -120,6 +123,10 @@ impl FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
+        if let Some((standing, _)) = self.filter.standing() {
+            values.integers[at] = standing as i32;
+            at += 1;
+        }
         if self.filter.integrated_input().is_some() {
             values.reals[at] = integrated;
         }
@@ -133,7 +140,7 @@ impl Block for FilterBlock {
         self.filter = configuration.build_loop()?;
         self.configuration = configuration;
         self.rearm_seen = false;
-        self.kept.clone_from(self.filter.filter().state());
+        self.filter.save(&mut self.kept);
         Ok(())
     }
 
@@ -153,11 +160,10 @@ impl Block for FilterBlock {
         let rising = self.rearm(values);
         let hold = self.hold();
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
-        let before = self.filter.integrated();
         let unknown =
             self.filter.differentiate(t, hold, x, u_ref, Direction { x: dx, u: du_ref }, &mut self.change);
         if rising {
-            self.filter.restore(&self.kept, before).map_err(|e| e.to_string())?;
+            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
         }
         if let Some(reason) = unknown.map_err(|e| e.to_string())? {
             return Err(self.named(reason));
@@ -185,36 +191,45 @@ impl Block for FilterBlock {
         self.sample(t, Some(h), values)
     }
 
+    fn notice(&mut self) -> Option<String> {
+        let (standing, failure) = self.filter.standing()?;
+        if self.noticed.replace(standing) == Some(standing) {
+            return None;
+        }
+        let lost = matches!(standing, Standing::Refused | Standing::Withdrawn | Standing::Irregular);
+        lost.then(|| {
+            let why = failure.map(|failure| format!(": {}", self.configuration.failure(failure)));
+            format!("the promise is {} ({}){}", standing.name(), standing.meaning(), why.unwrap_or_default())
+        })
+    }
+
     fn save(&self, state: &mut BlockState) {
         // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
         let Self {
             rearm_seen: now,
-            filter: memory,
+            filter,
             configuration: _,
             parameters: _,
             layout: _,
+            noticed: _,
             kept: _,
             u: _,
             change: _,
         } = self;
-        let (memory, value) = (memory.filter(), memory.integrated());
         match state {
-            BlockState::Filter { rearm_seen, filter, integrated } => {
-                (*rearm_seen, *integrated) = (*now, value);
-                filter.clone_from(memory.state());
+            BlockState::Filter { rearm_seen, memory } => {
+                *rearm_seen = *now;
+                filter.save(memory);
             }
-            _ => {
-                let filter = memory.state().clone();
-                *state = BlockState::Filter { rearm_seen: *now, filter, integrated: value };
-            }
+            _ => *state = BlockState::Filter { rearm_seen: *now, memory: Box::new(filter.state()) },
         }
     }
 
     fn restore(&mut self, state: &BlockState) -> Result<(), String> {
-        let BlockState::Filter { rearm_seen, filter, integrated } = state else {
+        let BlockState::Filter { rearm_seen, memory } = state else {
             return Err(state.mismatch("filter"));
         };
-        self.filter.restore(filter, *integrated).map_err(|e| e.to_string())?;
+        self.filter.restore(memory).map_err(|e| e.to_string())?;
         self.rearm_seen = *rearm_seen;
         Ok(())
     }

@@ -5,8 +5,7 @@ mod disturbance;
 mod filter;
 mod plant;
 
-use punctual_core::filter::FilterState;
-
+use crate::LoopState;
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
 use controller::ControllerBlock;
@@ -55,10 +54,8 @@ pub enum BlockState {
     Filter {
         /// `rearm` at the last step.
         rearm_seen: bool,
-        /// The states of the promises.
-        filter: FilterState,
-        /// The integrated state; 0 without an integrator.
-        integrated: f64,
+        /// The memory of the loop.
+        memory: Box<LoopState>,
     },
     /// State of a plant.
     Plant {
@@ -118,6 +115,11 @@ pub trait Block: Send {
     ///
     /// A step that cannot be made; nothing has changed.
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String>;
+
+    /// What the user should know of the last step, if there is anything; said once.
+    fn notice(&mut self) -> Option<String> {
+        None
+    }
 
     /// Writes all that is remembered to `state`; allocates only where that was of another kind or size.
     fn save(&self, state: &mut BlockState);

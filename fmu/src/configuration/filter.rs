@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use punctual_core::MAX_ROWS;
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
+use punctual_core::plan::Failure;
 use serde::{Deserialize, Serialize};
 
 use super::adding::{Adding, not_affine};
@@ -37,6 +38,16 @@ words! {
     }
 }
 
+words! {
+    /// Whether the filter promises only what a plan keeps.
+    pub enum AssuranceName {
+        /// The rows alone ([`SafetyFilter`]).
+        Off = "off",
+        /// A plan behind every input ([`AssuredFilter`](punctual_core::filter::AssuredFilter)).
+        On = "on",
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum FilterKind {
@@ -53,6 +64,8 @@ pub(super) struct RawFilter {
     #[serde(default = "yes")]
     direct_feedthrough: bool,
     sampling: Option<SamplingName>,
+    #[serde(default = "off")]
+    assurance: AssuranceName,
     #[serde(default)]
     actuation_delay: f64,
     #[serde(default)]
@@ -81,6 +94,9 @@ pub struct FilterConfiguration {
     pub direct_feedthrough: bool,
     /// The treatment of inputs that are held between samples.
     pub sampling: SamplingName,
+    /// Whether the filter promises only what a plan keeps.
+    #[serde(skip_serializing_if = "is_off")]
+    pub assurance: AssuranceName,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
     /// Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
@@ -112,6 +128,14 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+fn off() -> AssuranceName {
+    AssuranceName::Off
+}
+
+fn is_off(assurance: &AssuranceName) -> bool {
+    *assurance == AssuranceName::Off
+}
+
 fn yes() -> bool {
     true
 }
@@ -124,7 +148,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 13] = [
+        static KEYS: [Key; 14] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -143,6 +167,14 @@ pub(super) static SECTION: Section = Section {
                 ),
                 "inputs are held between samples: `measured` predicts over the period since the last step, `step_size` over \
                  that of `[experiment]`, `pointwise` not at all, so `margin` has to cover it",
+            ),
+            Key::new(
+                "assurance",
+                Word(AssuranceName::WORDS),
+                Some("`off`"),
+                "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
+                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
+                 promise. Needs a model to run ahead, sets that stay where they are, no integrator, no delay, no errors",
             ),
             Key::new(
                 "actuation_delay",
@@ -237,6 +269,7 @@ impl FilterConfiguration {
                 true => SamplingName::Pointwise,
                 false => SamplingName::Measured,
             }),
+            assurance: raw.assurance,
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
             correction_limit: raw.correction_limit,
@@ -419,6 +452,28 @@ impl FilterConfiguration {
     /// The relative degree of each barrier; none for a configuration that cannot be built.
     pub fn relative_degrees(&self) -> Vec<usize> {
         self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
+    }
+
+    /// Whether the filter follows plans.
+    pub fn is_assured(&self) -> bool {
+        self.assurance == AssuranceName::On
+    }
+
+    /// What keeps a plan from being one, in words.
+    pub fn failure(&self, failure: Failure) -> String {
+        match failure {
+            Failure::Broken { barrier, time, slack } => {
+                let (section, lack) = (&self.barrier[barrier], -slack);
+                format!(
+                    "{} is not met at {time:.6} s, by {lack:.6} {}",
+                    section.name,
+                    section.unit(&self.plant)
+                )
+            }
+            Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
+            Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
+            _ => "the model is not finite, or no step resolves it".to_owned(),
+        }
     }
 
     /// Whether an input has a bound.

@@ -1,6 +1,6 @@
 //! `[integrator]` of a filter: a state of its model that is commanded and not measured.
 
-use punctual_core::filter::{IntegratedFilter, Integration};
+use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, SafetyFilter};
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
@@ -128,13 +128,18 @@ impl FilterConfiguration {
         inputs
     }
 
-    /// The filter with its integrator, if it has one.
+    /// The filter with its plans or its integrator, if it has them.
     ///
     /// # Errors
     ///
     /// A number out of range, or numbers that contradict each other.
     pub fn build_loop(&self) -> Result<FilterLoop, ConfigurationError> {
         let filter = self.build()?;
+        if self.is_assured() {
+            let refused = |reason| format!("is \"on\", must be \"off\": {reason}");
+            let assured = self.assured(filter).map_err(|e| ConfigurationError::new("assurance", refused(e)));
+            return assured.map(|filter| FilterLoop::Assured(Box::new(filter)));
+        }
         let Some(section) = &self.integrator else { return Ok(FilterLoop::Plain(filter)) };
         let end = |value: f64| if value.abs() >= UNBOUNDED { value.signum() * f64::INFINITY } else { value };
         let limits = [section.min, section.max].map(end);
@@ -149,5 +154,20 @@ impl FilterConfiguration {
         let (state, input) = section.place(&self.plant)?;
         let of = Integration { state, input, limits, gain: section.gain };
         IntegratedFilter::new(filter, of).map(FilterLoop::Integrated).map_err(refused)
+    }
+
+    /// `filter`, built from this configuration, with plans behind it, whether or not `assurance` asks for them.
+    ///
+    /// # Errors
+    ///
+    /// What no plan accounts for yet, in words.
+    pub fn assured(&self, filter: SafetyFilter) -> Result<AssuredFilter, String> {
+        if self.integrator.is_some() {
+            return Err("an integrator is before the plant, which no plan accounts for yet".to_owned());
+        }
+        if let Some(input) = self.barrier_inputs().first() {
+            return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
+        }
+        AssuredFilter::new(filter, self.experiment.step_size).map_err(|e| e.to_string())
     }
 }

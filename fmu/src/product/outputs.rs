@@ -29,7 +29,7 @@ pub enum Reading {
 use Reading::{Count, Flag, Phase, Real};
 
 /// The outputs of each barrier, in the order of the variables.
-pub static BARRIER_OUTPUTS: [BarrierOutput; 13] = [
+pub static BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     BarrierOutput {
         name: "h",
         description: "barrier; the state is safe where it is >= 0",
@@ -74,8 +74,13 @@ pub static BARRIER_OUTPUTS: [BarrierOutput; 13] = [
     BarrierOutput { name: "arrived", description: "h >= 0 has been reached", reading: Flag(|b| b.arrived) },
     BarrierOutput {
         name: "guaranteed",
-        description: "the theorem behind the phase applies: conditions met, every step since satisfied",
+        description: "a plan in hand keeps the promise whatever u_ref is; needs assurance = \"on\"",
         reading: Flag(|b| b.guaranteed),
+    },
+    BarrierOutput {
+        name: "on_course",
+        description: "the theorem behind the phase applies so far: conditions met, every step since satisfied",
+        reading: Flag(|b| b.on_course),
     },
     BarrierOutput {
         name: "deadline_unreachable",

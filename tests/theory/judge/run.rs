@@ -42,7 +42,7 @@ pub(crate) struct Promise {
     pub(crate) out_after_arrival: bool,
     /// The lowest h where h ≥ 0 was promised, flag or not.
     pub(crate) left: Option<Break>,
-    /// The same while the report said `guaranteed`, in holds as long as told and in longer ones.
+    /// The same while the report said `on_course`, in holds as long as told and in longer ones.
     pub(crate) broken: Option<Break>,
     pub(crate) broken_longer: Option<Break>,
     pub(crate) flagged_first: bool,
@@ -104,7 +104,7 @@ pub(crate) fn run(case: &Case) -> Run {
 /// The last report on one set.
 #[derive(Clone, Copy)]
 struct Said {
-    guaranteed: bool,
+    on_course: bool,
     phase: Phase,
     /// Time in s into the hold from which h ≥ 0 is promised, infinite if it is not.
     from: f64,
@@ -137,7 +137,7 @@ impl<'a> Judge<'a> {
         Self {
             case,
             promises: starts.iter().map(promise).collect(),
-            said: vec![Said { guaranteed: false, phase: Phase::Waiting, from: 0.0 }; starts.len()],
+            said: vec![Said { on_course: false, phase: Phase::Waiting, from: 0.0 }; starts.len()],
             floors: vec![-TOLERANCE * size; starts.len()],
             grid: Vec::new(),
             states: Vec::new(),
@@ -150,8 +150,8 @@ impl<'a> Judge<'a> {
         let first = t == self.case.start_time;
         for (i, set) in self.case.sets.iter().enumerate() {
             let (b, promise) = (&report.barriers[i], &mut self.promises[i]);
-            promise.flagged_first |= first && b.guaranteed;
-            promise.unflagged |= !b.guaranteed;
+            promise.flagged_first |= first && b.on_course;
+            promise.unflagged |= !b.on_course;
             promise.unmet += usize::from(b.unmet_steps > 0);
             if b.h >= 0.0 && promise.arrival.is_none() {
                 promise.arrival = Some(t);
@@ -164,7 +164,7 @@ impl<'a> Judge<'a> {
             } else {
                 to_deadline.max(0.0)
             };
-            self.said[i] = Said { guaranteed: b.guaranteed, phase: b.phase, from };
+            self.said[i] = Said { on_course: b.on_course, phase: b.phase, from };
         }
     }
 
@@ -248,7 +248,7 @@ impl<'a> Judge<'a> {
         // A part in 1e9 more is the round-off of times that are sums.
         let longer = hold > self.case.longest_told() * (1.0 + 1e-9);
         keep_worst(&mut promise.left, found);
-        if said.guaranteed {
+        if said.on_course {
             keep_worst(if longer { &mut promise.broken_longer } else { &mut promise.broken }, found);
         }
     }

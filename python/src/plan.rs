@@ -1,0 +1,66 @@
+//! `Plan`: what keeps the promise of a filter that follows plans.
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use punctual_core::plan::Witness;
+use punctual_fmu::FilterLoop;
+use pyo3::prelude::*;
+
+/// Points of the way, at least.
+const POINTS: f64 = 200.0;
+
+/// A verified way to keep every promise from the last step on, whatever u_ref is. The last input is held for ever.
+#[pyclass(frozen, module = "punctual")]
+pub(crate) struct Plan {
+    /// Times on the way in s, shape (n,); the plant is at rest from the last on.
+    #[pyo3(get)]
+    times: Py<PyArray1<f64>>,
+    /// The states then, shape (n, states).
+    #[pyo3(get)]
+    x: Py<PyArray2<f64>>,
+    /// The inputs held from then until the next time, shape (n, inputs).
+    #[pyo3(get)]
+    u: Py<PyArray2<f64>>,
+    /// The largest input on the way after the first, as a part of its bounds, 0 to 1.
+    #[pyo3(get)]
+    effort: f64,
+    /// The barrier with the least h above its margin, the time in s, and that h.
+    #[pyo3(get)]
+    tightest: Option<(String, f64, f64)>,
+}
+
+impl Plan {
+    /// The plan of `filter` from its last sample, `x` at `t`, if it has one.
+    pub(crate) fn of(
+        py: Python<'_>,
+        filter: &FilterLoop,
+        (t, x): (f64, &[f64]),
+        inputs: usize,
+    ) -> PyResult<Option<Self>> {
+        let (Some(witness), FilterLoop::Assured(assured)) = (filter.plan(), filter) else { return Ok(None) };
+        let Witness { inputs: holds, tightest, effort, .. } = witness;
+        let end = holds.last().map_or(t, |(end, _)| *end);
+        let way = assured.way(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
+        let times: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
+        let states: Vec<f64> = way.iter().flat_map(|(_, x, _)| x.iter().copied()).collect();
+        let held: Vec<f64> = way.iter().flat_map(|(.., u)| u[..inputs].iter().copied()).collect();
+        let count = times.len();
+        let name =
+            |barrier: usize| assured.filter().barrier_names().nth(barrier).unwrap_or_default().to_owned();
+        Ok(Some(Self {
+            times: times.into_pyarray(py).unbind(),
+            x: states.into_pyarray(py).reshape([count, x.len()])?.unbind(),
+            u: held.into_pyarray(py).reshape([count, inputs])?.unbind(),
+            effort: *effort,
+            tightest: tightest.map(|at| (name(at.barrier), at.time, at.slack)),
+        }))
+    }
+}
+
+#[pymethods]
+impl Plan {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let times = self.times.bind(py).readonly();
+        let end = times.as_slice()?.last().copied().unwrap_or(f64::NAN);
+        Ok(format!("Plan(at rest from t={end}, effort={})", self.effort))
+    }
+}
