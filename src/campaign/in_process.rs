@@ -11,6 +11,8 @@ use crate::error::Error;
 pub struct InProcess {
     name: String,
     instance: Instance,
+    /// What the user should know of the run.
+    notice: Option<String>,
 }
 
 impl InProcess {
@@ -21,7 +23,7 @@ impl InProcess {
     /// A GUID that is not the configuration's.
     pub fn new(name: &str, configuration: Configuration, guid: &str) -> Result<Self, Error> {
         let instance = Instance::new(configuration, guid).map_err(|e| Error::broken(name, e))?;
-        Ok(Self { name: name.to_owned(), instance })
+        Ok(Self { name: name.to_owned(), instance, notice: None })
     }
 
     /// The error of a refused call: the instance, the call and the time.
@@ -49,6 +51,7 @@ impl Participant for InProcess {
 
     fn reset(&mut self) -> Result<(), Error> {
         self.instance.reset();
+        self.notice = None;
         Ok(())
     }
 
@@ -60,7 +63,6 @@ impl Participant for InProcess {
     calls! {
         enter_initialization_mode() as "fmi2EnterInitializationMode";
         exit_initialization_mode() as "fmi2ExitInitializationMode";
-        do_step(time: f64, step: f64) as "fmi2DoStep";
         terminate() as "fmi2Terminate";
         get_real(references: &[u32], values: &mut [f64]) as "fmi2GetReal";
         get_integer(references: &[u32], values: &mut [i32]) as "fmi2GetInteger";
@@ -70,7 +72,15 @@ impl Participant for InProcess {
         set_boolean(references: &[u32], values: &[i32]) as "fmi2SetBoolean";
     }
 
+    fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error> {
+        self.instance.do_step(time, step).map_err(|reason| self.refused("fmi2DoStep", &reason))?;
+        if let Some(notice) = self.instance.notice() {
+            self.notice = Some(notice);
+        }
+        Ok(())
+    }
+
     fn remark(&self) -> Option<String> {
-        None
+        self.notice.clone()
     }
 }

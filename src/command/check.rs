@@ -95,6 +95,8 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
+    /// Whether nothing speaks against the promise: a plan keeps it, or the first step and the closed loop do.
+    promised: bool,
     /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
     /// Whether the theorem applies to the first step.
@@ -117,11 +119,6 @@ impl StartReport {
             (false, Some(Kept::Kept)) => "not on course, though the closed loop keeps it",
             (false, _) => "not on course",
         }
-    }
-
-    /// Whether nothing speaks against the promise: a plan, or the first step and the closed loop.
-    fn is_promised(&self) -> bool {
-        self.guaranteed || self.on_course && self.simulated.is_none_or(|seen| seen == Kept::Kept)
     }
 }
 
@@ -213,7 +210,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
             let lost = |s: &StartReport| s.reach.as_ref().is_some_and(|r| r.deadline == Verdict::CannotBeMet);
             let kept = report.closed_loop.as_ref().is_none_or(|run| run.kept);
-            let promised = kept && starts.all(|start| start.is_promised() && !lost(start));
+            let promised = kept && starts.all(|start| start.promised && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Configuration::Controller(configuration) => {
@@ -384,10 +381,12 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
             _ => None,
         };
         let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
+        let guaranteed = c.is_assured() && witness.as_ref().is_some_and(|witness| witness.keeps(name));
         let start = report.map(|b| StartReport {
             h: b.h,
             inside: b.h >= -ROUND_OFF,
-            guaranteed: c.is_assured() && witness.as_ref().is_some_and(|witness| witness.keeps(name)),
+            promised: guaranteed || b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
+            guaranteed,
             on_course: b.on_course,
             simulated,
             reach,
@@ -397,7 +396,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
                 "outside at the start and without a deadline: nothing is promised; give it a deadline"
                     .to_owned(),
             );
-        } else if start.as_ref().is_some_and(|s| !s.is_promised()) {
+        } else if start.as_ref().is_some_and(|s| !s.promised) {
             warn("not to be relied on from this start".to_owned());
         }
         barriers.push(BarrierReport {

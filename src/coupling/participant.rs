@@ -1,5 +1,7 @@
 //! The calls of FMI 2.0 co-simulation that the master makes, whoever answers them.
 
+use punctual_fmu::fmi2::Status;
+
 use crate::error::Error;
 use crate::host::Slave;
 
@@ -126,8 +128,11 @@ impl Participant for Slave {
     }
 
     fn remark(&self) -> Option<String> {
-        let count = self.warnings();
-        let last = || self.log().last().map(|m| format!("; last: {m}")).unwrap_or_default();
-        (count > 0).then(|| format!("{count} calls returned fmi2Warning{}", last()))
+        let (count, log) = (self.warnings(), self.log());
+        if count > 0 {
+            let last = log.last().map(|m| format!("; last: {m}")).unwrap_or_default();
+            return Some(format!("{count} calls returned fmi2Warning{last}"));
+        }
+        log.into_iter().rfind(|message| message.status == Status::WARNING).map(|message| message.text)
     }
 }

@@ -52,7 +52,7 @@ fn an_unknown_category_is_an_error_and_switches_nothing() {
     let slave = Slave::new(&fmu);
     let message = slave.refused(debug(&slave, true, &["logEvents", "log100%s"]));
     let wanted = "fmi2SetDebugLogging: the log category \"log100?s\" is unknown, must be one of \
-                  logStatusError, logEvents";
+                  logStatusError, logEvents, logStatusWarning";
     assert_eq!(message, wanted);
     let pointers: [Text; 1] = [null()];
     let message = slave.refused((API.set_debug_logging)(slave.component, 1, 1, pointers.as_ptr()));

@@ -15,12 +15,14 @@
 //! | `plant` | inner steps, initial states, refusals |
 //! | `derivatives` | directional derivatives against differences, and refusals |
 //! | `external` | derivatives that are inputs, against the filter that computes them |
+//! | `assurance` | plans: bits, states, the log, derivatives |
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
 mod arguments;
+mod assurance;
 mod derivatives;
 mod exports;
 mod external;

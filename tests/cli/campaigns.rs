@@ -53,7 +53,7 @@ fn workshop(runs: u64, sampling: &str) -> Workshop {
 }
 
 /// All rows of a result, and the names of its columns.
-fn rows(path: &Path) -> (Vec<String>, Vec<Row>) {
+pub(crate) fn rows(path: &Path) -> (Vec<String>, Vec<Row>) {
     let (reader, source) = campaign::recorded(path).expect("a result");
     let measures = Measures::new(&Campaign::of(source, path, path).expect("its campaign"));
     let rows = (0..reader.groups()).flat_map(|g| reader.group(g, measures.columns()).expect("a group"));

@@ -92,7 +92,7 @@ fn the_json_tells_the_same() {
     );
     let barrier = &report["barriers"][0];
     assert_eq!((&barrier["relative_degree"], &barrier["rate_times_deadline"]), (&2.into(), &20.0.into()));
-    assert_eq!((&barrier["start"]["inside"], &barrier["start"]["guaranteed"]), (&true.into(), &true.into()));
+    assert_eq!((&barrier["start"]["inside"], &barrier["start"]["on_course"]), (&true.into(), &true.into()));
 
     let text = workshop.punctual(["check", "plant.toml", "--json"]).success();
     let report: Value = serde_json::from_str(&text).expect("JSON");
@@ -135,7 +135,7 @@ fn a_start_without_a_guarantee_is_code_one() {
     let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: infeasible"), "{done:#?}");
-    assert!(done.stdout.contains("warning: goal: nothing is guaranteed from this start\n"), "{done:#?}");
+    assert!(done.stdout.contains("warning: goal: not to be relied on from this start\n"), "{done:#?}");
 }
 
 /// Standing still and heading across the line to the goal: no input moves h at that instant.
@@ -146,7 +146,7 @@ fn a_start_without_authority_is_code_one() {
     let done = workshop(&[COARSE, pointwise]).punctual(["check", "filter.toml", "--x0", &across]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: no_authority\n"), "{done:#?}");
-    assert!(done.stdout.contains("outside, h = -60.8426 m; not guaranteed\n"), "{done:#?}");
+    assert!(done.stdout.contains("outside, h = -60.8426 m; not on course\n"), "{done:#?}");
 }
 
 #[test]

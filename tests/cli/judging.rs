@@ -119,7 +119,7 @@ fn an_obstacle_is_kept_without_a_deadline() {
         let (code, report) = check(&workshop, &[]);
         assert_eq!(
             (code, &report["barriers"][0]["deadline"]),
-            (i32::from(report["barriers"][0]["start"]["first_step"] == false), &Value::Null),
+            (i32::from(report["barriers"][0]["start"]["on_course"] == false), &Value::Null),
             "{report}"
         );
         let text = workshop.punctual(["check", "filter.toml"]).success();
@@ -173,7 +173,7 @@ fn what_began_inside_and_is_left_is_not_kept() {
             (1, &"broken".into()),
             "{report}"
         );
-        assert_eq!(report["barriers"][0]["start"]["guaranteed"], false);
+        assert_eq!(report["barriers"][0]["start"]["promised"], false);
     }
 }
 
@@ -250,14 +250,14 @@ fn check_says_what_a_run_does() {
         assert_eq!(seen["promise"], promise["promise"], "{checked} against {ran}");
         assert!(seen["promise"] != "kept" || seen["unmet"] == promise["unmet"], "{checked} against {ran}");
         let start = &checked["barriers"][0]["start"];
-        let (said, kept) = (start["guaranteed"] == true, seen["promise"] == "kept");
+        let (said, kept) = (start["promised"] == true, seen["promise"] == "kept");
         assert!(!said || kept, "{checked}");
         assert!(code == 1 || said && kept, "{code}: {checked}");
         let can = start["reach"]["deadline"] == "can_be_met";
         assert!(!can || kept, "{checked}");
         let text = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]).stdout;
         assert!(text.contains("closed loop with u_ref = 0 (--u-ref none)"), "{text}");
-        assert!(kept || !text.contains("; guaranteed\n"), "{text}");
+        assert!(kept || !text.contains("and the closed loop keeps it\n"), "{text}");
         let notes = ran["notes"].as_array().expect("a list");
         let told =
             |note: &Value| note.as_str().is_some_and(|n| n.contains("nothing feeds u_ref.u_x, u_ref.u_y"));
@@ -269,7 +269,7 @@ fn check_says_what_a_run_does() {
 
 /// A pole on a cart: the cart has to be somewhere, the pole upright, and one force does not do both for long.
 #[test]
-fn what_runs_away_is_not_guaranteed() {
+fn what_runs_away_is_not_promised() {
     let plant = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }, \
                  { name = \"theta\", unit = \"rad\", min = -1.0, max = 1.0 }, { name = \"w\", unit = \"rad/s\" }]\n\
                  inputs = [{ name = \"force\", unit = \"N\", min = -40.0, max = 40.0 }]\n\

@@ -41,7 +41,7 @@ fn the_example_keeps_its_promise() {
     let after = time.iter().zip(&h).filter(|(t, _)| **t >= DEADLINE - 1e-9).map(|(_, h)| *h);
     assert!(after.fold(f64::INFINITY, f64::min) >= 0.0, "it leaves again");
     assert!(table.column("filter.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
-    assert!(table.column("filter.goal.guaranteed").iter().all(|g| *g == 1.0));
+    assert!(table.column("filter.goal.on_course").iter().all(|g| *g == 1.0));
     let arrived = table.column("filter.goal.arrived");
     assert!((0..arrived.len()).all(|k| (arrived[k] == 1.0) == (k >= arrival)), "arrived follows h");
 }
@@ -51,7 +51,7 @@ fn header_and_rows() {
     let table = recorded(&[("stop_time = 20.0", "stop_time = 0.01")], "");
     let outputs = ["u.a", "u.omega", "status", "goal.h", "goal.profile", "goal.time_left", "goal.slack"];
     let rest = ["margin_used", "sampling_loss", "unmet_steps", "postponed"];
-    let flags = ["arrived", "guaranteed", "deadline_unreachable", "deadlocked", "phase"];
+    let flags = ["arrived", "guaranteed", "on_course", "deadline_unreachable", "deadlocked", "phase"];
     let rest: Vec<_> = rest.iter().chain(&flags).map(|field| format!("goal.{field}")).collect();
     let states = ["x.x_p", "x.y_p", "x.theta", "x.v"];
     let mut names = vec!["time".to_owned()];

@@ -59,7 +59,7 @@ def test_the_promise(run):
         assert arrival <= DEADLINE
         assert after >= 0.0
         assert all(row["filter.status"] in (0.0, 1.0) for _, row in rows)
-        assert all(row["filter.goal.guaranteed"] == 1.0 for _, row in rows[:-1])
+        assert all(row["filter.goal.on_course"] == 1.0 for _, row in rows[:-1])
 
 
 def test_h_against_its_promised_bound(run):

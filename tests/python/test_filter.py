@@ -129,3 +129,48 @@ def test_a_file_is_named(tmp_path):
         punctual.Filter(str(tmp_path / "none.toml"))
     with pytest.raises(TypeError, match=r"barrier\[0\].radius: is None, must be a number"):
         punctual.Filter(FILTER | {"barrier": [{"name": "goal", "radius": None}]})
+
+
+def assured(deadline):
+    """A filter that follows plans: a goal, an obstacle on the way, bounds."""
+    barriers = [
+        {"name": "goal", "centre": [20.0, 10.0], "radius": 2.0, "deadline": deadline},
+        {"name": "tree", "shape": "obstacle", "centre": [10.0, 5.0], "radius": 2.0},
+    ]
+    bounds = {"a": [-4.0, 4.0], "omega": [-2.0, 2.0]}
+    return FILTER | {"assurance": "on", "barrier": barriers, "bounds": bounds, "experiment": {"step_size": 0.05}}
+
+
+def test_plans_are_followed_as_by_the_fmu(tmp_path):
+    plant = punctual.build(PLANT | {"x0": {"theta": 1.0}}, tmp_path / "plant.fmu")
+    fmu = punctual.build(assured(8.0), tmp_path / "filter.fmu")
+    items = {item.name.lower(): item.value for item in punctual.Assurance}
+    assert items == {v.name: v.items for v in punctual.variables(fmu)}["assurance"]
+    result = punctual.simulate(fmu, plant, stop_time=10.0, step_size=0.05, nominal={"a": ("v", 2.0)})
+    own = punctual.Filter(assured(8.0))
+    assert own.plan is None and own.refusal is None
+    backups = 0
+    for t, row in zip([0.0, *(result["time"][:-1] + 0.05)], result):
+        x = [row[f"x.{name}"] for name in STATES]
+        step = own.step(t, x, [row["u_ref.a"], row["u_ref.omega"]])
+        assert step.u.tolist() == [row["u.a"], row["u.omega"]], t
+        assert step.assurance is punctual.Assurance.ASSURED and row["assurance"] == step.assurance and step.satisfied
+        assert all(barrier.guaranteed for barrier in step.barriers.values())
+        backups += step.status is Status.BACKUP
+        plan = own.plan
+        assert len(plan.times) == len(plan.x) == len(plan.u) and plan.times[0] == t and plan.x[0].tolist() == x
+        assert np.abs(plan.u).max(axis=0).tolist() <= [4.0, 2.0] and plan.u[0].tolist() == step.u.tolist()
+        distance = np.hypot(*(plan.x[:, :2] - [20.0, 10.0]).T)
+        assert (distance[plan.times >= 8.0] <= 2.0).all() and (np.hypot(*(plan.x[:, :2] - [10.0, 5.0]).T) >= 2.0).all()
+        assert np.abs(plan.x[-1, 3]) < 1e-4, "at rest"
+    assert backups > 0
+
+
+def test_what_is_not_promised_is_said():
+    own = punctual.Filter(assured(2.0))
+    step = own.step(0.0, [0.0, 0.0, 1.0, 0.0])
+    assert step.assurance is punctual.Assurance.REFUSED and not step.barriers["goal"].guaranteed
+    assert own.plan is None and own.refusal.startswith("goal is not met at 2.0")
+    assert punctual.Filter(FILTER).step(0.0, [0.0, 0.0, 1.0, 0.0]).assurance is None
+    with pytest.raises(punctual.Error, match='assurance: is "on", must be "off": actuation_delay: is not 0'):
+        punctual.Filter(assured(8.0) | {"actuation_delay": 0.01})

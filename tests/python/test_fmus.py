@@ -69,7 +69,7 @@ def test_a_plugin_of_a_dict_is_looked_for_in_the_current_folder(tmp_path, monkey
 def test_check_is_what_the_command_line_says():
     report = punctual.check(FILTER, x0={"v": 2.0})
     assert [barrier["relative_degree"] for barrier in report["barriers"]] == [2, 2]
-    assert report["barriers"][0]["start"]["guaranteed"] is True
+    assert report["barriers"][0]["start"]["on_course"] is True
     assert punctual.check(FILTER, plant=PLANT)["barriers"] == report["barriers"]
     # A deadline that the bounds do not allow is an answer, not an error.
     lost = punctual.check(FILTER | {"barrier": [goal(deadline=0.5)]}, x0={"v": 2.0})

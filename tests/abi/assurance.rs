@@ -1,0 +1,210 @@
+//! A filter that follows plans: the filter of the core bit for bit, plans in states, what the log says, and derivatives.
+
+use punctual_core::filter::{Standing, Status};
+
+use crate::api::{API, ERROR, OK};
+use crate::fmu::Fmu;
+use crate::slave::Slave;
+use crate::states::{LENGTH, sealed};
+
+const STEP: f64 = 0.05;
+
+/// A goal that is reached in time, and an obstacle on the way; u_ref drives into it.
+const ASSURED: &str = r#"
+kind = "filter"
+assurance = "on"
+plant.model = "unicycle"
+bounds = { a = [-4.0, 4.0], omega = [-2.0, 2.0] }
+experiment.step_size = 0.05
+[[barrier]]
+name = "goal"
+centre = [20.0, 10.0]
+radius = 2.0
+deadline = 8.0
+[[barrier]]
+name = "tree"
+shape = "obstacle"
+centre = [10.0, 5.0]
+radius = 2.0
+"#;
+const HOSTILE: [f64; 2] = [4.0, -1.0];
+
+/// The plant over one step, with an integrator of its own.
+fn moved(x: [f64; 4], u: [f64; 2]) -> [f64; 4] {
+    let rate = |x: [f64; 4]| [x[3] * x[2].cos(), x[3] * x[2].sin(), u[1], u[0]];
+    let beside = |k: [f64; 4], dt: f64| std::array::from_fn(|i| x[i] + dt * k[i]);
+    let a = rate(x);
+    let b = rate(beside(a, STEP / 2.0));
+    let c = rate(beside(b, STEP / 2.0));
+    let d = rate(beside(c, STEP));
+    std::array::from_fn(|i| x[i] + STEP / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
+}
+
+fn sample(slave: &Slave, x: [f64; 4]) {
+    slave.set_inputs(&[x[0], x[1], x[2], x[3], HOSTILE[0], HOSTILE[1]]);
+}
+
+/// Makes steps `from` to `to` from `x`; returns the inputs given and the last state.
+fn drive(slave: &Slave, mut x: [f64; 4], from: u32, to: u32) -> (Vec<[u64; 2]>, [f64; 4]) {
+    let mut given = Vec::new();
+    for k in from..to {
+        sample(slave, x);
+        slave.step(f64::from(k) * STEP, STEP);
+        let u = [slave.real("u.a"), slave.real("u.omega")];
+        given.push(u.map(f64::to_bits));
+        x = moved(x, u);
+    }
+    (given, x)
+}
+
+#[test]
+fn an_fmu_follows_plans_as_the_core_does() {
+    let fmu = Fmu::new(ASSURED);
+    let (slave, mut filter) = (Slave::ready(&fmu), fmu.filter().build_loop().expect("a filter"));
+    let mut x = [0.0, 0.0, 1.0, 0.0];
+    let mut backups = 0;
+    for k in 0..220 {
+        // The time that the FMU has come to, by its own sum.
+        let (t, mut u) = (slave.time(), [0.0; 2]);
+        filter.step(t, STEP, &x, &HOSTILE, &mut u).expect("right lengths");
+        sample(&slave, x);
+        // Reading ahead of the step changes nothing.
+        if k % 3 == 0 {
+            assert_eq!(slave.real("u.a").to_bits(), u[0].to_bits(), "{t}");
+        }
+        slave.step(t, STEP);
+        slave.shows(filter.filter(), &u, &format!("at {t}"));
+        assert_eq!(slave.integer("assurance"), Standing::Assured as i32, "{t}");
+        assert!(slave.flag("goal.guaranteed") && slave.flag("tree.guaranteed"), "{t}");
+        let status = slave.integer("status");
+        assert!(Status::from_number(status).is_some_and(Status::is_satisfied), "{t}: {status}");
+        backups += i32::from(status == Status::Backup as i32);
+        x = moved(x, u);
+        assert!((x[0] - 10.0).hypot(x[1] - 5.0) >= 2.0, "{t}: {x:?}");
+        assert!(t + STEP < 8.0 || (x[0] - 20.0).hypot(x[1] - 10.0) <= 2.0, "{t}: {x:?}");
+    }
+    assert!(backups > 0, "the plan never had to decide");
+    assert_eq!(slave.log.messages(), [""; 0]);
+}
+
+/// The plan is part of the state: from bytes in another instance, every bit that follows is the same.
+#[test]
+fn a_plan_is_saved_with_the_state() {
+    let fmu = Fmu::new(ASSURED);
+    let (slave, other) = (Slave::ready(&fmu), Slave::new(&fmu));
+    let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 40);
+    let state = slave.state();
+    let bytes = slave.bytes(state);
+    assert_eq!(bytes[LENGTH..LENGTH + 8], (bytes.len() as u64).to_le_bytes());
+    let (on, _) = drive(&slave, x, 40, 90);
+    slave.restore(state);
+    assert_eq!(drive(&slave, x, 40, 90).0, on);
+    other.restore(other.read(&bytes));
+    assert_eq!(other.now(), bytes);
+    assert_eq!(drive(&other, x, 40, 90).0, on);
+    assert_eq!(other.integer("assurance"), Standing::Assured as i32);
+}
+
+/// Bytes of a plan that are no plan of this filter are refused; others keep inputs finite and within their bounds.
+#[test]
+fn damaged_plans_do_no_harm() {
+    let fmu = Fmu::new(ASSURED);
+    let slave = Slave::ready(&fmu);
+    let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 30);
+    let bytes = slave.now();
+    // The commitment is the last part: most of the state.
+    let first = bytes.len() * 2 / 5;
+    let (mut refused, mut taken) = (0, 0);
+    for (n, at) in (first..bytes.len() - 20).step_by(97).enumerate() {
+        let mut damaged = bytes.clone();
+        match n % 4 {
+            // Not a number, wherever it begins.
+            0 => damaged[at..].iter_mut().take(16).for_each(|byte| *byte = 255),
+            1 => damaged[at] = 0,
+            2 => damaged[at] ^= 0x40,
+            _ => damaged[at] ^= 0x01,
+        }
+        let (status, state) = slave.try_read(&sealed(damaged));
+        if status != OK {
+            assert!(slave.refused(status).starts_with("fmi2DeSerializeFMUstate: "));
+            refused += 1;
+            continue;
+        }
+        if (API.set_state)(slave.component, state) == ERROR {
+            refused += 1;
+            continue;
+        }
+        taken += 1;
+        sample(&slave, x);
+        slave.step(30.0 * STEP, STEP);
+        let u = [slave.real("u.a"), slave.real("u.omega")];
+        assert!(u[0].abs() <= 4.0 && u[1].abs() <= 2.0, "{at}: {u:?}");
+    }
+    assert!(refused >= 5 && taken > 5, "{refused} refused, {taken} taken");
+}
+
+#[test]
+fn what_is_not_promised_is_said_in_words() {
+    let soon = ASSURED.replace("deadline = 8.0", "deadline = 2.0");
+    let fmu = Fmu::new(&soon);
+    let slave = Slave::ready(&fmu);
+    drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
+    assert_eq!(slave.integer("assurance"), Standing::Refused as i32);
+    assert!(!slave.flag("goal.guaranteed") && !slave.flag("tree.guaranteed"));
+    // Once, not at every step.
+    let [message] = &slave.log.messages()[..] else { panic!("{:?}", slave.log.messages()) };
+    assert!(
+        message.starts_with("the promise is refused (") && message.contains("goal is not met at 2.0"),
+        "{message}"
+    );
+    assert_eq!(slave.log.entries()[0].category, "logStatusWarning");
+    // A new start decides anew; somebody who carries the plant away ends the promise.
+    let fmu = Fmu::new(ASSURED);
+    let slave = Slave::ready(&fmu);
+    drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
+    sample(&slave, [-300.0, 0.0, 0.0, 0.0]);
+    slave.step(3.0 * STEP, STEP);
+    assert_eq!(slave.integer("assurance"), Standing::Withdrawn as i32);
+    assert!(slave.log.messages()[0].starts_with("the promise is withdrawn ("), "{:?}", slave.log.messages());
+    slave.set_flag("rearm", true);
+    sample(&slave, [0.0, 0.0, 1.0, 0.0]);
+    slave.step(4.0 * STEP, STEP);
+    assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+    // Late.
+    sample(&slave, [0.0, 0.0, 1.0, 0.0]);
+    slave.step(9.0 * STEP, STEP);
+    assert_eq!(slave.integer("assurance"), Standing::Irregular as i32);
+}
+
+/// Derivatives are those of the rows where the rows chose the input, and refused where a plan did.
+#[test]
+fn derivatives_are_given_or_refused() {
+    let (goal, _) = ASSURED.rsplit_once("[[barrier]]").expect("two barriers");
+    let fmu = Fmu::new(goal);
+    let slave = Slave::ready(&fmu);
+    let (unknown, known, seed, mut out) = (fmu.reference("u.a"), fmu.reference("x.v"), 1.0, f64::NAN);
+    let mut x = [0.0, 0.0, 1.0, 0.0];
+    let (mut given, mut refused) = (0, 0);
+    for k in 0..120 {
+        sample(&slave, x);
+        let backup = slave.integer("status") == Status::Backup as i32;
+        let c = slave.component;
+        let status = (API.directional_derivative)(
+            c,
+            &raw const unknown,
+            1,
+            &raw const known,
+            1,
+            &raw const seed,
+            &raw mut out,
+        );
+        if status == OK {
+            given += 1;
+            assert!(!backup && out.is_finite());
+        } else if slave.refused(status).contains("a plan chose the input") {
+            refused += 1;
+        }
+        x = drive(&slave, x, k, k + 1).1;
+    }
+    assert!(given > 5 && refused > 5, "{given} given, {refused} refused");
+}
