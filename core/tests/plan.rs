@@ -4,8 +4,8 @@
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, Commitment, Driver, FilterBuilder, FilterState, SafetyFilter, Sampling,
-    Standing, Status,
+    AssuredFilter, BarrierSettings, Commitment, Driver, FilterBuilder, FilterState, Infeasible, SafetyFilter,
+    Sampling, Standing, Status,
 };
 use punctual_core::plan::Failure;
 use punctual_reference::plants::{PointMass, Unicycle};
@@ -157,6 +157,42 @@ fn what_no_input_can_keep_is_refused() {
 }
 
 /// The least time in which a point mass gets from rest to rest over a distance d is 2√(d/a); inside earlier.
+/// A deadline that cannot be kept is given up for the soonest that can, where the barrier allows it, and that one is kept.
+#[test]
+fn the_soonest_deadline_is_taken_and_kept() {
+    for infeasible in [Infeasible::Report, Infeasible::Soonest] {
+        let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+        let settings = BarrierSettings { infeasible, ..BarrierSettings::within(2.0) };
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, goal, settings)
+            .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (mut x, mut u, mut deadline) = ([0.0, 0.0, -1.0, 2.0], [0.0; 2], 0.0);
+        for k in 0..400 {
+            let t = f64::from(k) * PERIOD;
+            let assurance = *filter.step(t, &x, &[-8.0, 8.0], &mut u).expect("right dimensions");
+            if infeasible == Infeasible::Report {
+                assert_eq!(assurance.standing, Standing::Refused);
+                break;
+            }
+            let goal = &filter.report().barriers[0];
+            assert!(assurance.is_assured() && goal.guaranteed && goal.postponed == 1, "{t}: {goal:?}");
+            if k == 0 {
+                // 20 m there and to a stop take 4.5 s at 4 m/s2; the disc's edge is nearer.
+                deadline = goal.time_left;
+                assert!((3.0..5.5).contains(&deadline), "{deadline}");
+            }
+            assert!((goal.time_left - (deadline - t).max(0.0)).abs() < 1e-9, "{t}: {goal:?}");
+            x = Vehicle::PointMass.move_by(x, u, PERIOD);
+            let distance = (x[0] - GOAL.0[0]).hypot(x[1] - GOAL.0[1]);
+            assert!(t + PERIOD < deadline || distance <= GOAL.1, "{t}: {x:?}");
+        }
+    }
+}
+
 #[test]
 fn the_soonest_deadline_is_near_what_physics_allows() {
     let goal = DistanceDisc::new([30.0, 0.0], 1.0, 1.0).expect("valid disc");

@@ -6,8 +6,8 @@ use alloc::vec::Vec;
 
 use super::slot::BarrierSlot;
 use super::{
-    Begin, End, FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative, Status, Strictness,
-    Workspace,
+    Begin, End, FilterState, Infeasible, NoDerivative, Report, SafetyFilter, SampleDerivative, Status,
+    Strictness, Workspace,
 };
 use crate::MAX_INPUTS;
 use crate::elementary;
@@ -498,11 +498,11 @@ impl AssuredFilter {
     /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
     /// deadline, or one without a deadline whose set `x` is outside of.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> {
-        self.promises(t, x, 1.0).into_iter().map(|promise| promise.is_some())
+        self.promises(t, x, |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
 
-    /// The promises from `x` at `t`, with every deadline `factor` times as long.
-    fn promises(&self, t: f64, x: &[f64], factor: f64) -> Vec<Option<Promise>> {
+    /// The promises from `x` at `t`, each deadline multiplied by the factor of its barrier.
+    fn promises(&self, t: f64, x: &[f64], factor: impl Fn(&BarrierSlot) -> f64) -> Vec<Option<Promise>> {
         let promise = |slot: &BarrierSlot| {
             // Not that of the report, which has none where u_ref is no number.
             let mut derivatives = Derivatives::ZERO;
@@ -512,7 +512,7 @@ impl AssuredFilter {
                 // Not-a-number is asked for at once, and found by the check.
                 _ if h.is_nan() || h >= 0.0 => t,
                 // A little earlier, so that round-off of a time is no gap.
-                Some(deadline) => t + factor * deadline - ON_TIME * self.period,
+                Some(deadline) => t + factor(slot) * deadline - ON_TIME * self.period,
                 None => return None,
             };
             let until = match slot.end {
@@ -533,49 +533,62 @@ impl AssuredFilter {
     ///
     /// What the nearest trial fails at.
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
-        let promises = self.promises(t, x, factor);
+        let promises = self.promises(t, x, |_| factor);
         self.planned(&promises, self.period, &[], |planner| planner.search(t, x)).map(|plan| plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
     /// twentieth, and that plan. None is looked for beyond `longest` times the deadlines.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        const FINE: f64 = 1.05;
-        const MOST_LONGER: f64 = 1e6;
-        // Twice as long until there is one, or half as long until there is none.
-        let longest = longest.min(MOST_LONGER);
-        let (mut low, mut high) = (1.0, 1.0);
-        let mut found = self.foresee(t, x, high).ok();
-        if found.is_some() {
-            while let Some(witness) = self.foresee(t, x, 0.5 * high).ok().filter(|_| high > 1e-3) {
-                (found, high) = (Some(witness), 0.5 * high);
-            }
-            low = 0.5 * high;
-        }
-        while found.is_none() && high < longest {
-            (low, high) = (high, (2.0 * high).min(longest));
-            found = self.foresee(t, x, high).ok();
-        }
-        let mut found = found?;
-        while high > FINE * low {
-            let middle = elementary::sqrt(low * high);
-            match self.foresee(t, x, middle) {
-                Ok(witness) => (found, high) = (witness, middle),
-                Err(_) => low = middle,
-            }
-        }
-        Some((high, found))
+        least_factor(longest, self.foresee(t, x, 1.0).ok(), |factor| self.foresee(t, x, factor).ok())
     }
 
-    /// Decides at the first sample: what is promised, and whether a plan keeps it.
+    /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
+    /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one.
     fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
-        self.next.promises = self.promises(t, x, 1.0);
-        match self.planned(&self.next.promises, hold, u, |planner| planner.search(t, x)) {
-            Ok(plan) => {
-                self.next.plan = plan;
+        /// The longest deadlines looked for, in units of those configured.
+        const LONGEST: f64 = 16.0;
+        let search =
+            |promises: &[Option<Promise>]| self.planned(promises, hold, u, |planner| planner.search(t, x));
+        let promises = self.promises(t, x, |_| 1.0);
+        let mut found = search(&promises).map(|plan| (1.0, (promises.clone(), plan)));
+        let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
+        if found.is_err() && self.filter.slots.iter().any(yields) {
+            let later = least_factor(LONGEST, None, |factor| {
+                let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+                let plan = search(&promises).ok()?;
+                Some((promises, plan))
+            });
+            found = later.map_or(found, Ok);
+        }
+        match found {
+            Ok((factor, (promises, plan))) => {
+                (self.next.promises, self.next.plan) = (promises, plan);
                 self.end(Standing::Assured, None);
+                self.postpone(t, hold, factor);
             }
-            Err(failure) => self.end(Standing::Refused, Some(failure)),
+            Err(failure) => {
+                self.next.promises = promises;
+                self.end(Standing::Refused, Some(failure));
+            }
+        }
+    }
+
+    /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield.
+    fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
+        let Workspace { next, report, .. } = &mut self.filter.workspace;
+        let states = next.barriers.iter_mut().zip(&self.filter.state.barriers);
+        for ((slot, (state, before)), b) in self.filter.slots.iter().zip(states).zip(&mut report.barriers) {
+            let settings = slot.promise.settings();
+            let Some(deadline) = settings.deadline else { continue };
+            if factor > 1.0 && settings.infeasible == Infeasible::Soonest && slot.now.in_force && b.h < 0.0 {
+                let stack = &slot.now.derivatives.drift[..slot.degree()];
+                slot.promise.anchor(state, t, stack, factor * deadline, hold);
+                // Once, whatever the rows had made of it.
+                state.postponed = before.postponed + 1;
+                b.remember(state);
+                (b.time_left, b.deadline_unreachable) = (state.deadline, false);
+            }
         }
     }
 
@@ -673,6 +686,36 @@ impl Looked {
         let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
         same(&[self.t, self.hold], &[t, hold]) && same(&self.x, x) && same(&self.u_ref, u_ref)
     }
+}
+
+/// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
+/// finds with 1. What is found with a factor is taken to be found with every larger one.
+fn least_factor<T>(longest: f64, mut found: Option<T>, find: impl Fn(f64) -> Option<T>) -> Option<(f64, T)> {
+    const FINE: f64 = 1.05;
+    const LEAST: f64 = 1e-3;
+    const MOST: f64 = 1e6;
+    // Twice as long until there is one, or half as long until there is none.
+    let longest = longest.min(MOST);
+    let (mut low, mut high) = (1.0, 1.0);
+    if found.is_some() {
+        while let Some(sooner) = find(0.5 * high).filter(|_| high > LEAST) {
+            (found, high) = (Some(sooner), 0.5 * high);
+        }
+        low = 0.5 * high;
+    }
+    while found.is_none() && high < longest {
+        (low, high) = (high, (2.0 * high).min(longest));
+        found = find(high);
+    }
+    let mut found = found?;
+    while high > FINE * low {
+        let middle = elementary::sqrt(low * high);
+        match find(middle) {
+            Some(sooner) => (found, high) = (sooner, middle),
+            None => low = middle,
+        }
+    }
+    Some((high, found))
 }
 
 /// Checks that every barrier runs the same plant ahead, at some states: a plan is one of all of them.

@@ -153,7 +153,8 @@ static KEYS: [Row; 33] = [
         "when_infeasible",
         Word(InfeasibleName::WORDS),
         Some("`report`"),
-        "`report`, or `soonest`: give up a deadline that the bounds certainly do not allow for a later one",
+        "`report`, or `soonest`: give up a deadline that the bounds certainly do not allow for a later one; with `assurance` one \
+         that no plan keeps, for the soonest that one does",
     ),
     plain(
         "priority",
