@@ -53,6 +53,7 @@ fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error>
                 label: disc.label.clone().unwrap_or_default(),
                 centre: disc.centre,
                 radius: disc.radius,
+                obstacle: false,
             })
             .collect(),
     })

@@ -1,6 +1,6 @@
 //! `punctual check`: findings on a configuration before anything is built.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
@@ -11,6 +11,7 @@ use punctual_fmu::configuration::{
 use serde::Serialize;
 
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
+use super::map::{self, MapReport, Plane};
 use super::witness::{self, WitnessReport};
 use crate::coupling::Kept;
 use crate::error::Error;
@@ -38,6 +39,19 @@ pub struct Arguments {
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
     #[arg(long)]
     effort: bool,
+    /// Draw which starts can be promised, over two states: "x_p=-5..25,y_p=-5..15"; the others are as in the start, or 0
+    #[arg(long, value_name = "RANGES", allow_hyphen_values = true)]
+    map: Option<String>,
+    /// Starts along each side of --map
+    #[arg(long, value_name = "NUMBER", default_value_t = 25, requires = "map", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1000))]
+    cells: usize,
+    /// The folder for the pictures of the plan and of --map
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        default_value_if("map", clap::builder::ArgPredicate::IsPresent, "out")
+    )]
+    out: Option<PathBuf>,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -67,6 +81,9 @@ struct FilterReport {
     /// The plan that keeps every promise whatever u_ref is, where every input has bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     witness: Option<WitnessReport>,
+    /// The starts that can be promised, where they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    map: Option<MapReport>,
     /// Inputs that profiles and rates need, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
@@ -199,8 +216,19 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 }
                 _ => None,
             };
-            let mut report = filter(&configuration, start, &wanted).map_err(|e| e.in_file(file))?;
+            let plane = arguments
+                .map
+                .as_ref()
+                .map(|text| Plane::parse(text, arguments.cells, &configuration))
+                .transpose()?;
+            let out = arguments.out.as_deref();
+            let zeros = || vec![0.0; measured(&configuration).len()];
+            let from = start.clone().unwrap_or_else(zeros);
+            let mut report = filter(&configuration, start, &wanted, out).map_err(|e| e.in_file(file))?;
             report.effort = effort;
+            if let (Some(plane), Some(folder)) = (plane, out) {
+                report.map = Some(map::starts(&configuration, &from, &plane, folder)?);
+            }
             // Tell, and decide the exit code.
             if arguments.json {
                 output::json(&report);
@@ -295,7 +323,12 @@ fn measured(c: &FilterConfiguration) -> Vec<String> {
     states.chain(c.barrier_inputs().into_iter().map(|input| input.name)).collect()
 }
 
-fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> Result<FilterReport, Error> {
+fn filter(
+    c: &FilterConfiguration,
+    start: Option<Vec<f64>>,
+    wanted: &Wanted,
+    out: Option<&Path>,
+) -> Result<FilterReport, Error> {
     let mut filter = c.build()?;
     let inputs = c.plant.inputs().len();
     // The first step from the start, then the closed loops.
@@ -309,7 +342,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
     let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
     let damped = simulated.filter(|_| failed && *wanted == Wanted::None && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
-    let witness = simulated.map(|x0| witness::find(c, x0)).transpose()?.flatten();
+    let witness = simulated.map(|x0| witness::find(c, x0, out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
     let degrees: Vec<usize> = filter.relative_degrees().collect();
@@ -426,6 +459,7 @@ fn filter(c: &FilterConfiguration, start: Option<Vec<f64>>, wanted: &Wanted) -> 
         closed_loop,
         with_damping,
         witness,
+        map: None,
         effort: None,
     })
 }
@@ -545,6 +579,10 @@ fn filter_text(report: &FilterReport) -> String {
         lines.push(run.head());
     }
     lines.extend(report.witness.iter().map(WitnessReport::text));
+    if let Some(map) = &report.map {
+        let files = map.files.join("\n         ");
+        lines.push(format!("\n{} of {} starts can be promised\nwritten: {files}", map.promised, map.of));
+    }
     if let Some(ratings) = &report.effort {
         let wanted = report.closed_loop.as_ref().map_or("", |run| &run.u_ref);
         lines.push(closed_loop::ratings_text(ratings, wanted));

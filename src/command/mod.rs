@@ -6,6 +6,7 @@ pub mod check;
 mod closed_loop;
 pub mod demo;
 pub mod inspect;
+mod map;
 pub mod merge;
 pub mod replay;
 pub mod reproduce;

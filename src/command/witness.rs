@@ -1,9 +1,12 @@
 //! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
 
+use std::path::Path;
+
 use punctual_core::plan::Witness;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
+use super::map;
 use crate::error::Error;
 use crate::output::number;
 
@@ -26,6 +29,9 @@ pub(super) struct WitnessReport {
     soonest: Vec<(String, f64)>,
     /// The plan with the configured deadlines, or else with the soonest.
     plan: Option<PlanReport>,
+    /// Pictures of it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    files: Vec<String>,
 }
 
 /// A plan that was checked.
@@ -39,8 +45,12 @@ struct PlanReport {
     tightest: Option<(String, f64, f64, String)>,
 }
 
-/// The finding for the start `x0`; `None` where an input has no bounds, so that nothing is ruled out.
-pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<WitnessReport>, Error> {
+/// The finding for the start `x0`, whose plan is drawn into the folder `out` if there is one; `None` where an input has no bounds, so that nothing is ruled out.
+pub(super) fn find(
+    c: &FilterConfiguration,
+    x0: &[f64],
+    out: Option<&Path>,
+) -> Result<Option<WitnessReport>, Error> {
     let inputs = c.plant.inputs();
     let bounds = |name: &str| c.bounds.get(name).copied().filter(|b| b.iter().all(|b| b.abs() < UNBOUNDED));
     if inputs.iter().any(|input| bounds(&input.name).is_none()) {
@@ -53,6 +63,7 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
         soonest_factor: None,
         soonest: Vec::new(),
         plan: None,
+        files: Vec::new(),
     };
     let filter = match c.assured(c.build()?) {
         Ok(filter) => filter,
@@ -85,13 +96,19 @@ pub(super) fn find(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Witness
         let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
         given.collect::<Vec<_>>()
     };
+    let shown = configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness));
+    let files = match (out, shown) {
+        (Some(folder), Some(witness)) => map::plan(c, (&filter, witness), (t, x0), folder)?,
+        _ => Vec::new(),
+    };
     Ok(Some(WitnessReport {
         found: configured.is_ok(),
         reason,
         left_out,
         soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
         soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
-        plan: configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness)).map(plan),
+        plan: shown.map(plan),
+        files,
     }))
 }
 
@@ -133,6 +150,9 @@ impl WitnessReport {
                 let (slack, time) = (number(*slack), number(*time));
                 lines.push(format!("its tightest place: {barrier} at {time} s, {slack} {unit} inside"));
             }
+        }
+        if !self.files.is_empty() {
+            lines.push(format!("written: {}", self.files.join("\n         ")));
         }
         lines.join("\n")
     }

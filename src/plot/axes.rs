@@ -1,7 +1,7 @@
 //! A rectangle with two axes: grid, frame, ticks, labels; and curves inside it.
 
 use super::Disc;
-use super::canvas::{Anchor, Canvas, FRAME, GRID, INK, Pen, Point, SAFE, text_width};
+use super::canvas::{Anchor, Canvas, FRAME, GRID, INK, Pen, Point, text_width};
 use super::scale::Axis;
 
 /// Size of tick labels in pixels.
@@ -71,7 +71,8 @@ impl Axes {
         canvas.clipped(self.area, |canvas| {
             for disc in discs {
                 let centre = self.place(disc.centre[0], disc.centre[1]);
-                canvas.circle(centre, disc.radius * pixels, (SAFE, 0.18), Pen::solid(SAFE, 1.2));
+                let colour = disc.colour();
+                canvas.circle(centre, disc.radius * pixels, (colour, 0.18), Pen::solid(colour, 1.2));
             }
         });
     }

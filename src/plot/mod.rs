@@ -6,6 +6,7 @@ mod canvas;
 mod chart;
 mod decimate;
 mod legend;
+mod map;
 mod path;
 mod scale;
 mod time;
@@ -75,6 +76,39 @@ pub struct Disc {
     pub centre: [f64; 2],
     /// Its radius, in the units of the axes, finite, > 0.
     pub radius: f64,
+    /// Whether its outside is the safe set.
+    pub obstacle: bool,
+}
+
+impl Disc {
+    fn colour(&self) -> [u8; 3] {
+        if self.obstacle { colour(1) } else { canvas::SAFE }
+    }
+}
+
+/// Cells of a plane in the colours of what was found there.
+#[derive(Clone, Debug, Default)]
+pub struct MapPlot {
+    /// Title; empty for none.
+    pub title: String,
+    /// Label of the x axis, with its unit.
+    pub x_label: String,
+    /// Label of the y axis, with its unit.
+    pub y_label: String,
+    /// From and to along x, in the unit of the axis, finite.
+    pub x: [f64; 2],
+    /// From and to along y.
+    pub y: [f64; 2],
+    /// Number of cells along x.
+    pub columns: usize,
+    /// The kind of each cell, row after row from below: a position in `kinds`.
+    pub cells: Vec<usize>,
+    /// What the kinds mean. The first has the colour of safe sets.
+    pub kinds: Vec<String>,
+    /// Whether a unit has the same length on both axes; discs need it.
+    pub equal: bool,
+    /// Discs over the cells.
+    pub discs: Vec<Disc>,
 }
 
 /// Signals over time.
@@ -168,6 +202,17 @@ pub enum Scale {
 pub fn path(plot: &PathPlot, file: &File) -> Result<(), Error> {
     let mut canvas = Canvas::new(ALONE, path::WIDTH, path::HEIGHT);
     path::draw(plot, &mut canvas).map_err(|message| Error::plot(file, message))?;
+    canvas.save(file)
+}
+
+/// Draws a [`MapPlot`] into the SVG file `file`.
+///
+/// # Errors
+///
+/// No cell, or the file cannot be written.
+pub fn map(plot: &MapPlot, file: &File) -> Result<(), Error> {
+    let mut canvas = Canvas::new(ALONE, map::WIDTH, map::HEIGHT);
+    map::draw(plot, &mut canvas).map_err(|message| Error::plot(file, message))?;
     canvas.save(file)
 }
 

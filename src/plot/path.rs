@@ -1,7 +1,7 @@
 //! Paths in a plane, drawn with equal axes.
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, Pen, SAFE};
+use super::canvas::{Anchor, Canvas, INK, Pen};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent};
@@ -68,7 +68,8 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     }
     for disc in plot.discs.iter().filter(|disc| !disc.label.is_empty()) {
         if !entries.iter().any(|(_, text)| *text == disc.label) {
-            entries.push((Key::Patch(SAFE, 0.18, Pen::solid(SAFE, 1.2)), disc.label.clone()));
+            entries
+                .push((Key::Patch(disc.colour(), 0.18, Pen::solid(disc.colour(), 1.2)), disc.label.clone()));
         }
     }
     entries

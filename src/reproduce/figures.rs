@@ -146,7 +146,7 @@ fn trajectories(vehicle: Vehicle) -> Result<Figure, Error> {
             path(&existing, "finite-time HOCBF, p = 1, 1, q = 0.5", 3, Style::Dashed),
             path(&searched, "finite-time HOCBF, p = 4, 4, q = 0.5, distance, damping", 4, Style::Dashed),
         ],
-        discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS }],
+        discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS, obstacle: false }],
         ..Chart::default()
     };
     Ok(Figure {

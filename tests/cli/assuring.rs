@@ -135,3 +135,37 @@ fn a_campaign_counts_where_promises_stood() {
         assert!(again.contains("the row is as recorded, bit for bit"), "{again}");
     }
 }
+
+/// Pictures of the plan, and of the starts that can be promised: those near the goal, not those far from it.
+#[test]
+fn starts_that_can_be_promised_are_drawn() {
+    let workshop = Workshop::new();
+    workshop.write("filter.toml", filter("off", 4.0, ""));
+    let map =
+        ["check", "filter.toml", "--x0", "theta=0.46", "--map", "x_p=-40..40,y_p=0..20", "--cells", "4"];
+    let done = workshop.punctual(map);
+    assert!(
+        done.stdout.contains(" of 16 starts can be promised\nwritten: out/filter-map.svg\n"),
+        "{done:#?}"
+    );
+    for file in ["out/filter-map.svg", "out/filter-plan.svg", "out/filter-path.svg"] {
+        assert!(workshop.text(file).starts_with("<svg"), "{file}");
+    }
+    let table = workshop.text("out/filter-map.csv");
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!((rows.len(), &rows[0][..]), (17, &["x_p", "y_p", "found"][..]));
+    for row in &rows[1..] {
+        let x: f64 = row[0].parse().expect("a number");
+        // From 50 m away no acceleration of 4 m/s2 is there and stops in 4 s; the nearest start is 12 m from the goal.
+        let wanted = if x < 0.0 { "no plan keeps goal" } else { "can be promised" };
+        assert_eq!(row[2], wanted, "{row:?}");
+    }
+    for (ranges, message) in [
+        ("x_p=0..1", "is \"x_p=0..1\", must be two states, like \"x_p=-5..25,y_p=-5..15\""),
+        ("x_p=0..1,z=0..1", "\"z\" is no state, must be one of x_p, y_p, theta, v"),
+        ("x_p=1..0,y_p=0..1", "has \"x_p=1..0\", must go from less to more"),
+        ("x_p=0..nan,y_p=0..1", "has \"x_p=0..nan\", must be like \"x_p=-5..25\""),
+    ] {
+        workshop.punctual(["check", "filter.toml", "--map", ranges]).fails(2, &format!("--map: {message}"));
+    }
+}

@@ -299,7 +299,13 @@ fn each_dependency_is_named_in_one_place() {
         (&["rand_chacha", ":", ":"], &["src/campaign/sampling.rs"]),
         (
             &["rayon", ":", ":"],
-            &["src/campaign/runner.rs", "src/reproduce/", "python/src/pool.rs", "python/src/batch.rs"],
+            &[
+                "src/campaign/runner.rs",
+                "src/command/map.rs",
+                "src/reproduce/",
+                "python/src/pool.rs",
+                "python/src/batch.rs",
+            ],
         ),
         (&["pyo3", ":", ":"], &["python/src/"]),
         (

@@ -534,7 +534,8 @@ impl AssuredFilter {
     /// What the nearest trial fails at.
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
         let promises = self.promises(t, x, |_| factor);
-        self.planned(&promises, self.period, &[], |planner| planner.search(t, x)).map(|plan| plan.witness)
+        self.planned(&promises, (t, self.period), &[], |planner| planner.search(t, x))
+            .map(|plan| plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
@@ -548,8 +549,9 @@ impl AssuredFilter {
     fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
         /// The longest deadlines looked for, in units of those configured.
         const LONGEST: f64 = 16.0;
-        let search =
-            |promises: &[Option<Promise>]| self.planned(promises, hold, u, |planner| planner.search(t, x));
+        let search = |promises: &[Option<Promise>]| {
+            self.planned(promises, (t, hold), u, |planner| planner.search(t, x))
+        };
         let promises = self.promises(t, x, |_| 1.0);
         let mut found = search(&promises).map(|plan| (1.0, (promises.clone(), plan)));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
@@ -596,7 +598,7 @@ impl AssuredFilter {
     fn planned<R>(
         &self,
         promises: &[Option<Promise>],
-        period: f64,
+        (t, period): (f64, f64),
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
@@ -613,7 +615,8 @@ impl AssuredFilter {
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
         let source = &*self.filter.slots[0].source;
         let planner = Planner::new(source, &self.filter.bounds, &requirements, period, size);
-        f(&planner.ok_or(Failure::Singular)?)
+        let irregular = !self.is_regular(t, period);
+        f(&planner.ok_or(Failure::Singular)?.irregular(irregular))
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
@@ -626,7 +629,7 @@ impl AssuredFilter {
             *w = self.filter.bounds.clamp(i, u_ref[i]);
         }
         let plan = &self.next.plan;
-        let found = self.planned(&self.next.promises, hold, u, |planner| {
+        let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
             if reached
                 && wanted.iter().zip(u_ref).all(|(w, r)| w == r)
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
@@ -662,7 +665,7 @@ impl AssuredFilter {
             }
             Err(failure) => failure,
         };
-        match self.planned(&self.next.promises, hold, u, |planner| planner.search(t, x)) {
+        match self.planned(&self.next.promises, (t, hold), u, |planner| planner.search(t, x)) {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.plan = plan;

@@ -47,6 +47,24 @@ pub struct Witness {
     pub effort: f64,
 }
 
+impl Witness {
+    /// The mean input from `t` until `end` > `t`.
+    pub(super) fn mean(&self, t: f64, end: f64) -> [f64; MAX_INPUTS] {
+        let (mut mean, mut at) = ([0.0; MAX_INPUTS], t);
+        let last = self.inputs.last().map(|(_, u)| (f64::INFINITY, *u));
+        for (until, u) in self.inputs.iter().copied().chain(last) {
+            let until = until.min(end);
+            if until > at {
+                for (mean, u) in mean.iter_mut().zip(u) {
+                    *mean += u * (until - at) / (end - t);
+                }
+                at = until;
+            }
+        }
+        mean
+    }
+}
+
 /// Where h − margin is least.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -85,6 +103,22 @@ pub enum Failure {
     Singular,
 }
 
+/// The samples of a roll-out.
+#[derive(Clone, Copy)]
+pub(super) struct Grid {
+    /// The time in s for which the input of the first one is held.
+    pub(super) period: f64,
+    /// Whether the others follow in the same period, so that inputs change then; else they come as the plan has them.
+    pub(super) even: bool,
+}
+
+impl Grid {
+    /// By how much an end lies past a sample at least, in s: what it is meant to be is not that sample.
+    pub(super) fn slack(&self) -> f64 {
+        self.period * if self.even { 0.5 } else { ON_TIME }
+    }
+}
+
 /// A roll-out in progress.
 pub(super) struct Walk<'a> {
     model: Model<'a>,
@@ -98,18 +132,17 @@ pub(super) struct Walk<'a> {
     at: Vec<Derivatives>,
     witness: Witness,
     started: f64,
-    /// The sampling period in s: inputs change at samples.
-    period: f64,
+    grid: Grid,
 }
 
 impl<'a> Walk<'a> {
     /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin. Samples
-    /// are `period` s apart.
+    /// are those of `grid`.
     pub(super) fn new(
         model: Model<'a>,
         requirements: &'a [Requirement<'a>],
         strictness: f64,
-        period: f64,
+        grid: Grid,
         (t, x): (f64, &[f64]),
     ) -> Result<Self, Failure> {
         let mut walk = Self {
@@ -122,7 +155,7 @@ impl<'a> Walk<'a> {
             at: vec![Derivatives::ZERO; requirements.len()],
             witness: Witness { rates: vec![0.0; x.len()], ..Witness::default() },
             started: t,
-            period,
+            grid,
         };
         for i in 0..requirements.len() {
             walk.evaluate(i)?;
@@ -166,11 +199,12 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Holds `u` until the sample that `end` is meant to be: the nearest, where samples have come to lie elsewhere.
+    /// Holds `u` until `end`, or where samples are even and have come to lie elsewhere until the nearest.
     pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
-        let samples = ((end - self.started) / self.period + 0.5) as u64;
-        let sample = self.started + samples as f64 * self.period;
-        let end = if (sample - end).abs() <= ON_TIME * self.period { end } else { sample };
+        let Grid { period, even } = self.grid;
+        let samples = ((end - self.started) / period + 0.5) as u64;
+        let sample = self.started + samples as f64 * period;
+        let end = if !even || (sample - end).abs() <= ON_TIME * period { end } else { sample };
         // Time is too large to tell samples apart.
         if end.is_nan() || end <= self.t {
             return Err(Failure::Singular);
@@ -296,17 +330,25 @@ impl<'a> Walk<'a> {
     /// Follows the rest of `reference`.
     pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
         let mut u = vec![0.0; self.model.inputs()];
-        while let Some(k) = reference.hold_at(self.t, self.period) {
+        while let Some(k) = reference.hold_at(self.t, self.grid.slack()) {
             reference.input(&self.model, k, self.t, &self.x, &mut u);
             self.hold_until(&u, reference.times[k + 1])?;
         }
         Ok(())
     }
 
+    /// Holds the input of `reference` here until `end`.
+    pub(super) fn follow_until(&mut self, reference: &Reference, end: f64) -> Result<(), Failure> {
+        let mut u = vec![0.0; self.model.inputs()];
+        let Some(k) = reference.hold_at(self.t, self.grid.slack()) else { return Ok(()) };
+        reference.input(&self.model, k, self.t, &self.x, &mut u);
+        self.hold_until(&u, end)
+    }
+
     /// Brakes until the plant is at rest where it can stay for ever.
     pub(super) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
-        let hold = brake.hold.max(self.period);
+        let hold = brake.hold.max(self.grid.period);
         for _ in 0..BRAKING {
             brake.input(&self.model, &self.x, &mut u);
             let rate = self.model.rate(&self.x, &u, hold);

@@ -136,11 +136,10 @@ impl Reference {
             && gains.iter().all(|gain| is_of(&gain.0, inputs * states))
     }
 
-    /// The number of the hold that the sample at `t` begins or lies in, if one is left; samples are `period` s apart.
-    pub(super) fn hold_at(&self, t: f64, period: f64) -> Option<usize> {
-        // A time that is a sum of steps counts as the sample it is meant to be.
+    /// The number of the first hold that ends more than `slack` s after `t`, if one is left.
+    pub(super) fn hold_at(&self, t: f64, slack: f64) -> Option<usize> {
         let ends = self.times.get(1..)?;
-        ends.iter().position(|end| *end > t + 0.5 * period)
+        ends.iter().position(|end| *end > t + slack)
     }
 
     /// Writes the input for the rest of hold `k`, at time `t` and `x`.

@@ -4,11 +4,12 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::check::{Failure, Walk, Witness};
+use super::check::{Failure, Grid, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use super::search::{Descent, Search, Trajectory};
 use super::{Plan, Requirement};
+use crate::MAX_INPUTS;
 use crate::lie::{DerivativeSource, Predict};
 use crate::qp::Bounds;
 
@@ -49,6 +50,8 @@ pub struct Planner<'a> {
     period: f64,
     /// The size of an input that has no bounds.
     size: f64,
+    /// Whether samples come as those before did.
+    regular: bool,
 }
 
 impl<'a> Planner<'a> {
@@ -62,7 +65,13 @@ impl<'a> Planner<'a> {
         size: f64,
     ) -> Option<Self> {
         let dims = [source.state_dim(), source.input_dim()];
-        Some(Self { plant: source.predict()?, dims, bounds, requirements, period, size })
+        Some(Self { plant: source.predict()?, dims, bounds, requirements, period, size, regular: true })
+    }
+
+    /// The same planner at a sample that did not come as those before did, or is held for another time.
+    #[must_use]
+    pub fn irregular(self, irregular: bool) -> Self {
+        Self { regular: !irregular, ..self }
     }
 
     fn model(&self, step: f64) -> Model<'a> {
@@ -182,7 +191,8 @@ impl<'a> Planner<'a> {
             witness: Witness::default(),
             step: model.step,
         };
-        plan.witness = self.walk(&plan, 1.0, times[0], x, None, true)?;
+        let grid = Grid { period: self.period, even: true };
+        plan.witness = self.walk(&plan, 1.0, grid, (times[0], x), None, true)?;
         Ok(plan)
     }
 
@@ -193,13 +203,16 @@ impl<'a> Planner<'a> {
     ///
     /// What the first of these fails at.
     pub fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
-        let has_reference =
-            plan.reference.as_ref().is_some_and(|r| r.hold_at(t + self.period, self.period).is_some());
-        if !has_reference {
-            return self.walk(plan, 1.0, t, x, Some(u), false);
-        }
-        self.walk(plan, 1.0, t, x, Some(u), true)
-            .or_else(|failure| self.walk(plan, 1.0, t, x, Some(u), false).map_err(|_| failure))
+        self.on_a_grid(|grid| {
+            let at = t + self.period;
+            let has_reference =
+                plan.reference.as_ref().is_some_and(|r| r.hold_at(at, grid.slack()).is_some());
+            let walk = |follows| self.walk(plan, 1.0, grid, (t, x), Some(u), follows);
+            match has_reference {
+                true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
+                false => walk(false),
+            }
+        })
     }
 
     /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are, or the feedback along its
@@ -211,27 +224,51 @@ impl<'a> Planner<'a> {
     pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
-        let replay = || {
-            let mut walk = self.begin(plan, KEPT, t, x)?;
+        let replay = |grid: Grid| {
+            let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
+            let mut hold = |mut u: [f64; MAX_INPUTS], end: f64| {
+                self.model(plan.step).clamp(&mut u[..nu]);
+                walk.hold_until(&u[..nu], end)
+            };
+            if !grid.even {
+                at += grid.period;
+                hold(plan.witness.mean(t, at), at)?;
+            }
             for (end, u) in &plan.witness.inputs {
-                if *end > at + 0.5 * self.period {
-                    let mut u = *u;
-                    self.model(plan.step).clamp(&mut u[..nu]);
-                    walk.hold_until(&u[..nu], *end)?;
+                if *end > at + grid.slack() {
+                    hold(*u, *end)?;
                     at = *end;
                 }
             }
             walk.stop(brake)
         };
-        replay().or_else(|failure| {
-            let follow = |follows| self.walk(plan, KEPT, t, x, None, follows);
-            follow(true).or_else(|_| follow(false)).map_err(|_| failure)
+        self.on_a_grid(|grid| {
+            replay(grid).or_else(|failure| {
+                let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
+                follow(true).or_else(|_| follow(false)).map_err(|_| failure)
+            })
         })
     }
 
-    fn begin(&self, plan: &Plan, strictness: f64, t: f64, x: &[f64]) -> Result<Walk<'a>, Failure> {
-        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, self.period, (t, x))?;
+    /// What `find` finds for samples in the present period; else, where the plan was made for another, for those that it
+    /// was made for from the next one on.
+    fn on_a_grid(&self, find: impl Fn(Grid) -> Result<Witness, Failure>) -> Result<Witness, Failure> {
+        let grid = Grid { period: self.period, even: true };
+        find(grid).or_else(|failure| match self.regular {
+            true => Err(failure),
+            false => find(Grid { even: false, ..grid }).map_err(|_| failure),
+        })
+    }
+
+    fn begin(
+        &self,
+        plan: &Plan,
+        strictness: f64,
+        grid: Grid,
+        start: (f64, &[f64]),
+    ) -> Result<Walk<'a>, Failure> {
+        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, grid, start)?;
         Ok(walk.after(&plan.witness))
     }
 
@@ -239,16 +276,19 @@ impl<'a> Planner<'a> {
         &self,
         plan: &Plan,
         strictness: f64,
-        t: f64,
-        x: &[f64],
+        grid: Grid,
+        (t, x): (f64, &[f64]),
         first: Option<&[f64]>,
         follows: bool,
     ) -> Result<Witness, Failure> {
-        let mut walk = self.begin(plan, strictness, t, x)?;
+        let mut walk = self.begin(plan, strictness, grid, (t, x))?;
         if let Some(u) = first {
             walk.hold_until(u, t + self.period)?;
         }
         if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
+            if first.is_none() && !grid.even {
+                walk.follow_until(reference, t + self.period)?;
+            }
             walk.follow(reference)?;
         }
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };

@@ -54,7 +54,7 @@ fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
         x_label: "x_p (m)".into(),
         y_label: "y_p (m)".into(),
         paths: lines,
-        discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS }],
+        discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS, obstacle: false }],
     })
 }
 
