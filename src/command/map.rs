@@ -1,7 +1,7 @@
 //! Pictures of `check`: the plan from the start, and the starts from which there is one.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -244,6 +244,6 @@ fn discs(c: &FilterConfiguration) -> Vec<Disc> {
     c.barrier.iter().filter_map(|b| disc(&b.name, &b.shape)).collect()
 }
 
-fn shown(file: &PathBuf) -> String {
-    file.display().to_string()
+fn shown(file: impl AsRef<Path>) -> String {
+    file.as_ref().display().to_string()
 }

@@ -25,6 +25,8 @@ const WORTH: f64 = 0.01;
 const SEARCHED: f64 = 3.0;
 /// Margins for the rest of a plan that was checked before: the model differs from the plant by round-off at least.
 const KEPT: f64 = 0.5;
+/// Margins for another input where the next sample may come at any time: what is left is for the plan to move by.
+const WARY: f64 = 4.0;
 /// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
 const TIGHTENED: u32 = 4;
 const TIGHTENING: u32 = 4;
@@ -207,7 +209,8 @@ impl<'a> Planner<'a> {
             let at = t + self.period;
             let has_reference =
                 plan.reference.as_ref().is_some_and(|r| r.hold_at(at, grid.slack()).is_some());
-            let walk = |follows| self.walk(plan, 1.0, grid, (t, x), Some(u), follows);
+            let strictness = if self.regular { 1.0 } else { WARY };
+            let walk = |follows| self.walk(plan, strictness, grid, (t, x), Some(u), follows);
             match has_reference {
                 true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
                 false => walk(false),
