@@ -4,8 +4,8 @@
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, Commitment, Driver, FilterBuilder, FilterState, Infeasible, SafetyFilter,
-    Sampling, Standing, Status,
+    AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
+    Phase, SafetyFilter, Sampling, Standing, Status,
 };
 use punctual_core::plan::Failure;
 use punctual_reference::plants::{PointMass, Unicycle};
@@ -322,6 +322,84 @@ fn steps_of_other_lengths_keep_the_promise_or_end_it() {
     }
     println!("steps of other lengths: {kept} kept, {ended} ended");
     assert!(kept + ended == 12 && kept >= 6, "{kept} kept, {ended} ended");
+}
+
+/// A set that is let go on arrival is promised until then, and no longer.
+#[test]
+fn what_is_let_go_on_arrival_is_not_promised_after() {
+    let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, disc, BarrierSettings::within(8.0))
+        .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
+        .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
+        .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+    let (mut x, mut u, mut released) = ([0.0; 4], [0.0; 2], false);
+    for k in 0..500 {
+        let t = f64::from(k) * PERIOD;
+        let assurance = *filter.step(t, &x, &[3.0, 1.8], &mut u).expect("right dimensions");
+        let goal = &filter.report().barriers[0];
+        released |= goal.phase == Phase::Released;
+        assert!(assurance.is_assured() && goal.guaranteed != released, "{t}: {goal:?}");
+        // Free to drive on.
+        assert!(!released || u == [3.0, 1.8], "{t}: {u:?}");
+        x = Vehicle::PointMass.move_by(x, u, PERIOD);
+    }
+    assert!(released);
+}
+
+/// Steps of any size end, and none takes long.
+#[test]
+fn tiny_and_huge_steps_are_answered() {
+    for first in [1e-12, 1e-9, 1e-6, 1e-4, 0.02, 5.0, 1e5, 1e300] {
+        let vehicle = Vehicle::Unicycle;
+        let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
+        let (mut t, mut x) = (0.0, [0.0, 0.0, -0.4, 1.0]);
+        for hold in [first, 0.02, 1e18, 1e-12] {
+            filter.expect_hold(Some(hold)).expect("a time");
+            let mut u = [0.0; 2];
+            let assurance = *filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions");
+            assert!(u[0].abs() <= 6.0 && u[1].abs() <= 2.0, "{first} s: {assurance:?}");
+            assert!(first != 0.02 || t > 0.02 || assurance.is_assured(), "{assurance:?}");
+            x = vehicle.move_by(x, u, hold.min(0.02));
+            t += hold;
+        }
+    }
+}
+
+/// Pushed against the edge for ever: the margin is kept, the input settles, and the plan does not grow.
+#[test]
+fn a_vehicle_at_the_edge_comes_to_rest_there() {
+    for margin in [0.02, 0.0] {
+        let disc = DistanceDisc::new([0.0; 2], 2.0, 1.0).expect("valid disc");
+        let settings = BarrierSettings { margin, ..BarrierSettings::keeping() };
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("room", PointMass, disc, settings)
+            .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (mut x, mut last, mut jump) = ([0.0; 4], [0.0; 2], 0.0_f64);
+        for k in 0..3000 {
+            let (t, mut u) = (f64::from(k) * PERIOD, [0.0; 2]);
+            let assurance = *filter.step(t, &x, &[2.0, 0.0], &mut u).expect("right dimensions");
+            let holds = filter.plan().map_or(0, |plan| plan.inputs.len());
+            assert!(assurance.is_assured() && holds < 300, "{t}: {assurance:?}, {holds} holds");
+            x = Vehicle::PointMass.move_by(x, u, PERIOD);
+            let h = 2.0 - x[0].hypot(x[1]);
+            assert!(h > 0.9 * margin, "{t}: {h}");
+            if t > 20.0 {
+                jump = jump.max((u[0] - last[0]).abs());
+            }
+            last = u;
+        }
+        println!("at the edge: h = {}, jumps of {jump} m/s2", 2.0 - x[0].hypot(x[1]));
+        // A fraction of what is pushed with.
+        assert!(jump < 0.5, "{jump}");
+    }
 }
 
 #[test]

@@ -32,8 +32,8 @@ pub(crate) struct Filter {
     x: Vec<f64>,
     u_ref: Vec<f64>,
     u: Vec<f64>,
-    /// Time of the last step, in s.
-    t: f64,
+    /// Time of the last step with a valid state, in s, and that state.
+    seen: (f64, Vec<f64>),
 }
 
 #[pymethods]
@@ -51,7 +51,7 @@ impl Filter {
             x: vec![0.0; states],
             u_ref: vec![0.0; inputs],
             u: vec![0.0; inputs],
-            t: 0.0,
+            seen: (0.0, vec![0.0; states]),
             interface,
             configuration,
         })
@@ -99,7 +99,10 @@ impl Filter {
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
         own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
-        self.t = t;
+        if t.is_finite() && self.x.iter().all(|x| x.is_finite()) {
+            self.seen.0 = t;
+            self.seen.1.copy_from_slice(&self.x);
+        }
         let (report, standing) = (own.filter().filter().report(), own.filter().standing());
         Ok(Step::new(py, &self.u, report, standing.map(|(standing, _)| standing), &self.names))
     }
@@ -108,7 +111,7 @@ impl Filter {
     #[getter]
     fn plan(&mut self, py: Python<'_>) -> PyResult<Option<Plan>> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        Plan::of(py, own.filter(), (self.t, &self.x), self.u.len())
+        Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), self.u.len())
     }
 
     /// Why there is no plan, where the promise was refused or withdrawn.

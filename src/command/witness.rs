@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use punctual_core::filter::AssuredFilter;
 use punctual_core::plan::Witness;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
@@ -9,9 +10,6 @@ use serde::Serialize;
 use super::map;
 use crate::error::Error;
 use crate::output::number;
-
-/// The longest deadlines looked for, in units of the configured ones.
-const LONGEST: f64 = 4.0;
 
 /// The finding on plans from the start.
 #[derive(Serialize)]
@@ -90,7 +88,7 @@ pub(super) fn find(
     let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let soonest = if has_deadline { filter.soonest(t, x0, LONGEST) } else { None };
+    let soonest = if has_deadline { filter.soonest(t, x0, AssuredFilter::LONGEST) } else { None };
     let reason = configured.as_ref().err().map(|failure| c.failure(*failure));
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
@@ -134,7 +132,7 @@ impl WitnessReport {
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
         } else if !self.found && self.plan.is_none() {
-            lines.push("no longer deadline with a plan was found".to_owned());
+            lines.push(format!("no deadline up to {} times as long has a plan", AssuredFilter::LONGEST));
         }
         if let Some(plan) = &self.plan {
             let inputs: Vec<_> = plan

@@ -6,21 +6,21 @@ use alloc::vec::Vec;
 
 use super::slot::BarrierSlot;
 use super::{
-    Begin, End, FilterState, Infeasible, NoDerivative, Report, SafetyFilter, SampleDerivative, Status,
+    Begin, End, FilterState, Infeasible, NoDerivative, Phase, Report, SafetyFilter, SampleDerivative, Status,
     Strictness, Workspace,
 };
 use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Derivatives, Direction};
-use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Witness};
+use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
 use crate::scalar::all_finite;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
 const MARGIN: f64 = 1e-4;
 /// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
-/// Halvings between the input of the plan and the one that is preferred.
+/// Halvings between an input and the one that is preferred.
 const BISECTIONS: u32 = 4;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
@@ -34,6 +34,8 @@ pub enum Driver {
     /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
     #[default]
     Rows,
+    /// The rows, as near to u_ref as a comfortable plan allows.
+    Eased,
     /// A compromise: the last input towards the rows' answer that has a plan behind it.
     Between,
     /// The plan: nothing else keeps the promise.
@@ -192,6 +194,9 @@ pub struct AssuredFilter {
 }
 
 impl AssuredFilter {
+    /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
+    pub const LONGEST: f64 = 16.0;
+
     /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0.
     ///
     /// # Errors
@@ -311,6 +316,10 @@ impl AssuredFilter {
             if let Some(flaw) = plan.flaw(self.filter.state_dim, self.filter.input_dim) {
                 return refuse("plan", flaw);
             }
+            let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
+            if !promises.iter().flatten().all(is_promise) {
+                return refuse("promises", "have a time or a margin that is no number");
+            }
             if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
                 return refuse("sample", "has no time, must have one beside a plan");
             }
@@ -408,6 +417,8 @@ impl AssuredFilter {
     /// whole filter.
     fn sample(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
         self.next.clone_from(&self.commitment);
+        let mut rows = [0.0; MAX_INPUTS];
+        rows[..u.len()].copy_from_slice(u);
         let is_valid = t.is_finite() && all_finite(x);
         if is_valid || self.next.sample.is_some() {
             self.next.sample = Some([t, hold]);
@@ -418,7 +429,15 @@ impl AssuredFilter {
             _ => {}
         }
         self.assurance.driver = Driver::Rows;
-        if self.next.standing == Standing::Assured {
+        // What is let go on arrival is promised no longer.
+        let reports = &self.filter.workspace.report.barriers;
+        for ((promise, slot), b) in self.next.promises.iter_mut().zip(&self.filter.slots).zip(reports) {
+            if slot.end == End::OnArrival && b.phase == Phase::Released {
+                *promise = None;
+            }
+        }
+        let is_over = self.next.promises.iter().all(Option::is_none);
+        if self.next.standing == Standing::Assured && !is_over {
             self.assurance.driver = match is_valid {
                 true => self.choose(t, hold, x, u_ref, u),
                 false => self.go_on(t, hold, u),
@@ -426,7 +445,7 @@ impl AssuredFilter {
         }
         (self.assurance.standing, self.assurance.failure) = (self.next.standing, self.next.failure);
         if self.next.standing == Standing::Assured {
-            self.report_on(u);
+            self.report_on(&rows[..u.len()], u);
         }
     }
 
@@ -451,25 +470,26 @@ impl AssuredFilter {
         })
     }
 
-    /// Makes the report and the state of the rows those of the input `u`, which has a plan behind it.
-    fn report_on(&mut self, u: &[f64]) {
+    /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it.
+    fn report_on(&mut self, rows: &[f64], u: &[f64]) {
         let Workspace { next, report, .. } = &mut self.filter.workspace;
         next.input[..u.len()].copy_from_slice(u);
         let driver = self.assurance.driver;
         report.status = match (report.status, driver) {
             (Status::InvalidInput, _) => Status::InvalidInput,
             (_, Driver::Reference) => Status::Unchanged,
+            (_, Driver::Eased) => Status::Filtered,
             (status, Driver::Rows) if status.is_satisfied() => status,
             _ => Status::Backup,
         };
         for ((b, state), promise) in
             report.barriers.iter_mut().zip(&mut next.barriers).zip(&self.next.promises)
         {
-            if driver != Driver::Rows {
+            if u != rows {
                 (b.on_course, state.on_course) = (false, false);
                 b.slack = b.row.slack(u);
             }
-            if promise.is_some() {
+            if promise.is_some() && b.phase != Phase::Released {
                 b.guaranteed = true;
                 (b.unmet_steps, state.unmet) = (0, None);
                 (b.blocked_by, b.deadlocked) = (None, false);
@@ -547,8 +567,6 @@ impl AssuredFilter {
     /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
     /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one.
     fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
-        /// The longest deadlines looked for, in units of those configured.
-        const LONGEST: f64 = 16.0;
         let search = |promises: &[Option<Promise>]| {
             self.planned(promises, (t, hold), u, |planner| planner.search(t, x))
         };
@@ -556,7 +574,7 @@ impl AssuredFilter {
         let mut found = search(&promises).map(|plan| (1.0, (promises.clone(), plan)));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter.slots.iter().any(yields) {
-            let later = least_factor(LONGEST, None, |factor| {
+            let later = least_factor(Self::LONGEST, None, |factor| {
                 let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
                 let plan = search(&promises).ok()?;
                 Some((promises, plan))
@@ -629,33 +647,34 @@ impl AssuredFilter {
             *w = self.filter.bounds.clamp(i, u_ref[i]);
         }
         let plan = &self.next.plan;
+        // Gentle, and with the margin that is aimed at.
+        let comfortable = |witness: &Witness| {
+            let margin = |at: &Tightest| self.filter.slots[at.barrier].promise.settings().margin;
+            witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
+        };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            if reached
-                && wanted.iter().zip(u_ref).all(|(w, r)| w == r)
+            let passes = reached && wanted.iter().zip(u_ref).all(|(w, r)| w == r);
+            if passes
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
-                && witness.effort <= COMFORTABLE
+                && comfortable(&witness)
             {
                 return Ok((Driver::Reference, witness));
             }
             wanted.copy_from_slice(u);
             if let Ok(witness) = planner.behind(plan, t, x, wanted) {
-                return Ok((Driver::Rows, witness));
+                if !passes || !comfortable(&witness) || u == u_ref {
+                    return Ok((Driver::Rows, witness));
+                }
+                // As near to u_ref as is comfortable, so that the input does not jump between the two.
+                let eased =
+                    towards(u, u_ref, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
+                return Ok((if eased.0 { Driver::Eased } else { Driver::Rows }, eased.1));
             }
             // Towards the answer of the rows, from the plan's own input.
-            let mut kept = planner.tail(plan, t, x)?;
+            let kept = planner.tail(plan, t, x)?;
             let own = kept.inputs[0].1;
-            let (mut low, mut high, mut driver) = (0.0, 1.0, Driver::Plan);
-            for _ in 0..BISECTIONS {
-                let part = 0.5 * (low + high);
-                for i in 0..u.len() {
-                    wanted[i] = own[i] + part * (u[i] - own[i]);
-                }
-                match planner.behind(plan, t, x, wanted) {
-                    Ok(witness) => (low, kept, driver) = (part, witness, Driver::Between),
-                    Err(_) => high = part,
-                }
-            }
-            Ok((driver, kept))
+            let between = towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
+            Ok((if between.0 { Driver::Between } else { Driver::Plan }, between.1))
         });
         let failure = match found {
             Ok((driver, witness)) => {
@@ -681,6 +700,28 @@ impl AssuredFilter {
             }
         }
     }
+}
+
+/// The witness behind the last input on the way `from` one `to` another that has one, in halvings, and whether that is
+/// another than `from`, whose witness is `kept`.
+fn towards(
+    from: &[f64],
+    to: &[f64],
+    mut kept: Witness,
+    behind: impl Fn(&[f64]) -> Option<Witness>,
+) -> (bool, Witness) {
+    let (mut low, mut high, mut input) = (0.0, 1.0, [0.0; MAX_INPUTS]);
+    for _ in 0..BISECTIONS {
+        let part = 0.5 * (low + high);
+        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
+            *input = from + part * (to - from);
+        }
+        match behind(&input[..from.len()]) {
+            Some(witness) => (low, kept) = (part, witness),
+            None => high = part,
+        }
+    }
+    (low > 0.0, kept)
 }
 
 impl Looked {

@@ -17,6 +17,8 @@ use crate::MAX_INPUTS;
 use crate::lie::Derivatives;
 use crate::scalar::all_finite;
 
+/// Most steps of the model in a hold.
+const MOST_STEPS: f64 = 1e5;
 /// Halvings of a piece whose bound does not decide.
 const HALVINGS: u32 = 6;
 /// Rate of the state that counts as rest, as a part of the largest on the way.
@@ -101,6 +103,8 @@ pub enum Failure {
     Nothing,
     /// The model is not finite on the way.
     Singular,
+    /// There are too many samples, or steps of the model, to look at.
+    TooLong,
 }
 
 /// The samples of a roll-out.
@@ -145,6 +149,9 @@ impl<'a> Walk<'a> {
         grid: Grid,
         (t, x): (f64, &[f64]),
     ) -> Result<Self, Failure> {
+        if grid.period > MOST_STEPS * model.step {
+            return Err(Failure::TooLong);
+        }
         let mut walk = Self {
             model,
             requirements,
@@ -350,18 +357,31 @@ impl<'a> Walk<'a> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = brake.hold.max(self.grid.period);
         for _ in 0..BRAKING {
-            brake.input(&self.model, &self.x, &mut u);
-            let rate = self.model.rate(&self.x, &u, hold);
-            let still = |(i, rate): (usize, &f64)| {
-                rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
-            };
-            if rate.iter().enumerate().all(still) && self.rests(hold)? {
-                self.hold_until(&u, self.t + hold)?;
+            let rests = self.is_still(brake, hold, &mut u) && self.rests(hold)?;
+            self.hold_until(&u, self.t + hold)?;
+            if rests {
                 return Ok(self.witness);
             }
-            self.hold_until(&u, self.t + hold)?;
         }
         Err(Failure::NoRest)
+    }
+
+    /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.
+    pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
+        let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
+        let hold = brake.hold.max(self.grid.period);
+        let ends = self.is_still(brake, hold, &mut u) && matches!(self.rests(hold), Ok(true));
+        self.witness.tightest = tightest;
+        ends
+    }
+
+    /// Whether the plant stands still under the input of `brake`, which is written to `u`.
+    fn is_still(&self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+        brake.input(&self.model, &self.x, u);
+        let rate = self.model.rate(&self.x, u, hold);
+        rate.iter().enumerate().all(|(i, rate)| {
+            rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
+        })
     }
 
     /// Whether every set is still, so that a plant at rest here stays in all that are or will be asked for.

@@ -28,6 +28,7 @@ pub use planner::Planner;
 use alloc::sync::Arc;
 
 use crate::lie::DerivativeSource;
+use crate::scalar::all_finite;
 use law::{Brake, Reference};
 
 /// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
@@ -77,6 +78,9 @@ impl Plan {
         if self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))
             || self.witness.rates.len() != states
+            || !all_finite(&self.witness.rates)
+            || self.witness.inputs.is_empty()
+            || self.witness.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u))
         {
             return Some("is of a plant of other dimensions, or not finite");
         }

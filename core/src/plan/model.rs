@@ -44,7 +44,7 @@ impl Model<'_> {
     /// Number of equal steps of at most [`Self::step`] in `duration`.
     pub(super) fn steps(&self, duration: f64) -> usize {
         // Round-off of a sum of steps is no further step.
-        (duration / self.step * (1.0 - 1e-9)) as usize + 1
+        ((duration / self.step * (1.0 - 1e-9)) as usize).saturating_add(1)
     }
 
     /// Moves `x` by `duration` s under the held input `u`.

@@ -32,8 +32,9 @@ const TIGHTENED: u32 = 4;
 const TIGHTENING: u32 = 4;
 /// Error of the model over a hold, as a part of the size of a state: in the search, and in the check.
 const RESOLVED: [f64; 2] = [1e-5, 1e-8];
-/// The longest step of the model, in sampling periods.
+/// The longest step of the model, in sampling periods; or as a part of a hold, where periods are shorter.
 const COARSE: f64 = 4.0;
+const FINE: f64 = 32.0;
 /// The most samples until a deadline.
 const MOST_SAMPLES: usize = 100_000_000;
 /// Halvings of the model's step until it is resolved.
@@ -90,7 +91,10 @@ impl<'a> Planner<'a> {
         for (part, holds) in GRIDS {
             let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let Some((hold, times)) = self.grid(t, &requirements, holds) else { continue };
+            let Some((hold, times)) = self.grid(t, &requirements, holds) else {
+                failure = Failure::TooLong;
+                continue;
+            };
             let resolved = RESOLVED.map(|error| self.resolved(x, hold, error));
             let [Some(coarse), Some(fine)] = resolved else {
                 failure = Failure::Singular;
@@ -230,17 +234,21 @@ impl<'a> Planner<'a> {
         let replay = |grid: Grid| {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
-            let mut hold = |mut u: [f64; MAX_INPUTS], end: f64| {
+            let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
                 self.model(plan.step).clamp(&mut u[..nu]);
                 walk.hold_until(&u[..nu], end)
             };
             if !grid.even {
                 at += grid.period;
-                hold(plan.witness.mean(t, at), at)?;
+                hold(&mut walk, plan.witness.mean(t, at), at)?;
             }
             for (end, u) in &plan.witness.inputs {
                 if *end > at + grid.slack() {
-                    hold(*u, *end)?;
+                    // Not again what has come to its end, which grows by a hold at every sample.
+                    if walk.may_end(brake) {
+                        break;
+                    }
+                    hold(&mut walk, *u, *end)?;
                     at = *end;
                 }
             }
@@ -301,9 +309,9 @@ impl<'a> Planner<'a> {
     /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one.
     fn resolved(&self, x: &[f64], hold: f64, allowed: f64) -> Option<f64> {
         let nu = self.dims[1];
-        let mut step = self.period.max((hold / 8.0).min(COARSE * self.period));
+        let mut step = (hold / 8.0).min((COARSE * self.period).max(hold / FINE));
         for _ in 0..HALVINGS {
-            let error = |sign: f64| {
+            let is_resolved = |sign: f64| {
                 let mut u: Vec<f64> = (0..nu).map(|i| sign * self.model(step).reach(i, self.size)).collect();
                 self.model(step).clamp(&mut u);
                 let run = |step: f64| {
@@ -312,9 +320,10 @@ impl<'a> Planner<'a> {
                     end
                 };
                 let (coarse, fine) = (run(step), run(step / 2.0));
-                coarse.iter().zip(&fine).map(|(a, b)| (a - b).abs() / (1.0 + b.abs())).fold(0.0, f64::max)
+                // Not-a-number is not.
+                coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() <= allowed * (1.0 + b.abs()))
             };
-            if error(1.0).max(error(-1.0)) <= allowed {
+            if is_resolved(1.0) && is_resolved(-1.0) {
                 return Some(step);
             }
             step /= 2.0;

@@ -79,14 +79,13 @@ impl FilterBlock {
                 stepped.map(|()| filter.integrated())
             }
         };
+        let written = done.map(|integrated| self.write(values, integrated)).map_err(|e| e.to_string());
         if step.is_some() {
             self.rearm_seen = values.booleans[self.rearm_index()];
         } else if rising {
             self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
         }
-        let integrated = done.map_err(|e| e.to_string())?;
-        self.write(values, integrated);
-        Ok(())
+        written
     }
 
     /// The reason why there is no derivative, with the barrier by its name.
@@ -139,7 +138,7 @@ impl Block for FilterBlock {
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
         self.filter = configuration.build_loop()?;
         self.configuration = configuration;
-        self.rearm_seen = false;
+        (self.rearm_seen, self.noticed) = (false, None);
         self.filter.save(&mut self.kept);
         Ok(())
     }
@@ -253,6 +252,20 @@ impl Block for FilterBlock {
                 _ => 0.0_f64.max(min).min(max),
             };
         }
-        values.integers[outputs + inputs] = Status::InvalidInput as i32;
+        let mut at = outputs + inputs;
+        values.integers[at] = Status::InvalidInput as i32;
+        // No plan has 0 for its input.
+        at += 1;
+        for _ in &self.configuration.barrier {
+            for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
+                if matches!(output.name, "guaranteed" | "on_course") {
+                    values.booleans[i] = false;
+                }
+            }
+            at += BARRIER_OUTPUTS.len();
+        }
+        if self.filter.standing().is_some() {
+            values.integers[at] = Standing::Undecided as i32;
+        }
     }
 }

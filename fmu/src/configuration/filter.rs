@@ -463,15 +463,18 @@ impl FilterConfiguration {
     pub fn failure(&self, failure: Failure) -> String {
         match failure {
             Failure::Broken { barrier, time, slack } => {
-                let (section, lack) = (&self.barrier[barrier], -slack);
-                format!(
-                    "{} is not met at {time:.6} s, by {lack:.6} {}",
-                    section.name,
-                    section.unit(&self.plant)
-                )
+                // One of a state from elsewhere may have any number.
+                let Some(section) = self.barrier.get(barrier) else {
+                    return "a barrier is not met".to_owned();
+                };
+                let (unit, lack) = (section.unit(&self.plant), -slack);
+                format!("{} is not met at {time:.6} s, by {lack:.6} {unit}", section.name)
             }
             Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
+            Failure::TooLong => {
+                "there are too many samples until the deadline, or too long a step".to_owned()
+            }
             _ => "the model is not finite, or no step resolves it".to_owned(),
         }
     }
