@@ -5,7 +5,7 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | `filter_loop` | a filter with its integrator, if it has one |
+//! | `filter_loop` | a filter with its plans or its integrator, if it has them, and its memory |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
 //! | [`block`] | the computation: a filter, plant or controller between value arrays |

@@ -258,7 +258,7 @@ impl Block for FilterBlock {
         at += 1;
         for _ in &self.configuration.barrier {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
-                if matches!(output.name, "guaranteed" | "on_course") {
+                if output.name == "guaranteed" {
                     values.booleans[i] = false;
                 }
             }
