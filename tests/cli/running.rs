@@ -122,7 +122,7 @@ fn the_json_of_a_run() {
         (&"filter.goal".into(), &0.into())
     );
     let signals = report["signals"].as_array().expect("a list");
-    assert_eq!(signals.len(), 27);
+    assert_eq!(signals.len(), 28);
     let left = signals.iter().find(|s| s["name"] == "filter.goal.time_left").expect("the time left");
     assert_eq!((&left["unit"], &left["max"], &left["final"]), (&"s".into(), &10.0.into(), &9.5.into()));
     assert_eq!(
