@@ -32,7 +32,7 @@ def test_a_session_with_every_category(demo, kind):
     for name, status, category, message in log:
         print(f"\n{name} [{category}] status {status}: {message}", end="")
     declared = declared_categories(path)
-    assert sorted(declared) == ["logEvents", "logStatusError"]
+    assert sorted(declared) == ["logEvents", "logStatusError", "logStatusWarning"]
     assert {category for _, _, category, _ in log} == set(declared), "each category was used, no other"
     assert {name for name, *_ in log} == {log[0][0]} != {""}
     assert all(status == (ERROR if category == "logStatusError" else OK) for _, status, category, _ in log)
