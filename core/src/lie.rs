@@ -41,7 +41,7 @@ pub use crate::error::RelativeDegree;
 pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
 pub use embedded::embedded;
 pub use external::external;
-pub use source::{DerivativeSource, Direction, Directional, Predict, PredictDirectional};
+pub use source::{COURSE, Course, DerivativeSource, Direction, Directional, Predict, PredictDirectional};
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
@@ -185,6 +185,27 @@ where
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let x = SVector::from_column_slice(x);
         ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
+    }
+
+    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
+        let (x, u) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
+        out.copy_from_slice(self.plant.derivative(&x, &u).as_slice());
+    }
+
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+        let x = SVector::<f64, NX>::from_column_slice(x);
+        for (out, state) in out.iter_mut().zip(&ahead::path::<P, NX, NU>(&self.plant, &x, u)) {
+            *out = state.coefficients;
+        }
+    }
+
+    fn value(&self, t: f64, x: &[f64]) -> f64 {
+        self.barrier.value(t, &SVector::from_column_slice(x))
+    }
+
+    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
+        let states = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
+        *out = self.barrier.value(Taylor::time(t), &states).coefficients;
     }
 }
 

@@ -6,8 +6,8 @@ use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
-    self, Ahead, Coefficients, DerivativeSource, Derivatives, Direction, Directional, Predict,
-    PredictDirectional, RelativeDegree, SUBSTEPS,
+    self, Ahead, COURSE, Coefficients, Course, DerivativeSource, Derivatives, Direction, Directional,
+    Predict, PredictDirectional, RelativeDegree, SUBSTEPS,
 };
 use punctual_core::scalar::Scalar;
 
@@ -78,6 +78,8 @@ pub(crate) fn source<E: Equations>(
             flow: Flow::new(plant),
             along_tangent: Along::new(plant, along, n),
             flow_tangent: Flow::new(plant),
+            courses: Along::new(plant, along, COURSE - 1),
+            value: Along::new(plant, along, 1),
         };
         let (states, inputs) = (plant.states(), plant.inputs());
         Box::new(Source { work: RefCell::new(work), states, inputs, n })
@@ -233,6 +235,23 @@ impl<E: Equations, C: Scalar> Along<E, C> {
         self.series.get(self.h, k) * (1..=k).map(|i| i as f64).product::<f64>()
     }
 
+    /// Computes the coefficients of h from those of the states, at time `t`, and returns h.
+    fn follow(&mut self, t: f64, state: impl Fn(usize, usize) -> C) -> C {
+        let Self { equations, series, n, .. } = self;
+        let states = equations.states();
+        series.set(states + equations.inputs(), 0, C::from(t));
+        for k in 0..=*n {
+            for i in 0..states {
+                series.set(i, k, state(i, k));
+            }
+            if k < *n {
+                equations.advance(series, k);
+            }
+        }
+        self.h = equations.finish(series, *n);
+        series.get(self.h, 0)
+    }
+
     /// Computes the coefficients of h `duration` ahead, from the state and the inputs that `flow` has.
     fn ahead(&mut self, t: f64, duration: f64) {
         self.flow.run(duration, SUBSTEPS);
@@ -276,6 +295,8 @@ struct Work<E, const M: usize> {
     flow: Flow<E, f64>,
     along_tangent: Along<E, Tangent<Dual<M>>>,
     flow_tangent: Flow<E, Tangent<f64>>,
+    courses: Along<E, f64>,
+    value: Along<E, f64>,
 }
 
 impl<E, const M: usize> Source<E, M> {
@@ -342,6 +363,38 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         along.hold(|i| u.get(i).copied().unwrap_or_default());
         along.ahead(t, duration);
         self.write(out, |k| along.derivative(k));
+    }
+
+    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
+        let Flow { equations, series, .. } = &mut self.work.borrow_mut().courses.flow;
+        for (register, &value) in x.iter().chain(u).enumerate() {
+            series.set(register, 0, value);
+        }
+        equations.advance(series, 0);
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = series.get(equations.derivative(i), 0);
+        }
+    }
+
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+        let courses = &mut self.work.borrow_mut().courses;
+        courses.flow.set_state(x.iter().copied());
+        courses.flow.hold(u.iter().copied());
+        courses.continue_from_flow(0.0);
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = std::array::from_fn(|k| courses.series.get(i, k));
+        }
+    }
+
+    fn value(&self, t: f64, x: &[f64]) -> f64 {
+        let courses = &mut self.work.borrow_mut().value;
+        courses.follow(t, |i, _| x[i])
+    }
+
+    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
+        let courses = &mut self.work.borrow_mut().courses;
+        courses.follow(t, |i, k| path[i][k]);
+        *out = std::array::from_fn(|k| courses.series.get(courses.h, k));
     }
 }
 

@@ -624,7 +624,8 @@ impl AssuredFilter {
         let requirements: Vec<Requirement<'_>> = slots
             .filter_map(|(barrier, (slot, promise))| {
                 let Promise { from, until, margin } = (*promise)?;
-                Some(Requirement { barrier, source: &*slot.source, from, until, margin })
+                let model = slot.source.predict()?;
+                Some(Requirement { barrier, source: &*slot.source, model, from, until, margin })
             })
             .collect();
         if requirements.is_empty() {

@@ -47,6 +47,13 @@ impl<C: Scalar, const K: usize> Taylor<C, K> {
         }
     }
 
+    /// The same function with `J` ≤ `K` coefficients.
+    #[inline]
+    pub fn truncated<const J: usize>(&self) -> Taylor<C, J> {
+        const { assert!(J <= K, "a series knows no more than its coefficients") };
+        Taylor { coefficients: from_fn(|k| self.coefficients[k]) }
+    }
+
     /// The k-th derivative at τ = 0, for k < `K`.
     ///
     /// # Panics

@@ -14,7 +14,7 @@
 
 use nalgebra::SVector;
 
-use super::Direction;
+use super::{COURSE, Direction};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, rk4};
 use crate::jet::{Dual, Tangent, Taylor};
@@ -100,6 +100,36 @@ where
         }
     }
     barrier.value(Taylor::time(t + duration), &series)
+}
+
+/// The courses of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`.
+pub(super) fn path<P, const NX: usize, const NU: usize>(
+    plant: &P,
+    x: &SVector<f64, NX>,
+    u: &[f64],
+) -> SVector<Taylor<f64, COURSE>, NX>
+where
+    P: ControlAffine<NX, NU>,
+{
+    let mut path = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
+    macro_rules! extend_to {
+        ($($j:literal),*) => {{
+            const { assert!([$($j),*].len() == COURSE - 1, "an order each") };
+            $({
+                let known = SVector::<Taylor<f64, $j>, NX>::from_fn(|i, _| path[i].truncated());
+                let (f, g) = (plant.drift(&known), plant.input_map(&known));
+                for i in 0..NX {
+                    let mut rate = f[i].coefficients[$j - 1];
+                    for m in 0..NU {
+                        rate += g[(i, m)].coefficients[$j - 1] * u[m];
+                    }
+                    path[i].coefficients[$j] = rate * (1.0 / $j as f64);
+                }
+            })*
+        }};
+    }
+    extend_to!(1, 2, 3, 4, 5, 6, 7, 8, 9);
+    path
 }
 
 /// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead;

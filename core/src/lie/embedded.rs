@@ -3,7 +3,9 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, Predict, PredictDirectional};
+use super::{
+    Ahead, COURSE, Course, DerivativeSource, Derivatives, Direction, Directional, Predict, PredictDirectional,
+};
 use crate::error::{Error, ErrorKind, length};
 
 /// Most states that a picked source may have.
@@ -78,6 +80,41 @@ impl Predict for Embedded {
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let Some(source) = self.source.predict() else { return };
         source.ahead(t, &self.picked(x)[..self.picks.len()], u, duration, out);
+    }
+
+    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
+        let Some(source) = self.source.predict() else { return };
+        let mut own = [0.0; MAX_PICKED];
+        source.rate(&self.picked(x)[..self.picks.len()], u, &mut own[..self.picks.len()]);
+        out.fill(0.0);
+        self.put_back(&own, out);
+    }
+
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+        let Some(source) = self.source.predict() else { return };
+        let mut own = [[0.0; COURSE]; MAX_PICKED];
+        source.path(&self.picked(x)[..self.picks.len()], u, &mut own[..self.picks.len()]);
+        for (out, &x) in out.iter_mut().zip(x) {
+            *out = [0.0; COURSE];
+            out[0] = x;
+        }
+        for (&pick, own) in self.picks.iter().zip(own) {
+            out[pick] = own;
+        }
+    }
+
+    fn value(&self, t: f64, x: &[f64]) -> f64 {
+        let Some(source) = self.source.predict() else { return f64::NAN };
+        source.value(t, &self.picked(x)[..self.picks.len()])
+    }
+
+    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
+        let Some(source) = self.source.predict() else { return };
+        let mut own = [[0.0; COURSE]; MAX_PICKED];
+        for (own, &pick) in own.iter_mut().zip(&self.picks) {
+            *own = path[pick];
+        }
+        source.value_along(t, &own[..self.picks.len()], out);
     }
 }
 

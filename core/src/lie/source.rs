@@ -56,7 +56,25 @@ pub trait Predict {
     /// Writes the derivatives of h `duration` ≥ 0 seconds after `t` and `x` under the held input `u`; at time
     /// `t + duration`.
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead);
+
+    /// Writes ẋ at `x` under `u`.
+    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
+
+    /// Writes the course of every state from `x` on under the held input `u`.
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]);
+
+    /// h at time `t` (s) and state `x`.
+    fn value(&self, t: f64, x: &[f64]) -> f64;
+
+    /// Writes the course of h along `path`, the courses of all states from `t` on.
+    fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
 }
+
+/// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …
+pub type Course = [f64; COURSE];
+
+/// Number of coefficients of a [`Course`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
+pub const COURSE: usize = 10;
 
 /// The derivatives of h at an instant, differentiated along a direction.
 pub trait Directional {

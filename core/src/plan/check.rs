@@ -1,26 +1,37 @@
 //! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
 //!
-//! Between two nodes a time σ apart under one input, h is looked at in the middle too. Both halves then have a lower bound,
-//! which is the least of three: the chord less M (σ/2)²/8, where M is the largest second derivative at the three points,
-//! widened by as much as it differs there (for n = 1 three times the difference quotient of ḣ); the point where the tangents
-//! of a half cross; and all of it less the error that the cubic through the ends makes in the middle. Where that does not
-//! decide, the piece is halved. So it is assumed that a dip of h between two points shows at them: as a value, a slope, a
-//! second derivative, or as a middle that is not where it was expected.
+//! Under one input, state and h are followed by their Taylor [courses](crate::lie::Course) in pieces. A piece ends where the
+//! last terms of a state no longer vanish, and is halved while the course of a state is not a solution in its middle or at its
+//! end. On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
+//! less its last terms and less four times what the course misses h by at four instants. Where that does not decide, the
+//! piece is halved for this h. So it is assumed that plant and h are analytic on a piece, or that what bends them shows at
+//! these instants.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::Requirement;
+use super::course::{self, at, shifted};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use crate::MAX_INPUTS;
-use crate::lie::Derivatives;
+use crate::lie::{COURSE, Course, Derivatives};
 use crate::scalar::all_finite;
 
-/// Most steps of the model in a hold.
-const MOST_STEPS: f64 = 1e5;
-/// Halvings of a piece whose bound does not decide.
-const HALVINGS: u32 = 6;
+/// Most pieces of a roll-out.
+const MOST_PIECES: u32 = 100_000;
+/// The last terms of a state's course at the end of a piece, as a part of its size.
+const TRUNCATED: f64 = 1e-10;
+/// By how much the course of a state may miss being a solution, over the piece and as a part of its size.
+const RESIDUAL: f64 = 1e-8;
+/// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
+const HALVINGS: u32 = 14;
+const SHARPER: u32 = 3;
+/// The bound of a piece that is sharp enough, as a part of the least value seen.
+const SHARP: f64 = 0.8;
+/// Instants of a piece at which its course is compared with h, and what a difference there counts for between them.
+const INSTANTS: u32 = 4;
+const MISSED: f64 = 4.0;
 /// Rate of the state that counts as rest, as a part of the largest on the way.
 const AT_REST: f64 = 1e-6;
 /// Change of a state over a hold that is round-off, as a part of its size.
@@ -47,6 +58,8 @@ pub struct Witness {
     pub(super) rates: Vec<f64>,
     /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
+    /// Whether its holds end at samples in the period of the first.
+    pub(crate) is_even: bool,
 }
 
 impl Witness {
@@ -131,9 +144,11 @@ pub(super) struct Walk<'a> {
     strictness: f64,
     t: f64,
     x: Vec<f64>,
-    before: Vec<f64>,
-    /// Derivatives of h at (t, x) for the requirements that are or come into force.
-    at: Vec<Derivatives>,
+    /// The courses of the states from here on, a state on them and its rate.
+    path: Vec<Course>,
+    point: Vec<f64>,
+    rate: Vec<f64>,
+    pieces: u32,
     witness: Witness,
     started: f64,
     grid: Grid,
@@ -149,23 +164,24 @@ impl<'a> Walk<'a> {
         grid: Grid,
         (t, x): (f64, &[f64]),
     ) -> Result<Self, Failure> {
-        if grid.period > MOST_STEPS * model.step {
-            return Err(Failure::TooLong);
-        }
         let mut walk = Self {
             model,
             requirements,
             strictness,
             t,
             x: x.to_vec(),
-            before: x.to_vec(),
-            at: vec![Derivatives::ZERO; requirements.len()],
-            witness: Witness { rates: vec![0.0; x.len()], ..Witness::default() },
+            path: vec![[0.0; COURSE]; x.len()],
+            point: x.to_vec(),
+            rate: x.to_vec(),
+            pieces: 0,
+            witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
             started: t,
             grid,
         };
-        for i in 0..requirements.len() {
-            walk.evaluate(i)?;
+        for (i, requirement) in requirements.iter().enumerate() {
+            if requirement.is_in_force(t) {
+                walk.note(i, t, requirement.model.value(t, x))?;
+            }
         }
         Ok(walk)
     }
@@ -180,17 +196,6 @@ impl<'a> Walk<'a> {
 
     fn margin(&self, i: usize) -> f64 {
         self.strictness * self.requirements[i].margin
-    }
-
-    /// Evaluates requirement `i` here, and checks it where it is in force.
-    fn evaluate(&mut self, i: usize) -> Result<(), Failure> {
-        let requirement = &self.requirements[i];
-        requirement.source.evaluate(self.t, &self.x, &mut self.at[i]);
-        let h = self.at[i].drift[0];
-        if !self.at[i].is_finite() {
-            return Err(Failure::Singular);
-        }
-        if requirement.is_in_force(self.t) { self.note(i, self.t, h) } else { Ok(()) }
     }
 
     /// Notes that h of requirement `i` is at least `h` around `t`.
@@ -214,7 +219,7 @@ impl<'a> Walk<'a> {
         let end = if !even || (sample - end).abs() <= ON_TIME * period { end } else { sample };
         // Time is too large to tell samples apart.
         if end.is_nan() || end <= self.t {
-            return Err(Failure::Singular);
+            return Err(Failure::TooLong);
         }
         self.hold(u, end)
     }
@@ -226,10 +231,8 @@ impl<'a> Walk<'a> {
             let ahead = self.t + 1e-9 * (end - self.t);
             let event = |node: f64, time: f64| if ahead < time && time < node { time } else { node };
             let node = self.requirements.iter().fold(end, |node, r| event(event(node, r.from), r.until));
-            let (begin, steps) = (self.t, self.model.steps(node - self.t));
-            for k in 1..=steps {
-                let time = if k == steps { node } else { begin + (node - begin) * k as f64 / steps as f64 };
-                self.advance(u, time)?;
+            while self.t < node {
+                self.advance(u, node)?;
             }
         }
         let mut input = [0.0; MAX_INPUTS];
@@ -247,91 +250,91 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Moves on to the node `time`.
-    fn advance(&mut self, u: &[f64], time: f64) -> Result<(), Failure> {
-        let (from, dt) = (self.t, time - self.t);
-        self.before.copy_from_slice(&self.x);
-        self.model.plant.flow(&mut self.x, u, dt);
-        if !all_finite(&self.x) {
+    /// Moves on by a piece, to `node` at most.
+    fn advance(&mut self, u: &[f64], node: f64) -> Result<(), Failure> {
+        self.pieces += 1;
+        if self.pieces > MOST_PIECES {
+            return Err(Failure::TooLong);
+        }
+        self.model.plant.path(&self.x, u, &mut self.path);
+        if !all_finite(self.path.as_flattened()) {
             return Err(Failure::Singular);
         }
-        // In a piece of some round-offs of time there is no rate.
-        if dt > 1e-6 * self.model.step {
-            for (rate, (x, before)) in self.witness.rates.iter_mut().zip(self.x.iter().zip(&self.before)) {
-                *rate = rate.max((x - before).abs() / dt);
+        let whole = node - self.t;
+        let mut dt = self.path.iter().fold(whole, |dt, c| course::reach(c, TRUNCATED * size(c), dt));
+        while !(self.is_solution(u, 0.5 * dt) && self.is_solution(u, dt)) {
+            dt *= 0.5;
+            if self.t + dt <= self.t {
+                return Err(Failure::Singular);
             }
         }
-        self.t = time;
+        let end = if dt < whole { self.t + dt } else { node };
+        // At a time so large that a piece is within its round-off.
+        if end <= self.t {
+            return Err(Failure::TooLong);
+        }
+        for (greatest, (c, rate)) in self.witness.rates.iter_mut().zip(self.path.iter().zip(&self.rate)) {
+            *greatest = greatest.max(c[1].abs()).max(rate.abs());
+        }
+        let from = self.t;
         for i in 0..self.requirements.len() {
-            let requirement = &self.requirements[i];
-            if requirement.from > time || requirement.until <= from {
-                continue;
-            }
-            let first = self.at[i];
-            self.evaluate(i)?;
-            if requirement.is_in_force(from) {
-                let least =
-                    self.least_between(i, u, [&first, &self.at[i]], (from, dt), &self.before, HALVINGS);
+            if self.requirements[i].is_in_force(from) {
+                let path = core::mem::take(&mut self.path);
+                let least = self.least(i, &path, (from, dt), HALVINGS);
+                self.path = path;
                 self.note(i, from, least)?;
             }
         }
+        for (x, c) in self.x.iter_mut().zip(&self.path) {
+            *x = at(c, dt);
+        }
+        self.t = end;
         Ok(())
     }
 
-    /// A number that h of requirement `i` does not fall below in the piece from `x` at `from`, `dt` s long.
-    fn least_between(
-        &self,
-        i: usize,
-        u: &[f64],
-        ends: [&Derivatives; 2],
-        (from, dt): (f64, f64),
-        x: &[f64],
-        halvings: u32,
-    ) -> f64 {
-        let source = self.requirements[i].source;
-        let n = source.relative_degree();
-        let derivative = |d: &Derivatives, k: usize| match k < n {
-            true => d.drift[k],
-            false => d.drift[k] + d.row.iter().zip(u).map(|(a, u)| a * u).sum::<f64>(),
-        };
-        let margin = self.margin(i);
-        let mut middle = (x.to_vec(), Derivatives::ZERO);
-        self.model.plant.flow(&mut middle.0, u, dt / 2.0);
-        source.evaluate(from + dt / 2.0, &middle.0, &mut middle.1);
-        if !middle.1.is_finite() {
-            return f64::NEG_INFINITY;
+    /// Whether the courses of the states are a solution `dt` s after their begin. Leaves state and rate there.
+    fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
+        for (x, c) in self.point.iter_mut().zip(&self.path) {
+            *x = at(c, dt);
         }
-        let points = [ends[0], &middle.1, ends[1]];
-        let h = points.map(|d| d.drift[0]);
-        let slope = points.map(|d| derivative(d, 1));
-        let half = dt / 2.0;
-        let least = h[0].min(h[1]).min(h[2]);
-        let second = match n {
-            1 => 3.0 * (slope[1] - slope[0]).abs().max((slope[2] - slope[1]).abs()) / half,
-            _ => {
-                let second = points.map(|d| derivative(d, 2));
-                let (low, high) =
-                    (second[0].min(second[1]).min(second[2]), second[0].max(second[1]).max(second[2]));
-                high + (high - low)
+        self.model.plant.rate(&self.point, u, &mut self.rate);
+        let misses = |(c, rate): (&Course, &f64)| (course::slope(c, dt) - rate).abs() * dt;
+        // Not-a-number is none.
+        self.path.iter().zip(&self.rate).all(|both| misses(both) <= RESIDUAL * size(both.0))
+    }
+
+    /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from`.
+    fn least(&mut self, i: usize, path: &[Course], (from, dt): (f64, f64), halvings: u32) -> f64 {
+        let (model, margin) = (self.requirements[i].model, self.margin(i));
+        let mut h = [0.0; COURSE];
+        model.value_along(from, path, &mut h);
+        let (mut least, mut missed) = (h[0], 0.0_f64);
+        for k in 1..=INSTANTS {
+            let after = dt * f64::from(k) / f64::from(INSTANTS);
+            for (x, c) in self.point.iter_mut().zip(path) {
+                *x = at(c, after);
             }
-        };
-        let chord = least - second.max(0.0) * half * half / 8.0;
-        // Where a falling tangent and a rising one cross.
-        let crossing = |a: usize, b: usize| match slope[a] < 0.0 && slope[b] > 0.0 {
-            true => {
-                let time = ((h[b] - h[a] - slope[b] * half) / (slope[a] - slope[b])).clamp(0.0, half);
-                h[a] + slope[a] * time
+            let value = model.value(from + after, &self.point);
+            if !value.is_finite() {
+                return f64::NEG_INFINITY;
             }
-            false => least,
-        };
-        let expected = 0.5 * (h[0] + h[2]) + (slope[0] - slope[2]) * dt / 8.0;
-        let bound = chord.min(crossing(0, 1)).min(crossing(1, 2)) - (h[1] - expected).abs();
-        if bound >= margin || halvings == 0 || least < margin {
-            return bound;
+            (least, missed) = (least.min(value), missed.max((value - at(&h, after)).abs()));
         }
-        let part = |ends, from, x: &[f64]| self.least_between(i, u, ends, (from, half), x, halvings - 1);
-        let left = part([ends[0], &middle.1], from, x);
-        left.min(part([&middle.1, ends[1]], from + half, &middle.0))
+        let bound = course::least(&h, dt) - course::last_terms(&h, dt) - MISSED * missed;
+        let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
+        let slack = bound - margin;
+        let decides = slack >= 0.0
+            && (slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS);
+        if decides || least < margin || halvings == 0 {
+            return bound.min(least);
+        }
+        let half = 0.5 * dt;
+        let left = self.least(i, path, (from, half), halvings - 1);
+        if left < margin {
+            return left;
+        }
+        let path: Vec<Course> = path.iter().map(|c| shifted(c, half)).collect();
+        left.min(self.least(i, &path, (from + half, half), halvings - 1))
     }
 
     /// Follows the rest of `reference`.
@@ -376,40 +379,47 @@ impl<'a> Walk<'a> {
     }
 
     /// Whether the plant stands still under the input of `brake`, which is written to `u`.
-    fn is_still(&self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+    fn is_still(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
         brake.input(&self.model, &self.x, u);
-        let rate = self.model.rate(&self.x, u, hold);
-        rate.iter().enumerate().all(|(i, rate)| {
+        self.model.plant.rate(&self.x, u, &mut self.rate);
+        self.rate.iter().enumerate().all(|(i, rate)| {
             rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
         })
     }
 
     /// Whether every set is still, so that a plant at rest here stays in all that are or will be asked for.
     fn rests(&mut self, hold: f64) -> Result<bool, Failure> {
-        let length = (self.t - self.started).max(self.model.step);
+        let length = (self.t - self.started).max(self.grid.period);
         for i in 0..self.requirements.len() {
             let requirement = &self.requirements[i];
             if requirement.until <= self.t {
                 continue;
             }
-            requirement.source.evaluate(self.t, &self.x, &mut self.at[i]);
-            let h = self.at[i].drift[0];
-            let mut later = Derivatives::ZERO;
+            let h = requirement.model.value(self.t, &self.x);
             let spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
             for span in spans {
-                requirement.source.evaluate(self.t + span, &self.x, &mut later);
-                if (later.drift[0] - h).abs() > 1e-12 * (1.0 + h.abs()) {
+                let later = requirement.model.value(self.t + span, &self.x);
+                if (later - h).abs() > 1e-12 * (1.0 + h.abs()) {
                     return Ok(false);
                 }
             }
             if requirement.until == f64::INFINITY || requirement.from > self.t {
                 let drift = match requirement.source.relative_degree() {
                     1 => 0.0,
-                    _ => self.at[i].drift[1].abs() * DRIFT * hold,
+                    _ => {
+                        let mut derivatives = Derivatives::ZERO;
+                        requirement.source.evaluate(self.t, &self.x, &mut derivatives);
+                        derivatives.drift[1].abs() * DRIFT * hold
+                    }
                 };
                 self.note(i, self.t.max(requirement.from), h - drift)?;
             }
         }
         Ok(true)
     }
+}
+
+/// The size of a state, by which its errors are measured.
+fn size(course: &Course) -> f64 {
+    1.0 + course[0].abs()
 }

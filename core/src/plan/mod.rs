@@ -10,12 +10,14 @@
 //! | `model` | the plant run ahead, its linearisation by differences, the rest near a state |
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
 //! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
+//! | `course` | polynomials in time, and what they do not fall below |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
 //!
 //! The search is heuristic and may fail. The check does not depend on it: a promise rests on the check alone.
 
 mod check;
+mod course;
 mod law;
 mod model;
 mod planner;
@@ -27,7 +29,7 @@ pub use planner::Planner;
 
 use alloc::sync::Arc;
 
-use crate::lie::DerivativeSource;
+use crate::lie::{DerivativeSource, Predict};
 use crate::scalar::all_finite;
 use law::{Brake, Reference};
 
@@ -36,8 +38,10 @@ use law::{Brake, Reference};
 pub struct Requirement<'a> {
     /// The number of its barrier, to name it by.
     pub barrier: usize,
-    /// The barrier, along a model that can be run ahead.
+    /// The barrier along the plant.
     pub source: &'a dyn DerivativeSource,
+    /// The same, run ahead.
+    pub model: &'a dyn Predict,
     /// First time in s.
     pub from: f64,
     /// Last time in s; infinite for ever.
@@ -52,9 +56,6 @@ impl Requirement<'_> {
     }
 }
 
-/// Most steps of the model in a plan.
-const MOST_STEPS: f64 = 1e7;
-
 /// A witness, and the laws from which the next ones are made: plain data, remembered between samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -63,8 +64,6 @@ pub struct Plan {
     brake: Option<Arc<Brake>>,
     /// The inputs that keep every requirement.
     pub witness: Witness,
-    /// The longest step in s in which the model is run ahead.
-    step: f64,
 }
 
 impl Plan {
@@ -75,21 +74,12 @@ impl Plan {
 
     /// What is wrong with it as a plan of a plant with `states` states and `inputs` inputs; one from a file may be.
     pub(crate) fn flaw(&self, states: usize, inputs: usize) -> Option<&'static str> {
-        if self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
+        let is_flawed = self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))
             || self.witness.rates.len() != states
             || !all_finite(&self.witness.rates)
             || self.witness.inputs.is_empty()
-            || self.witness.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u))
-        {
-            return Some("is of a plant of other dimensions, or not finite");
-        }
-        let times = self.reference.iter().flat_map(|reference| &reference.times);
-        let ends = self.witness.inputs.iter().map(|(end, _)| end);
-        let span = |(first, last): (f64, f64), t: &f64| (first.min(*t), last.max(*t));
-        let (first, last) = times.chain(ends).fold((f64::INFINITY, f64::NEG_INFINITY), span);
-        let longest = (last - first).max(self.brake.as_ref().map_or(0.0, |brake| brake.hold));
-        let is_short = self.step > 0.0 && longest <= MOST_STEPS * self.step;
-        (!is_short).then_some("takes too many steps of the model")
+            || self.witness.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u));
+        is_flawed.then_some("is of a plant of other dimensions, or not finite")
     }
 }

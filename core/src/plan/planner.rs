@@ -195,7 +195,6 @@ impl<'a> Planner<'a> {
             reference: Some(Arc::new(reference)),
             brake: Some(brake.clone()),
             witness: Witness::default(),
-            step: model.step,
         };
         let grid = Grid { period: self.period, even: true };
         plan.witness = self.walk(&plan, 1.0, grid, (times[0], x), None, true)?;
@@ -235,7 +234,7 @@ impl<'a> Planner<'a> {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
             let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
-                self.model(plan.step).clamp(&mut u[..nu]);
+                self.model(self.period).clamp(&mut u[..nu]);
                 walk.hold_until(&u[..nu], end)
             };
             if !grid.even {
@@ -279,7 +278,7 @@ impl<'a> Planner<'a> {
         grid: Grid,
         start: (f64, &[f64]),
     ) -> Result<Walk<'a>, Failure> {
-        let walk = Walk::new(self.model(plan.step), self.requirements, strictness, grid, start)?;
+        let walk = Walk::new(self.model(self.period), self.requirements, strictness, grid, start)?;
         Ok(walk.after(&plan.witness))
     }
 

@@ -1,0 +1,119 @@
+//! Arithmetic of [`Course`]s: polynomials in the time since their begin.
+
+use crate::elementary::powf;
+use crate::lie::{COURSE, Course};
+
+/// Highest power.
+const DEGREE: usize = COURSE - 1;
+
+/// The value after `dt` s.
+pub(super) fn at(course: &Course, dt: f64) -> f64 {
+    course.iter().rev().fold(0.0, |sum, c| sum * dt + c)
+}
+
+/// The derivative after `dt` s, per second.
+pub(super) fn slope(course: &Course, dt: f64) -> f64 {
+    (1..COURSE).rev().fold(0.0, |sum, k| sum * dt + k as f64 * course[k])
+}
+
+/// The same polynomial in the time from `dt` s later on.
+pub(super) fn shifted(course: &Course, dt: f64) -> Course {
+    let mut c = *course;
+    for first in 0..DEGREE {
+        for k in (first..DEGREE).rev() {
+            c[k] += c[k + 1] * dt;
+        }
+    }
+    c
+}
+
+/// The sum of the last two terms after `dt` s.
+pub(super) fn last_terms(course: &Course, dt: f64) -> f64 {
+    let power = (0..DEGREE - 1).fold(1.0, |power, _| power * dt);
+    power * (course[DEGREE - 1].abs() + course[DEGREE].abs() * dt)
+}
+
+/// The longest time, up to `most` s, after which neither of the last two terms is larger than `allowed`.
+pub(super) fn reach(course: &Course, allowed: f64, most: f64) -> f64 {
+    if last_terms(course, most) <= allowed {
+        return most;
+    }
+    let until = |k: usize| powf(allowed / course[k].abs(), 1.0 / k as f64);
+    most.min(until(DEGREE - 1)).min(until(DEGREE))
+}
+
+/// A number that no value within `dt` s is below: the least coefficient in the basis of Bernstein,
+/// `b_j = Σ_{k ≤ j} C(j, k) / C(n, k) a_k` with a_k = c_k dtᵏ.
+///
+/// Source: G. Farin, *Curves and Surfaces for CAGD*, section 6.1 (convex hull property).
+pub(super) fn least(course: &Course, dt: f64) -> f64 {
+    let (mut scaled, mut power) = (*course, 1.0);
+    for (scaled, all) in scaled.iter_mut().zip(CHOICES[DEGREE]) {
+        *scaled *= power / all;
+        power *= dt;
+    }
+    let coefficient = |j: usize| -> f64 {
+        let terms = CHOICES[j].iter().zip(&scaled).take(j + 1);
+        terms.map(|(choices, a)| choices * a).sum()
+    };
+    (0..COURSE).map(coefficient).fold(f64::INFINITY, f64::min)
+}
+
+/// C(n, k) at `[n][k]`.
+const CHOICES: [[f64; COURSE]; COURSE] = {
+    let mut table = [[0.0; COURSE]; COURSE];
+    let mut n = 0;
+    while n < COURSE {
+        table[n][0] = 1.0;
+        let mut k = 1;
+        while k <= n {
+            table[n][k] = table[n - 1][k - 1] + table[n - 1][k];
+            k += 1;
+        }
+        n += 1;
+    }
+    table
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (1 − τ)⁹ and others: known values, slopes and bounds.
+    const FALLS: Course = [1.0, -9.0, 36.0, -84.0, 126.0, -126.0, 84.0, -36.0, 9.0, -1.0];
+
+    #[test]
+    fn polynomials_are_what_they_are() {
+        assert!((at(&FALLS, 0.5) - 0.5_f64.powi(9)).abs() < 1e-12);
+        assert!((slope(&FALLS, 0.5) + 9.0 * 0.5_f64.powi(8)).abs() < 1e-12);
+        let later = shifted(&FALLS, 0.25);
+        for dt in [0.0, 0.1, 0.3, 0.75] {
+            assert!((at(&later, dt) - (0.75 - dt).powi(9)).abs() < 1e-12);
+        }
+        assert!((last_terms(&FALLS, 0.5) - (9.0 / 256.0 + 1.0 / 512.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_value_is_below_the_least_coefficient() {
+        // All coefficients of (1 - τ)⁹ in the basis of Bernstein on [0, 1] are 0 but the first.
+        assert!(least(&FALLS, 1.0).abs() < 1e-12);
+        let mut wave = [0.0; COURSE];
+        for seed in 0..200_u64 {
+            for (k, c) in wave.iter_mut().enumerate() {
+                *c = ((seed * 7919 + k as u64 * 104_729) % 1009) as f64 / 500.0 - 1.0;
+            }
+            let lowest =
+                (0..=1000).map(|k| at(&wave, 1.2 * f64::from(k) / 1000.0)).fold(f64::INFINITY, f64::min);
+            assert!(least(&wave, 1.2) <= lowest + 1e-12, "{wave:?}");
+        }
+        // A line is its own bound.
+        assert_eq!(least(&[3.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0), 1.0);
+    }
+
+    #[test]
+    fn the_last_terms_are_as_small_as_allowed() {
+        let dt = reach(&FALLS, 1e-6, 10.0);
+        assert!(last_terms(&FALLS, dt) <= 2.1e-6 && last_terms(&FALLS, 1.1 * dt) > 1e-6);
+        assert_eq!(reach(&[5.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1e-9, 7.0), 7.0);
+    }
+}
