@@ -20,8 +20,9 @@ use crate::scalar::all_finite;
 const MARGIN: f64 = 1e-4;
 /// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
-/// Halvings between an input and the one that is preferred.
-const BISECTIONS: u32 = 4;
+/// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
+const FIRST: f64 = 0.125;
+const BISECTIONS: u32 = 3;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
 
@@ -381,6 +382,7 @@ impl AssuredFilter {
             return Ok(&self.assurance);
         }
         self.looked = None;
+        self.filter.is_backed = self.commitment.standing == Standing::Assured;
         self.filter.peek(t, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
         let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: [0.0; MAX_INPUTS] };
@@ -703,7 +705,7 @@ impl AssuredFilter {
     }
 }
 
-/// The witness behind the last input on the way `from` one `to` another that has one, in halvings, and whether that is
+/// The witness behind the last input on the way `from` one `to` another that has one, of those tried, and whether that is
 /// another than `from`, whose witness is `kept`.
 fn towards(
     from: &[f64],
@@ -711,16 +713,17 @@ fn towards(
     mut kept: Witness,
     behind: impl Fn(&[f64]) -> Option<Witness>,
 ) -> (bool, Witness) {
-    let (mut low, mut high, mut input) = (0.0, 1.0, [0.0; MAX_INPUTS]);
-    for _ in 0..BISECTIONS {
-        let part = 0.5 * (low + high);
+    let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
+    for _ in 0..=BISECTIONS {
         for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
             *input = from + part * (to - from);
         }
         match behind(&input[..from.len()]) {
             Some(witness) => (low, kept) = (part, witness),
+            None if low == 0.0 => break,
             None => high = part,
         }
+        part = 0.5 * (low + high);
     }
     (low > 0.0, kept)
 }

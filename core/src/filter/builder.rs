@@ -458,6 +458,7 @@ impl FilterBuilder {
             first_period,
             period_max,
             expected: None,
+            is_backed: false,
             state,
             workspace,
         })

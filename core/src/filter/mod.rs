@@ -123,6 +123,8 @@ pub struct SafetyFilter {
     period_max: f64,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
+    /// Whether a plan stands behind the next step, so that rows need not be met.
+    is_backed: bool,
     state: FilterState,
     workspace: Workspace,
 }

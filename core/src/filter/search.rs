@@ -49,10 +49,10 @@ const SAME: f64 = 1e-6;
 const FAR: f64 = 8.0;
 /// Distance aside of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
 const ASIDE: f64 = 0.5;
-/// Linearisations per guess.
-const ITERATIONS: u32 = 12;
-/// Halvings of the way to the answer of one linearisation.
-const HALVINGS: u32 = 8;
+/// Linearisations per guess, and halvings of the way to the answer of one of them.
+const PATIENT: [u32; 2] = [12, 8];
+/// The same where a plan stands behind the step: what is found with more of them is seldom better than the plan.
+const BACKED: [u32; 2] = [4, 2];
 /// The part of the foretold decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
 /// Largest ratio of each step of a search to the one before, for its answer to be the only one near.
@@ -93,6 +93,8 @@ pub(super) struct PeriodProblem<'a> {
     pub(super) errors: &'a MeasurementErrors,
     /// Whether to look far around for an input where the pointwise rows cannot be met either.
     pub(super) widens: bool,
+    /// Whether a plan stands behind the step, so that rows need not be met.
+    pub(super) is_backed: bool,
 }
 
 /// Linear models of the sampled rows, and the violation of each at the present u in units of its terms.
@@ -164,7 +166,8 @@ impl PeriodProblem<'_> {
         settled &= best.distance <= FAR * size;
         settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, i, &mut at));
         // Look far around where the answer is in doubt.
-        let widens = self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal;
+        let widens =
+            !self.is_backed && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
         if !settled
             && widens
             && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, qp)
@@ -244,6 +247,10 @@ impl PeriodProblem<'_> {
     fn problem<'b>(&'b self, rows: &'b [Row]) -> Problem<'b> {
         let plain = Problem::new(rows, self.bounds, self.u_ref, self.correction_limit);
         Problem { enforcement: self.enforcement, ..plain }
+    }
+
+    fn patience(&self) -> [u32; 2] {
+        if self.is_backed { BACKED } else { PATIENT }
     }
 
     fn soft(&self) -> RowSet {
@@ -409,7 +416,8 @@ impl PeriodProblem<'_> {
         let mut target = [0.0; MAX_INPUTS];
         let (target, mut last_way) = (&mut target[..m], f64::INFINITY);
         let mut ended = false;
-        for _ in 0..ITERATIONS {
+        let [iterations, _] = self.patience();
+        for _ in 0..iterations {
             // The answer of the QP linearised here.
             let solution = qp.solve(&self.problem(at.rows), target);
             found.relaxed = soft | qp.relaxed() | qp.ill_conditioned();
@@ -463,7 +471,8 @@ impl PeriodProblem<'_> {
         let m = u.len();
         let from: [f64; MAX_INPUTS] = core::array::from_fn(|i| if i < m { u[i] } else { 0.0 });
         let (violation, mut part) = (found.violation, 1.0);
-        for _ in 0..=HALVINGS {
+        let [_, halvings] = self.patience();
+        for _ in 0..=halvings {
             for i in 0..m {
                 // Round-off may leave the bounds, between two points within them.
                 u[i] = self.bounds.clamp(i, from[i] + part * (target[i] - from[i]));

@@ -213,6 +213,7 @@ impl SafetyFilter {
                 correction_limit,
                 errors: &self.errors,
                 widens: self.state.barriers.iter().all(widens),
+                is_backed: self.is_backed,
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, qp, u) {
