@@ -2,7 +2,7 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
-use punctual_core::barriers::{DistanceDisc, Outside};
+use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
     Phase, SafetyFilter, Sampling, Standing, Status,
@@ -367,6 +367,67 @@ fn tiny_and_huge_steps_are_answered() {
             t += hold;
         }
     }
+}
+
+/// A plan that is kept on its own ends through a change of the period is none of the new period: what ends it then is the
+/// change.
+#[test]
+fn a_plan_of_another_period_ends_as_irregular() {
+    let mut seen = 0;
+    for seed in 1..=6_u64 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let vehicle = Vehicle::Unicycle;
+        let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
+        let (mut t, mut x, mut u) = (0.0, [0.0, 0.0, -0.4, 1.0], [0.0; 2]);
+        let other = random.between(0.3, 2.7) * PERIOD;
+        for step in 0..60 {
+            let hold = if step < 40 { PERIOD } else { other };
+            filter.expect_hold(Some(hold)).expect("a time");
+            let u_ref = wanted(vehicle, seed % 5, x, [6.0, 2.0], random);
+            if !filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").is_assured() {
+                break;
+            }
+            x = vehicle.move_by(x, u, hold);
+            t += hold;
+            if step > 41 && format!("{:?}", filter.commitment()).contains("is_even: false") {
+                seen += 1;
+                let lost = |x: &[f64]| {
+                    let mut copy = vehicle.assured(8.0, [6.0, 2.0]);
+                    copy.restore(filter.filter().state(), filter.commitment()).expect("its own");
+                    copy.expect_hold(Some(other)).expect("a time");
+                    copy.step(t, x, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").standing
+                };
+                assert_eq!(lost(&[-400.0, 0.0, 0.0, 0.0]), Standing::Irregular);
+                // Its input changes within this hold.
+                assert_eq!(lost(&[f64::NAN; 4]), Standing::Irregular);
+            }
+        }
+    }
+    assert!(seen > 0, "no plan was kept through a change");
+}
+
+/// A small set seen from far away has no room for a margin in parts of the distance.
+#[test]
+fn small_sets_are_promised_from_far_away() {
+    let quadratic = QuadraticDisc::new([150.0, 0.0], 1.0).expect("valid disc");
+    let disc = DistanceDisc::new([2000.0, 0.0], 0.3, 0.3).expect("valid disc");
+    let far = |builder: Result<FilterBuilder, punctual_core::Error>| {
+        let filter = builder
+            .and_then(|b| b.bounds(&[-8.0; 2], &[8.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        filter.foresee(0.0, &[0.0; 4], 1.0)
+    };
+    let builder = || SafetyFilter::builder(4, 2);
+    let small = far(builder().barrier("goal", PointMass, quadratic, BarrierSettings::within(12.0)));
+    assert!(small.is_ok(), "{small:?}");
+    let distant = far(builder().barrier("goal", PointMass, disc, BarrierSettings::within(60.0)));
+    assert!(distant.is_ok(), "{distant:?}");
+    // Not where nothing is left: too soon.
+    let soon = far(builder().barrier("goal", PointMass, quadratic, BarrierSettings::within(6.0)));
+    assert!(matches!(soon, Err(Failure::Broken { .. })), "{soon:?}");
 }
 
 /// Pushed against the edge for ever: the margin is kept, the input settles, and the plan does not grow.

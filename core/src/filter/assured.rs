@@ -12,12 +12,14 @@ use super::{
 use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::{Derivatives, Direction};
+use crate::lie::{Derivatives, Direction, Predict};
 use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
 use crate::scalar::all_finite;
 
-/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
+/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples. No
+/// more than a part of the largest h there is: a small set that is far away has no room for it.
 const MARGIN: f64 = 1e-4;
+const ROOM: f64 = 0.05;
 /// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
 /// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
@@ -466,9 +468,12 @@ impl AssuredFilter {
 
     /// Whether the sample at `t` is one for which the plan was made.
     fn is_regular(&self, t: f64, hold: f64) -> bool {
-        self.commitment.sample.is_some_and(|[last, held]| {
+        let Commitment { plan, sample, .. } = &self.commitment;
+        sample.is_some_and(|[last, held]| {
             let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-            (t == last || t >= last + held - tolerance) && (hold - held).abs() <= ON_TIME * held
+            plan.witness.is_even
+                && (t == last || t >= last + held - tolerance)
+                && (hold - held).abs() <= ON_TIME * held
         })
     }
 
@@ -543,9 +548,16 @@ impl AssuredFilter {
                 End::OnArrival => from + self.period,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
-            (!soft && until > from).then_some(Promise { from, until, margin: MARGIN * h.abs() })
+            (!soft && until > from).then_some(Promise { from, until, margin: self.margin(slot, t, x, h) })
         };
         self.filter.slots.iter().map(promise).collect()
+    }
+
+    /// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
+    fn margin(&self, slot: &BarrierSlot, t: f64, x: &[f64], h: f64) -> f64 {
+        let wanted = MARGIN * h.abs();
+        let highest = slot.source.predict().map_or(0.0, |model| highest(model, t, x, wanted / ROOM));
+        if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
     }
 
     /// The plan that a first sample at `t` and `x` would find, with every deadline `factor` times as long. Remembers
@@ -734,6 +746,41 @@ impl Looked {
         let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
         same(&[self.t, self.hold], &[t, hold]) && same(&self.x, x) && same(&self.u_ref, u_ref)
     }
+}
+
+/// The largest h found uphill from `x` at `t`, up to `enough`.
+fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
+    const STEPS: u32 = 60;
+    const HALVINGS: u32 = 30;
+    let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
+    let mut h = model.value(t, &x);
+    for _ in 0..STEPS {
+        for i in 0..x.len() {
+            let (at, size) = (x[i], 1e-6 * (1.0 + x[i].abs()));
+            let [above, below] = [size, -size].map(|by| {
+                x[i] = at + by;
+                model.value(t, &x)
+            });
+            x[i] = at;
+            gradient[i] = (above - below) / (2.0 * size);
+        }
+        let steepness: f64 = gradient.iter().map(|g| g * g).sum();
+        let mut length = (enough - h) / steepness;
+        let climbs = (0..HALVINGS).any(|_| {
+            for (next, (x, g)) in next.iter_mut().zip(x.iter().zip(&gradient)) {
+                *next = x + length * g;
+            }
+            length *= 0.5;
+            model.value(t, &next) > h
+        });
+        // Not-a-number leads nowhere.
+        if h >= enough || !climbs {
+            break;
+        }
+        x.copy_from_slice(&next);
+        h = model.value(t, &x);
+    }
+    h
 }
 
 /// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
