@@ -80,7 +80,8 @@ impl FilterLoop {
     /// The number of the input that is integrated, if one is.
     pub fn integrated_input(&self) -> Option<usize> {
         match self {
-            Self::Plain(_) | Self::Assured(_) => None,
+            Self::Plain(_) => None,
+            Self::Assured(assured) => assured.integrated_input(),
             Self::Integrated(integrated) => Some(integrated.input()),
         }
     }
@@ -88,7 +89,8 @@ impl FilterLoop {
     /// The integral of that input after the last step; 0 where there is none.
     pub fn integrated(&self) -> f64 {
         match self {
-            Self::Plain(_) | Self::Assured(_) => 0.0,
+            Self::Plain(_) => 0.0,
+            Self::Assured(assured) => assured.value(),
             Self::Integrated(integrated) => integrated.value(),
         }
     }
@@ -96,7 +98,8 @@ impl FilterLoop {
     /// Puts back an [integral](Self::integrated).
     pub fn set_integrated(&mut self, value: f64) {
         match self {
-            Self::Plain(_) | Self::Assured(_) => {}
+            Self::Plain(_) => {}
+            Self::Assured(assured) => assured.set_value(value),
             Self::Integrated(integrated) => integrated.set_value(value),
         }
     }
@@ -135,7 +138,8 @@ impl FilterLoop {
             Self::Plain(filter) => filter.peek(t, x, u_ref, u).map(|_| 0.0),
             Self::Assured(assured) => {
                 assured.expect_hold(Some(hold))?;
-                assured.peek(t, x, u_ref, u).map(|_| 0.0)
+                assured.peek(t, x, u_ref, u)?;
+                Ok(assured.next_value())
             }
             Self::Integrated(integrated) => integrated.peek(t, hold, x, u_ref, u),
         }
@@ -202,10 +206,12 @@ impl FilterLoop {
     pub fn restore(&mut self, state: &LoopState) -> Result<(), Error> {
         match self {
             Self::Plain(filter) => filter.restore(&state.filter),
-            Self::Assured(assured) => match &state.commitment {
-                Some(commitment) => assured.restore(&state.filter, commitment),
-                None => assured.restore(&state.filter, &Commitment::default()),
-            },
+            Self::Assured(assured) => {
+                let blank = Commitment::default();
+                assured.restore(&state.filter, state.commitment.as_ref().unwrap_or(&blank))?;
+                assured.set_value(state.integrated);
+                Ok(())
+            }
             Self::Integrated(own) => own.restore(&state.filter, state.integrated),
         }
     }

@@ -222,8 +222,9 @@ fn watched(c: &FilterConfiguration) -> f64 {
 
 /// The closed loop of the configuration from `x0`, well past every deadline.
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
-    // An integrator is part of the plant here.
-    let mut filter = if c.is_assured() { c.build_loop()? } else { FilterLoop::Plain(c.build()?) };
+    // An integrator is part of the plant here, so its filter is that of the rows.
+    let follows = c.is_assured() && c.integrator.is_none();
+    let mut filter = if follows { c.build_loop()? } else { FilterLoop::Plain(c.build()?) };
     let plant = c.plant.build()?;
     let (length, deadlines) = (watched(c), deadlines(c));
     // The closed loop, finely enough.

@@ -43,7 +43,7 @@ impl Plane {
     /// Reads `x=0..10,y=-5..5`, two of the filter's states.
     pub(super) fn parse(text: &str, cells: usize, c: &FilterConfiguration) -> Result<Self, Error> {
         let refuse = |message: String| Error::configuration("--map", message);
-        let states = c.plant.states();
+        let states = c.measured_states();
         let side = |part: &str| -> Result<(usize, [f64; 2]), Error> {
             let like = || refuse(format!("has {:?}, must be like \"x_p=-5..25\"", part.trim()));
             let (name, range) = part.split_once('=').ok_or_else(like)?;
@@ -69,7 +69,7 @@ impl Plane {
     }
 }
 
-/// Draws which starts have a plan, `x0` but for the two states of `plane`, into `folder`.
+/// Draws which starts have a plan, `x0`, as it is [measured](FilterConfiguration::measured), but for the two states of `plane`, into `folder`.
 pub(super) fn starts(
     c: &FilterConfiguration,
     x0: &[f64],
@@ -122,7 +122,7 @@ pub(super) fn starts(
         )
         .collect::<Result<_, Error>>()?;
     // The picture and the table.
-    let signals = c.plant.states();
+    let signals = c.measured_states();
     let label = |axis: usize| {
         let state = &signals[plane.states[axis]];
         format!("{} at the start ({})", state.name, state.unit)
@@ -163,10 +163,7 @@ pub(super) fn plan(
     let end = plan.inputs.last().map_or(t, |(end, _)| *end);
     let way = filter.way(plan, t, x0, (end - t) / POINTS);
     let time: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
-    let mut h = vec![vec![0.0; c.barrier.len()]; way.len()];
-    for ((t, x, _), h) in way.iter().zip(&mut h) {
-        filter.filter().barrier_values(*t, x, h).map_err(Error::from)?;
-    }
+    let h: Vec<Vec<f64>> = way.iter().map(|(t, x, _)| filter.values(*t, x)).collect();
     let mut panels = Vec::new();
     for (i, barrier) in c.barrier.iter().enumerate() {
         let values = h.iter().map(|h| h[i]).collect();
@@ -183,7 +180,7 @@ pub(super) fn plan(
             ..TimePlot::default()
         });
     }
-    for (i, input) in c.plant.inputs().into_iter().enumerate() {
+    for (i, input) in c.commanded().into_iter().enumerate() {
         let values = way.iter().map(|(.., u)| u[i]).collect();
         let series = Series {
             label: format!("u.{}", input.name),
@@ -192,7 +189,7 @@ pub(super) fn plan(
             style: Style::Steps,
             ..Series::default()
         };
-        let limits = c.bounds.get(&input.name).copied().unwrap_or_default();
+        let limits = c.limits(&input.name).unwrap_or_default();
         panels.push(TimePlot {
             y_label: format!("{} ({})", input.name, input.unit),
             series: vec![series],
@@ -205,7 +202,7 @@ pub(super) fn plan(
     let mut files = vec![file("plan")];
     plot::times(&panels, &files[0])?;
     // The vehicles by name have their place first.
-    let states = c.plant.states();
+    let states = c.measured_states();
     if c.plant.model().is_some() && states.len() >= 2 && states[0].unit == "m" && states[1].unit == "m" {
         let along = |i: usize| way.iter().map(|(_, x, _)| x[i]).collect();
         let arrival = c

@@ -2,18 +2,22 @@
 //! (`docs/theory.md#witness`).
 
 use alloc::format;
+use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Deref;
 
+use super::integrator::Outer;
 use super::slot::BarrierSlot;
 use super::{
-    Begin, End, FilterState, Infeasible, NoDerivative, Phase, Report, SafetyFilter, SampleDerivative, Status,
-    Strictness, Workspace,
+    Begin, End, FilterState, Infeasible, IntegratedFilter, Integration, NoDerivative, Phase, Report,
+    SafetyFilter, SampleDerivative, Status, Strictness, Workspace,
 };
 use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::{Derivatives, Direction, Predict};
+use crate::lie::{Direction, Predict};
 use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
+use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples. No
@@ -185,7 +189,9 @@ struct Looked {
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
 pub struct AssuredFilter {
-    filter: SafetyFilter,
+    rows: Rows,
+    /// The bounds of the inputs, as the plant outside has them.
+    bounds: Bounds,
     period: f64,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
@@ -193,7 +199,78 @@ pub struct AssuredFilter {
     /// The sample that the reports are of, and the commitment after it.
     looked: Option<Looked>,
     next: Commitment,
+    /// The integral after that sample; 0 where there is none.
+    next_value: f64,
     assurance: Assurance,
+}
+
+/// The filter inside, whose rows are asked first.
+enum Rows {
+    Plain(SafetyFilter),
+    Integrated(IntegratedFilter),
+}
+
+impl Rows {
+    fn filter(&self) -> &SafetyFilter {
+        match self {
+            Self::Plain(filter) => filter,
+            Self::Integrated(integrated) => &integrated.filter,
+        }
+    }
+
+    fn filter_mut(&mut self) -> &mut SafetyFilter {
+        match self {
+            Self::Plain(filter) => filter,
+            Self::Integrated(integrated) => &mut integrated.filter,
+        }
+    }
+
+    /// Number of states and inputs of the plant outside.
+    fn dims(&self) -> [usize; 2] {
+        let SafetyFilter { state_dim, input_dim, .. } = self.filter();
+        [state_dim - usize::from(matches!(self, Self::Integrated(_))), *input_dim]
+    }
+
+    /// Writes the answer of the rows; returns the integral after it.
+    fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<f64, Error> {
+        match self {
+            Self::Plain(filter) => filter.peek(t, x, u_ref, u).map(|_| 0.0),
+            Self::Integrated(integrated) => integrated.peek(t, hold, x, u_ref, u),
+        }
+    }
+
+    /// Writes what the plant would be given if nothing but the bounds were in the way of `u_ref`; returns whether that is
+    /// u_ref, or follows it as it always does.
+    fn wanted(&self, hold: f64, u_ref: &[f64], u: &mut [f64]) -> bool {
+        match self {
+            Self::Plain(filter) => {
+                for (i, (u, wish)) in u.iter_mut().zip(u_ref).enumerate() {
+                    *u = filter.bounds.clamp(i, *wish);
+                }
+                u == u_ref
+            }
+            Self::Integrated(integrated) => {
+                integrated.wanted(hold, u_ref, u);
+                let others = u.iter().zip(u_ref).enumerate().filter(|(i, _)| *i != integrated.of.input);
+                others.map(|(_, both)| both).all(|(u, wish)| u == wish)
+            }
+        }
+    }
+
+    /// The input of the filter inside for the input `u` of the plant, which changes the integral evenly, and the integral
+    /// after it.
+    fn inside(&self, hold: f64, u: &[f64]) -> ([f64; MAX_INPUTS], f64) {
+        let mut inside = [0.0; MAX_INPUTS];
+        inside[..u.len()].copy_from_slice(u);
+        match self {
+            Self::Plain(_) => (inside, 0.0),
+            Self::Integrated(integrated) => {
+                let (input, value) = (integrated.of.input, integrated.value());
+                inside[input] = 2.0 * (u[input] - value) / hold;
+                (inside, integrated.limited(2.0 * u[input] - value))
+            }
+        }
+    }
 }
 
 impl AssuredFilter {
@@ -207,7 +284,42 @@ impl AssuredFilter {
     /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
     /// than the first one; one that begins later; a bound on disturbance or measurement errors; a delay.
     pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
+        let bounds = filter.bounds.clone();
+        Self::around(Rows::Plain(filter), bounds, period)
+    }
+
+    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0. Plans are those of the plant outside,
+    /// which has the integrated state for its input, within its limits. `x`, `u` and `u_ref` are those of
+    /// [`IntegratedFilter::step`].
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::new`]. Bounds on the rate; a barrier that depends on the integrated state.
+    pub fn integrated(filter: IntegratedFilter, period: f64) -> Result<Self, Error> {
+        let Integration { state, input, limits, .. } = filter.of;
+        let refuse = |message: &str| Err(Error::new(ErrorKind::Unsupported, "integrator", message));
+        if filter.rates != [f64::NEG_INFINITY, f64::INFINITY] {
+            return refuse("has a bounded rate, which no plan accounts for yet");
+        }
+        let depends = |slot: &BarrierSlot| {
+            let value = |held: f64| {
+                let mut x = vec![0.3; filter.filter.state_dim];
+                x[state] = held;
+                slot.source.predict().map(|model| model.value(0.0, &x).to_bits())
+            };
+            value(0.0) != value(0.1)
+        };
+        if filter.filter.slots.iter().any(depends) {
+            return refuse("has a state that a barrier depends on, which no plan accounts for yet");
+        }
+        let mut bounds = filter.filter.bounds.clone();
+        [bounds.min[input], bounds.max[input]] = limits;
+        Self::around(Rows::Integrated(filter), bounds, period)
+    }
+
+    fn around(rows: Rows, bounds: Bounds, period: f64) -> Result<Self, Error> {
         positive("period", period)?;
+        let filter = rows.filter();
         let refuse = |field: &str, message: &str| {
             Err(Error::new(
                 ErrorKind::Unsupported,
@@ -235,21 +347,52 @@ impl AssuredFilter {
                 return Err(named(Error::new(ErrorKind::Unsupported, "source", message)));
             }
         }
-        one_plant(&filter, period)?;
+        one_plant(filter, period)?;
         Ok(Self {
-            filter,
+            rows,
+            bounds,
             period,
             expected: None,
             commitment: Commitment::default(),
             looked: None,
             next: Commitment::default(),
+            next_value: 0.0,
             assurance: Assurance::default(),
         })
     }
 
     /// The filter inside: to look at.
     pub fn filter(&self) -> &SafetyFilter {
-        &self.filter
+        self.rows.filter()
+    }
+
+    /// The number of the input that is integrated, if one is.
+    pub fn integrated_input(&self) -> Option<usize> {
+        match &self.rows {
+            Rows::Plain(_) => None,
+            Rows::Integrated(integrated) => Some(integrated.of.input),
+        }
+    }
+
+    /// The integral after the last step, as [`IntegratedFilter::value`]; 0 where there is none.
+    pub fn value(&self) -> f64 {
+        match &self.rows {
+            Rows::Plain(_) => 0.0,
+            Rows::Integrated(integrated) => integrated.value(),
+        }
+    }
+
+    /// The integral that it would have after the sample of the last [`Self::peek`].
+    pub fn next_value(&self) -> f64 {
+        self.next_value
+    }
+
+    /// Puts back a [`Self::value`]; the nearest within the limits.
+    pub fn set_value(&mut self, value: f64) {
+        if let Rows::Integrated(integrated) = &mut self.rows {
+            integrated.set_value(value);
+            self.looked = None;
+        }
     }
 
     /// The plan that is committed, where there is one.
@@ -267,15 +410,14 @@ impl AssuredFilter {
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
         let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
-        let Some(plant) = self.filter.slots.first().and_then(|slot| slot.source.predict()) else {
-            return way;
-        };
+        let models = self.models();
+        let Some(plant) = models.first() else { return way };
         for (end, u) in &witness.inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
             for k in 1..=steps {
                 way.push((at, x.clone(), *u));
                 let next = begin + (end - begin) * k as f64 / steps as f64;
-                plant.flow(&mut x, &u[..self.filter.input_dim], next - at);
+                plant.flow(&mut x, &u[..self.rows.dims()[1]], next - at);
                 at = next;
             }
         }
@@ -283,9 +425,14 @@ impl AssuredFilter {
         way
     }
 
+    /// h of every barrier at time `t` (s) and state `x`.
+    pub fn values(&self, t: f64, x: &[f64]) -> Vec<f64> {
+        self.models().iter().map(|model| model.value(t, x)).collect()
+    }
+
     /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.
     pub fn report(&self) -> &Report {
-        self.filter.report()
+        self.filter().report()
     }
 
     /// Where the promise stands, and who chose the last input.
@@ -313,10 +460,10 @@ impl AssuredFilter {
         let Commitment { standing, promises, plan, sample, .. } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
-            length("promises", promises.len(), self.filter.slots.len())?;
+            length("promises", promises.len(), self.filter().slots.len())?;
         }
         if *standing == Standing::Assured {
-            if let Some(flaw) = plan.flaw(self.filter.state_dim, self.filter.input_dim) {
+            if let Some(flaw) = plan.flaw(self.rows.dims()) {
                 return refuse("plan", flaw);
             }
             let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
@@ -327,7 +474,7 @@ impl AssuredFilter {
                 return refuse("sample", "has no time, must have one beside a plan");
             }
         }
-        self.filter.restore(state)?;
+        self.rows.filter_mut().restore(state)?;
         self.commitment.clone_from(commitment);
         self.looked = None;
         let Commitment { standing, failure, .. } = self.commitment;
@@ -337,7 +484,7 @@ impl AssuredFilter {
 
     /// Forgets promise and plan: the next sample decides anew.
     pub fn rearm(&mut self) {
-        self.filter.rearm();
+        self.rows.filter_mut().rearm();
         self.commitment = Commitment::default();
         self.looked = None;
         self.assurance = Assurance::default();
@@ -361,8 +508,12 @@ impl AssuredFilter {
     /// A slice of the wrong length.
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
         self.peek(t, x, u_ref, u)?;
-        core::mem::swap(&mut self.filter.state, &mut self.filter.workspace.next);
+        let SafetyFilter { state, workspace, .. } = self.rows.filter_mut();
+        core::mem::swap(state, &mut workspace.next);
         core::mem::swap(&mut self.commitment, &mut self.next);
+        if let Rows::Integrated(integrated) = &mut self.rows {
+            integrated.set_value(self.next_value);
+        }
         self.looked = None;
         Ok(&self.assurance)
     }
@@ -373,9 +524,10 @@ impl AssuredFilter {
     ///
     /// As for [`Self::step`].
     pub fn peek(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Assurance, Error> {
-        length("x", x.len(), self.filter.state_dim)?;
-        length("u_ref", u_ref.len(), self.filter.input_dim)?;
-        length("u", u.len(), self.filter.input_dim)?;
+        let [states, inputs] = self.rows.dims();
+        length("x", x.len(), states)?;
+        length("u_ref", u_ref.len(), inputs)?;
+        length("u", u.len(), inputs)?;
         let hold = self.expected.unwrap_or(self.period);
         if let Some(looked) = &self.looked
             && looked.is_at(t, hold, x, u_ref)
@@ -384,8 +536,8 @@ impl AssuredFilter {
             return Ok(&self.assurance);
         }
         self.looked = None;
-        self.filter.is_backed = self.commitment.standing == Standing::Assured;
-        self.filter.peek(t, x, u_ref, u)?;
+        self.rows.filter_mut().is_backed = self.commitment.standing == Standing::Assured;
+        self.next_value = self.rows.peek(t, hold, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
         let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: [0.0; MAX_INPUTS] };
         looked.u[..u.len()].copy_from_slice(u);
@@ -407,13 +559,18 @@ impl AssuredFilter {
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
         let (mut u, mut rows) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
-        let (u, rows) = (&mut u[..self.filter.input_dim], &mut rows[..self.filter.input_dim]);
+        let inputs = self.rows.dims()[1];
+        let (u, rows) = (&mut u[..inputs], &mut rows[..inputs]);
         self.peek(t, x, u_ref, u)?;
         self.looked = None;
-        self.filter.peek(t, x, u_ref, rows)?;
-        match u == rows {
-            true => self.filter.differentiate(t, x, u_ref, direction, out),
-            false => Ok(Some(NoDerivative::Plan)),
+        let hold = self.expected.unwrap_or(self.period);
+        self.rows.peek(t, hold, x, u_ref, rows)?;
+        if u != rows {
+            return Ok(Some(NoDerivative::Plan));
+        }
+        match &mut self.rows {
+            Rows::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
+            Rows::Integrated(integrated) => integrated.differentiate(t, hold, x, u_ref, direction, out),
         }
     }
 
@@ -434,8 +591,9 @@ impl AssuredFilter {
         }
         self.assurance.driver = Driver::Rows;
         // What is let go on arrival is promised no longer.
-        let reports = &self.filter.workspace.report.barriers;
-        for ((promise, slot), b) in self.next.promises.iter_mut().zip(&self.filter.slots).zip(reports) {
+        let SafetyFilter { slots, workspace, .. } = self.rows.filter();
+        let reports = &workspace.report.barriers;
+        for ((promise, slot), b) in self.next.promises.iter_mut().zip(slots).zip(reports) {
             if slot.end == End::OnArrival && b.phase == Phase::Released {
                 *promise = None;
             }
@@ -449,7 +607,7 @@ impl AssuredFilter {
         }
         (self.assurance.standing, self.assurance.failure) = (self.next.standing, self.next.failure);
         if self.next.standing == Standing::Assured {
-            self.report_on(&rows[..u.len()], u);
+            self.report_on(hold, &rows[..u.len()], u);
         }
     }
 
@@ -478,10 +636,18 @@ impl AssuredFilter {
     }
 
     /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it.
-    fn report_on(&mut self, rows: &[f64], u: &[f64]) {
-        let Workspace { next, report, .. } = &mut self.filter.workspace;
-        next.input[..u.len()].copy_from_slice(u);
+    fn report_on(&mut self, hold: f64, rows: &[f64], u: &[f64]) {
         let driver = self.assurance.driver;
+        let (inside, value) = self.rows.inside(hold, u);
+        if let Some(input) = self.integrated_input()
+            && u != rows
+        {
+            // What a plan holds is where the integral is then.
+            let evenly = matches!(driver, Driver::Reference | Driver::Eased);
+            self.next_value = if evenly { value } else { u[input] };
+        }
+        let Workspace { next, report, .. } = &mut self.rows.filter_mut().workspace;
+        next.input[..u.len()].copy_from_slice(&inside[..u.len()]);
         report.status = match (report.status, driver) {
             (Status::InvalidInput, _) => Status::InvalidInput,
             (_, Driver::Reference) => Status::Unchanged,
@@ -494,7 +660,7 @@ impl AssuredFilter {
         {
             if u != rows {
                 (b.on_course, state.on_course) = (false, false);
-                b.slack = b.row.slack(u);
+                b.slack = b.row.slack(&inside[..u.len()]);
             }
             if promise.is_some() && b.phase != Phase::Released {
                 b.guaranteed = true;
@@ -513,7 +679,7 @@ impl AssuredFilter {
         let is_over = next.is_none() && !plan.stays();
         if let Some((_, input)) = next.or(inputs.last()) {
             for (i, u) in u.iter_mut().enumerate() {
-                *u = self.filter.bounds.clamp(i, input[i]);
+                *u = self.bounds.clamp(i, input[i]);
             }
         }
         if is_over || !self.is_regular(t, hold) {
@@ -530,11 +696,9 @@ impl AssuredFilter {
 
     /// The promises from `x` at `t`, each deadline multiplied by the factor of its barrier.
     fn promises(&self, t: f64, x: &[f64], factor: impl Fn(&BarrierSlot) -> f64) -> Vec<Option<Promise>> {
-        let promise = |slot: &BarrierSlot| {
+        let promise = |(slot, model): (&BarrierSlot, Model<'_>)| {
             // Not that of the report, which has none where u_ref is no number.
-            let mut derivatives = Derivatives::ZERO;
-            slot.source.evaluate(t, x, &mut derivatives);
-            let h = derivatives.drift[0];
+            let h = model.value(t, x);
             let from = match slot.promise.settings().deadline {
                 // Not-a-number is asked for at once, and found by the check.
                 _ if h.is_nan() || h >= 0.0 => t,
@@ -548,16 +712,21 @@ impl AssuredFilter {
                 End::OnArrival => from + self.period,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
-            (!soft && until > from).then_some(Promise { from, until, margin: self.margin(slot, t, x, h) })
+            (!soft && until > from).then_some(Promise { from, until, margin: margin(&*model, t, x, h) })
         };
-        self.filter.slots.iter().map(promise).collect()
+        self.filter().slots.iter().zip(self.models()).map(promise).collect()
     }
 
-    /// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
-    fn margin(&self, slot: &BarrierSlot, t: f64, x: &[f64], h: f64) -> f64 {
-        let wanted = MARGIN * h.abs();
-        let highest = slot.source.predict().map_or(0.0, |model| highest(model, t, x, wanted / ROOM));
-        if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
+    /// Every barrier along the plant outside.
+    fn models(&self) -> Vec<Model<'_>> {
+        let slots = self.filter().slots.iter();
+        let predicts = slots.filter_map(|slot| slot.source.predict());
+        match &self.rows {
+            Rows::Plain(_) => predicts.map(Model::Plain).collect(),
+            Rows::Integrated(IntegratedFilter { of: Integration { state, input, .. }, .. }) => {
+                predicts.map(|inside| Model::Outer(Outer { inside, state: *state, input: *input })).collect()
+            }
+        }
     }
 
     /// The plan that a first sample at `t` and `x` would find, with every deadline `factor` times as long. Remembers
@@ -587,7 +756,7 @@ impl AssuredFilter {
         let promises = self.promises(t, x, |_| 1.0);
         let mut found = search(&promises).map(|plan| (1.0, (promises.clone(), plan)));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
-        if found.is_err() && self.filter.slots.iter().any(yields) {
+        if found.is_err() && self.filter().slots.iter().any(yields) {
             let later = least_factor(Self::LONGEST, None, |factor| {
                 let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
                 let plan = search(&promises).ok()?;
@@ -610,9 +779,10 @@ impl AssuredFilter {
 
     /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield.
     fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
-        let Workspace { next, report, .. } = &mut self.filter.workspace;
-        let states = next.barriers.iter_mut().zip(&self.filter.state.barriers);
-        for ((slot, (state, before)), b) in self.filter.slots.iter().zip(states).zip(&mut report.barriers) {
+        let SafetyFilter { slots, state, workspace, .. } = self.rows.filter_mut();
+        let Workspace { next, report, .. } = workspace;
+        let states = next.barriers.iter_mut().zip(&state.barriers);
+        for ((slot, (state, before)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
             let settings = slot.promise.settings();
             let Some(deadline) = settings.deadline else { continue };
             if factor > 1.0 && settings.infeasible == Infeasible::Soonest && slot.now.in_force && b.h < 0.0 {
@@ -634,22 +804,23 @@ impl AssuredFilter {
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let slots = self.filter.slots.iter().zip(promises).enumerate();
-        let requirements: Vec<Requirement<'_>> = slots
-            .filter_map(|(barrier, (slot, promise))| {
+        let models = self.models();
+        let requirements: Vec<Requirement<'_>> = models
+            .iter()
+            .zip(promises)
+            .enumerate()
+            .filter_map(|(barrier, (model, promise))| {
                 let Promise { from, until, margin } = (*promise)?;
-                let model = slot.source.predict()?;
-                Some(Requirement { barrier, source: &*slot.source, model, from, until, margin })
+                Some(Requirement { barrier, model: &**model, from, until, margin })
             })
             .collect();
         if requirements.is_empty() {
             return Err(Failure::Nothing);
         }
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
-        let source = &*self.filter.slots[0].source;
-        let planner = Planner::new(source, &self.filter.bounds, &requirements, period, size);
-        let irregular = !self.is_regular(t, period);
-        f(&planner.ok_or(Failure::Singular)?.irregular(irregular))
+        let planner =
+            Planner::new(requirements[0].model, self.rows.dims(), &self.bounds, &requirements, period, size);
+        f(&planner.irregular(!self.is_regular(t, period)))
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
@@ -658,17 +829,17 @@ impl AssuredFilter {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let mut wanted = [0.0; MAX_INPUTS];
         let wanted = &mut wanted[..u.len()];
-        for (i, w) in wanted.iter_mut().enumerate() {
-            *w = self.filter.bounds.clamp(i, u_ref[i]);
-        }
+        let is_wish = self.rows.wanted(hold, u_ref, wanted);
+        let wish: [f64; MAX_INPUTS] = core::array::from_fn(|i| wanted.get(i).copied().unwrap_or_default());
+        let wish = &wish[..u.len()];
         let plan = &self.next.plan;
         // Gentle, and with the margin that is aimed at.
         let comfortable = |witness: &Witness| {
-            let margin = |at: &Tightest| self.filter.slots[at.barrier].promise.settings().margin;
+            let margin = |at: &Tightest| self.filter().slots[at.barrier].promise.settings().margin;
             witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            let passes = reached && wanted.iter().zip(u_ref).all(|(w, r)| w == r);
+            let passes = reached && is_wish;
             if passes
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
@@ -677,12 +848,12 @@ impl AssuredFilter {
             }
             wanted.copy_from_slice(u);
             if let Ok(witness) = planner.behind(plan, t, x, wanted) {
-                if !passes || !comfortable(&witness) || u == u_ref {
+                if !passes || !comfortable(&witness) || u == wish {
                     return Ok((Driver::Rows, witness));
                 }
                 // As near to u_ref as is comfortable, so that the input does not jump between the two.
                 let eased =
-                    towards(u, u_ref, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
+                    towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
                 return Ok((if eased.0 { Driver::Eased } else { Driver::Rows }, eased.1));
             }
             // Towards the answer of the rows, from the plan's own input.
@@ -717,6 +888,23 @@ impl AssuredFilter {
     }
 }
 
+/// A barrier along the plant outside.
+enum Model<'a> {
+    Plain(&'a dyn Predict),
+    Outer(Outer<'a>),
+}
+
+impl<'a> Deref for Model<'a> {
+    type Target = dyn Predict + 'a;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Plain(model) => *model,
+            Self::Outer(outer) => outer,
+        }
+    }
+}
+
 /// The witness behind the last input on the way `from` one `to` another that has one, of those tried, and whether that is
 /// another than `from`, whose witness is `kept`.
 fn towards(
@@ -746,6 +934,13 @@ impl Looked {
         let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
         same(&[self.t, self.hold], &[t, hold]) && same(&self.x, x) && same(&self.u_ref, u_ref)
     }
+}
+
+/// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
+fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
+    let wanted = MARGIN * h.abs();
+    let highest = highest(model, t, x, wanted / ROOM);
+    if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
 }
 
 /// The largest h found uphill from `x` at `t`, up to `enough`.

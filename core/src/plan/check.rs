@@ -15,7 +15,7 @@ use super::course::{self, at, shifted};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use crate::MAX_INPUTS;
-use crate::lie::{COURSE, Course, Derivatives};
+use crate::lie::{COURSE, Course};
 use crate::scalar::all_finite;
 
 /// Most pieces of a roll-out.
@@ -360,7 +360,7 @@ impl<'a> Walk<'a> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = brake.hold.max(self.grid.period);
         for _ in 0..BRAKING {
-            let rests = self.is_still(brake, hold, &mut u) && self.rests(hold)?;
+            let rests = self.is_still(brake, hold, &mut u) && self.rests(&u, hold)?;
             self.hold_until(&u, self.t + hold)?;
             if rests {
                 return Ok(self.witness);
@@ -373,7 +373,7 @@ impl<'a> Walk<'a> {
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
         let hold = brake.hold.max(self.grid.period);
-        let ends = self.is_still(brake, hold, &mut u) && matches!(self.rests(hold), Ok(true));
+        let ends = self.is_still(brake, hold, &mut u) && matches!(self.rests(&u, hold), Ok(true));
         self.witness.tightest = tightest;
         ends
     }
@@ -388,8 +388,9 @@ impl<'a> Walk<'a> {
     }
 
     /// Whether every set is still, so that a plant at rest here stays in all that are or will be asked for.
-    fn rests(&mut self, hold: f64) -> Result<bool, Failure> {
+    fn rests(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
         let length = (self.t - self.started).max(self.grid.period);
+        self.model.plant.path(&self.x, u, &mut self.path);
         for i in 0..self.requirements.len() {
             let requirement = &self.requirements[i];
             if requirement.until <= self.t {
@@ -404,14 +405,9 @@ impl<'a> Walk<'a> {
                 }
             }
             if requirement.until == f64::INFINITY || requirement.from > self.t {
-                let drift = match requirement.source.relative_degree() {
-                    1 => 0.0,
-                    _ => {
-                        let mut derivatives = Derivatives::ZERO;
-                        requirement.source.evaluate(self.t, &self.x, &mut derivatives);
-                        derivatives.drift[1].abs() * DRIFT * hold
-                    }
-                };
+                let mut course = [0.0; COURSE];
+                requirement.model.value_along(self.t, &self.path, &mut course);
+                let drift = course[1].abs() * DRIFT * hold;
                 self.note(i, self.t.max(requirement.from), h - drift)?;
             }
         }

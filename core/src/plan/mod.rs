@@ -29,7 +29,7 @@ pub use planner::Planner;
 
 use alloc::sync::Arc;
 
-use crate::lie::{DerivativeSource, Predict};
+use crate::lie::Predict;
 use crate::scalar::all_finite;
 use law::{Brake, Reference};
 
@@ -38,9 +38,7 @@ use law::{Brake, Reference};
 pub struct Requirement<'a> {
     /// The number of its barrier, to name it by.
     pub barrier: usize,
-    /// The barrier along the plant.
-    pub source: &'a dyn DerivativeSource,
-    /// The same, run ahead.
+    /// The barrier along the plant, run ahead.
     pub model: &'a dyn Predict,
     /// First time in s.
     pub from: f64,
@@ -72,8 +70,8 @@ impl Plan {
         self.brake.as_ref().is_some_and(|brake| brake.stays)
     }
 
-    /// What is wrong with it as a plan of a plant with `states` states and `inputs` inputs; one from a file may be.
-    pub(crate) fn flaw(&self, states: usize, inputs: usize) -> Option<&'static str> {
+    /// What is wrong with it as a plan of a plant with so many states and inputs; one from a file may be.
+    pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
         let is_flawed = self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))
             || self.witness.rates.len() != states

@@ -10,7 +10,7 @@ use super::model::Model;
 use super::search::{Descent, Search, Trajectory};
 use super::{Plan, Requirement};
 use crate::MAX_INPUTS;
-use crate::lie::{DerivativeSource, Predict};
+use crate::lie::Predict;
 use crate::qp::Bounds;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
@@ -58,17 +58,17 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// A planner for the plant of `source`, whose inputs are within `bounds` and held for `period` s; `size` > 0 is the
-    /// size of an input that has no bounds, in its unit. `None` where that source does not know its plant.
+    /// A planner for `plant`, which has as many states and inputs as `dims` says, and whose inputs are within `bounds` and
+    /// held for `period` s; `size` > 0 is the size of an input that has no bounds, in its unit.
     pub fn new(
-        source: &'a dyn DerivativeSource,
+        plant: &'a dyn Predict,
+        dims: [usize; 2],
         bounds: &'a Bounds,
         requirements: &'a [Requirement<'a>],
         period: f64,
         size: f64,
-    ) -> Option<Self> {
-        let dims = [source.state_dim(), source.input_dim()];
-        Some(Self { plant: source.predict()?, dims, bounds, requirements, period, size, regular: true })
+    ) -> Self {
+        Self { plant, dims, bounds, requirements, period, size, regular: true }
     }
 
     /// The same planner at a sample that did not come as those before did, or is held for another time.

@@ -22,7 +22,6 @@ use nalgebra::DMatrix;
 
 use super::Requirement;
 use super::model::{Linear, Model};
-use crate::lie::Derivatives;
 
 /// Price of a violation of the size of h on the way, against the price of full inputs all the time.
 const PENALTY: f64 = 300.0;
@@ -129,12 +128,10 @@ impl Search<'_> {
         let fastest = rates.iter().fold(1e-3, |m: f64, r| m.max(*r));
         rates.iter_mut().for_each(|r| *r = r.max(0.05 * fastest));
         let (mut values, mut sizes) = (Vec::new(), vec![0.0_f64; self.requirements.len()]);
-        let mut derivatives = Derivatives::ZERO;
         for (i, requirement) in self.requirements.iter().enumerate() {
             for (k, x) in states.iter().enumerate() {
                 let t = self.times[k];
-                requirement.source.evaluate(t, x, &mut derivatives);
-                let h = derivatives.drift[0];
+                let h = requirement.model.value(t, x);
                 sizes[i] = sizes[i].max(h.abs());
                 // A deadline between two nodes is asked for at the one before.
                 let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - t));
@@ -401,15 +398,14 @@ impl Search<'_> {
 
     /// ∂h/∂x of requirement `i` at node `k`, by central differences.
     fn gradient(&self, i: usize, k: usize, x: &[f64], out: &mut [f64]) {
-        let source = self.requirements[i].source;
-        let (t, mut moved, mut derivatives) = (self.times[k], x.to_vec(), Derivatives::ZERO);
+        let model = self.requirements[i].model;
+        let (t, mut moved) = (self.times[k], x.to_vec());
         for (j, out) in out.iter_mut().enumerate() {
             let size = 1e-6 * (1.0 + x[j].abs());
             let mut ends = [0.0; 2];
             for (end, sign) in ends.iter_mut().zip([size, -size]) {
                 moved[j] = x[j] + sign;
-                source.evaluate(t, &moved, &mut derivatives);
-                *end = derivatives.drift[0];
+                *end = model.value(t, &moved);
             }
             moved[j] = x[j];
             *out = (ends[0] - ends[1]) / (2.0 * size);

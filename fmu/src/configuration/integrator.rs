@@ -68,6 +68,11 @@ pub(super) static SECTION: Section = Section {
 };
 
 impl IntegratorSection {
+    /// Least and largest value of the state, infinite where there is none.
+    fn limits(&self) -> [f64; 2] {
+        [self.min, self.max].map(|v| if v.abs() >= UNBOUNDED { v.signum() * f64::INFINITY } else { v })
+    }
+
     /// The number of the state, and that of the input that is its rate.
     pub(super) fn place(&self, plant: &PlantSection) -> Result<(usize, usize), ConfigurationError> {
         let (states, inputs, derivatives) = (plant.states(), plant.inputs(), plant.derivatives());
@@ -118,6 +123,20 @@ impl FilterConfiguration {
         self.plant.states().into_iter().filter(|s| !integrated(s)).collect()
     }
 
+    /// Of the numbers `x`, one for each state of the plant, those that are [measured](Self::measured_states).
+    pub fn measured(&self, x: &[f64]) -> Vec<f64> {
+        let states = self.plant.states();
+        let is_measured = |name: &str| self.integrator.as_ref().is_none_or(|i| i.state != name);
+        x.iter().zip(states).filter(|(_, state)| is_measured(&state.name)).map(|(x, _)| *x).collect()
+    }
+
+    /// The bounds of a signal that the filter [hands out](Self::commanded), where it has both.
+    pub fn limits(&self, name: &str) -> Option<[f64; 2]> {
+        let integrator = self.integrator.as_ref().filter(|i| i.state == name);
+        let given = integrator.map(IntegratorSection::limits).or(self.bounds.get(name).copied());
+        given.filter(|limits| limits.iter().all(|limit| limit.abs() < UNBOUNDED))
+    }
+
     /// The signals that the filter hands out and is asked for: the inputs of the plant, the integrated state in
     /// place of its rate.
     pub fn commanded(&self) -> Vec<VariableSection> {
@@ -140,9 +159,18 @@ impl FilterConfiguration {
             let assured = self.assured(filter).map_err(|e| ConfigurationError::new("assurance", refused(e)));
             return assured.map(|filter| FilterLoop::Assured(Box::new(filter)));
         }
-        let Some(section) = &self.integrator else { return Ok(FilterLoop::Plain(filter)) };
-        let end = |value: f64| if value.abs() >= UNBOUNDED { value.signum() * f64::INFINITY } else { value };
-        let limits = [section.min, section.max].map(end);
+        match &self.integrator {
+            None => Ok(FilterLoop::Plain(filter)),
+            Some(section) => self.integrated(filter, section).map(FilterLoop::Integrated),
+        }
+    }
+
+    /// `filter` behind its integrator.
+    fn integrated(
+        &self,
+        filter: SafetyFilter,
+        section: &IntegratorSection,
+    ) -> Result<IntegratedFilter, ConfigurationError> {
         let refused = |e: punctual_core::Error| {
             let field = match e.field() {
                 "limits" => "integrator.min, integrator.max",
@@ -152,8 +180,8 @@ impl FilterConfiguration {
             ConfigurationError::new(field, e.message())
         };
         let (state, input) = section.place(&self.plant)?;
-        let of = Integration { state, input, limits, gain: section.gain };
-        IntegratedFilter::new(filter, of).map(FilterLoop::Integrated).map_err(refused)
+        let of = Integration { state, input, limits: section.limits(), gain: section.gain };
+        IntegratedFilter::new(filter, of).map_err(refused)
     }
 
     /// `filter`, built from this configuration, with plans behind it, whether or not `assurance` asks for them.
@@ -162,12 +190,17 @@ impl FilterConfiguration {
     ///
     /// What no plan accounts for yet, in words.
     pub fn assured(&self, filter: SafetyFilter) -> Result<AssuredFilter, String> {
-        if self.integrator.is_some() {
-            return Err("an integrator is before the plant, which no plan accounts for yet".to_owned());
-        }
         if let Some(input) = self.barrier_inputs().first() {
             return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
         }
-        AssuredFilter::new(filter, self.experiment.step_size).map_err(|e| e.to_string())
+        let period = self.experiment.step_size;
+        match &self.integrator {
+            None => AssuredFilter::new(filter, period),
+            Some(section) => {
+                let integrated = self.integrated(filter, section).map_err(|e| e.to_string())?;
+                AssuredFilter::integrated(integrated, period)
+            }
+        }
+        .map_err(|e| e.to_string())
     }
 }
