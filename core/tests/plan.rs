@@ -5,10 +5,10 @@
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
-    Phase, SafetyFilter, Sampling, Standing, Status,
+    IntegratedFilter, Integration, Phase, SafetyFilter, Sampling, Standing, Status,
 };
 use punctual_core::plan::Failure;
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_reference::plants::{PointMass, SmallSlipBicycle, Unicycle};
 
 const PERIOD: f64 = 0.02;
 const GOAL: ([f64; 2], f64) = ([20.0, 12.0], 2.0);
@@ -648,4 +648,71 @@ fn what_cannot_be_promised_is_not() {
     assert!(narrow.assurance().is_assured());
     narrow.rearm();
     assert!(!narrow.assurance().is_assured());
+}
+
+/// The paper's vehicle, whose angle is an integral: the plant is given its mean, within its limits and its rate.
+#[test]
+fn plans_stand_behind_an_integral_too() {
+    const LENGTH: f64 = 10.0;
+    const LIMITS: [f64; 2] = [-0.5, 0.5];
+    let rate = |x: [f64; 4], u: [f64; 2]| {
+        let (sin, cos) = x[2].sin_cos();
+        [x[3] * (cos - sin * u[1]), x[3] * (sin + cos * u[1]), x[3] * u[1] / LENGTH, u[0]]
+    };
+    let (mut accepted, deadline, period) = (0, 5.0, 0.05);
+    for seed in 1..=8_u64 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
+        let model = SmallSlipBicycle::new(LENGTH).expect("a length").with_rate();
+        let filter = SafetyFilter::builder(5, 2)
+            .barrier(
+                "goal",
+                model,
+                goal,
+                BarrierSettings { margin: 0.02, ..BarrierSettings::within(deadline) },
+            )
+            .and_then(|b| b.bounds(&[-40.0, -4.0], &[40.0, 4.0]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .and_then(|filter| {
+                IntegratedFilter::new(filter, Integration { state: 4, input: 1, limits: LIMITS, gain: 10.0 })
+            })
+            .expect("valid filter");
+        let mut filter = AssuredFilter::integrated(filter, period).expect("a filter that can be assured");
+        let [x, y] = [0, 1].map(|_| random.between(0.0, 90.0));
+        let mut x = [x, y, random.between(-3.0, 3.0), random.between(0.0, 20.0)];
+        let mut before = 0.0;
+        for k in 0..(2.0 * deadline / period) as usize {
+            let t = k as f64 * period;
+            let u_ref = match seed % 3 {
+                0 => [0.0; 2],
+                1 => [40.0, 0.5],
+                _ => [random.between(-40.0, 40.0), random.between(-0.5, 0.5)],
+            };
+            let mut u = [0.0; 2];
+            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            if k == 0 && !assurance.is_assured() {
+                break;
+            }
+            accepted += usize::from(k == 0);
+            assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
+            // The angle is the mean over the period, of an integral with its limits and its rate.
+            assert!((LIMITS[0]..=LIMITS[1]).contains(&filter.value()), "{}", filter.value());
+            assert!((filter.value() - before).abs() <= 4.0 * period + 1e-12 && u[0].abs() <= 40.0);
+            assert!((u[1] - 0.5 * (before + filter.value())).abs() < 1e-12, "{u:?}");
+            before = filter.value();
+            for part in 1..=20 {
+                let at = |k: [f64; 4], s: f64| std::array::from_fn(|i| x[i] + s * k[i]);
+                let dt = period / 20.0;
+                let a = rate(x, u);
+                let b = rate(at(a, dt / 2.0), u);
+                let c = rate(at(b, dt / 2.0), u);
+                let d = rate(at(c, dt), u);
+                x = std::array::from_fn(|i| x[i] + dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+                let (t, away) = (t + dt * f64::from(part), (x[0] - 45.0).hypot(x[1] - 45.0));
+                assert!(t < deadline || away <= 2.0, "{seed} at {t}: {away} m from the centre");
+            }
+        }
+    }
+    assert!(accepted >= 7, "{accepted} of 8 accepted");
 }

@@ -227,7 +227,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let mut report = filter(&configuration, start, &wanted, out).map_err(|e| e.in_file(file))?;
             report.effort = effort;
             if let (Some(plane), Some(folder)) = (plane, out) {
-                report.map = Some(map::starts(&configuration, &configuration.measured(&from), &plane, folder)?);
+                report.map =
+                    Some(map::starts(&configuration, &configuration.measured(&from), &plane, folder)?);
             }
             // Tell, and decide the exit code.
             if arguments.json {

@@ -163,7 +163,10 @@ pub(super) fn plan(
     let end = plan.inputs.last().map_or(t, |(end, _)| *end);
     let way = filter.way(plan, t, x0, (end - t) / POINTS);
     let time: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
-    let h: Vec<Vec<f64>> = way.iter().map(|(t, x, _)| filter.values(*t, x)).collect();
+    let mut h = vec![vec![0.0; c.barrier.len()]; way.len()];
+    for ((t, x, _), h) in way.iter().zip(&mut h) {
+        filter.filter().barrier_values(*t, x, h).map_err(Error::from)?;
+    }
     let mut panels = Vec::new();
     for (i, barrier) in c.barrier.iter().enumerate() {
         let values = h.iter().map(|h| h[i]).collect();
@@ -180,7 +183,7 @@ pub(super) fn plan(
             ..TimePlot::default()
         });
     }
-    for (i, input) in c.commanded().into_iter().enumerate() {
+    for (i, input) in c.plant.inputs().into_iter().enumerate() {
         let values = way.iter().map(|(.., u)| u[i]).collect();
         let series = Series {
             label: format!("u.{}", input.name),
@@ -189,7 +192,7 @@ pub(super) fn plan(
             style: Style::Steps,
             ..Series::default()
         };
-        let limits = c.limits(&input.name).unwrap_or_default();
+        let limits = c.bounds.get(&input.name).copied().unwrap_or_default();
         panels.push(TimePlot {
             y_label: format!("{} ({})", input.name, input.unit),
             series: vec![series],
@@ -202,7 +205,7 @@ pub(super) fn plan(
     let mut files = vec![file("plan")];
     plot::times(&panels, &files[0])?;
     // The vehicles by name have their place first.
-    let states = c.measured_states();
+    let states = c.plant.states();
     if c.plant.model().is_some() && states.len() >= 2 && states[0].unit == "m" && states[1].unit == "m" {
         let along = |i: usize| way.iter().map(|(_, x, _)| x[i]).collect();
         let arrival = c

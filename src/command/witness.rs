@@ -4,7 +4,7 @@ use std::path::Path;
 
 use punctual_core::filter::AssuredFilter;
 use punctual_core::plan::Witness;
-use punctual_fmu::configuration::FilterConfiguration;
+use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
 use super::map;
@@ -49,8 +49,9 @@ pub(super) fn find(
     x0: &[f64],
     out: Option<&Path>,
 ) -> Result<Option<WitnessReport>, Error> {
-    let (inputs, x0) = (c.commanded(), &c.measured(x0)[..]);
-    if inputs.iter().any(|input| c.limits(&input.name).is_none()) {
+    let (inputs, x0) = (c.plant.inputs(), &c.measured(x0)[..]);
+    let bounds = |name: &str| c.bounds.get(name).copied().filter(|b| b.iter().all(|b| b.abs() < UNBOUNDED));
+    if c.commanded().iter().any(|signal| c.limits(&signal.name).is_none()) {
         return Ok(None);
     }
     let refused = |reason: String| WitnessReport {
@@ -75,7 +76,7 @@ pub(super) fn find(
             .enumerate()
             .map(|(i, input)| {
                 let peak = witness.inputs.iter().fold(0.0_f64, |peak, (_, u)| peak.max(u[i].abs()));
-                let given = c.limits(&input.name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                let given = bounds(&input.name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 (input.name.clone(), peak, input.unit.clone(), given)
             })
             .collect(),

@@ -2,11 +2,9 @@
 //! (`docs/theory.md#witness`).
 
 use alloc::format;
-use alloc::vec;
 use alloc::vec::Vec;
-use core::ops::Deref;
 
-use super::integrator::Outer;
+use super::integrator::insert;
 use super::slot::BarrierSlot;
 use super::{
     Begin, End, FilterState, Infeasible, IntegratedFilter, Integration, NoDerivative, Phase, Report,
@@ -16,7 +14,7 @@ use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{Failure, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
+use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -190,7 +188,7 @@ struct Looked {
 /// ```
 pub struct AssuredFilter {
     rows: Rows,
-    /// The bounds of the inputs, as the plant outside has them.
+    /// The bounds of the inputs of the filter inside; for an integral those of a sample are tighter.
     bounds: Bounds,
     period: f64,
     /// The time in s for which the next input will be held, if somebody said so.
@@ -231,44 +229,41 @@ impl Rows {
         [state_dim - usize::from(matches!(self, Self::Integrated(_))), *input_dim]
     }
 
-    /// Writes the answer of the rows; returns the integral after it.
-    fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<f64, Error> {
+    /// Writes the answer of the rows, as one of the filter inside.
+    fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
         match self {
-            Self::Plain(filter) => filter.peek(t, x, u_ref, u).map(|_| 0.0),
-            Self::Integrated(integrated) => integrated.peek(t, hold, x, u_ref, u),
+            Self::Plain(filter) => filter.peek(t, x, u_ref, u).map(|_| ()),
+            Self::Integrated(own) => own.peek_rate(t, hold, x, u_ref, u),
         }
     }
 
-    /// Writes what the plant would be given if nothing but the bounds were in the way of `u_ref`; returns whether that is
-    /// u_ref, or follows it as it always does.
-    fn wanted(&self, hold: f64, u_ref: &[f64], u: &mut [f64]) -> bool {
-        match self {
-            Self::Plain(filter) => {
-                for (i, (u, wish)) in u.iter_mut().zip(u_ref).enumerate() {
-                    *u = filter.bounds.clamp(i, *wish);
-                }
-                u == u_ref
-            }
-            Self::Integrated(integrated) => {
-                integrated.wanted(hold, u_ref, u);
-                let others = u.iter().zip(u_ref).enumerate().filter(|(i, _)| *i != integrated.of.input);
-                others.map(|(_, both)| both).all(|(u, wish)| u == wish)
-            }
+    /// The state of the filter inside.
+    fn state(&self, x: &[f64]) -> Vec<f64> {
+        let mut inside = x.to_vec();
+        if let Self::Integrated(own) = self {
+            inside.push(0.0);
+            insert(&mut inside, x, own.of.state, own.value());
         }
+        inside
     }
 
-    /// The input of the filter inside for the input `u` of the plant, which changes the integral evenly, and the integral
-    /// after it.
-    fn inside(&self, hold: f64, u: &[f64]) -> ([f64; MAX_INPUTS], f64) {
-        let mut inside = [0.0; MAX_INPUTS];
-        inside[..u.len()].copy_from_slice(u);
+    /// `u_ref` as a wish of the filter inside, and within its bounds.
+    fn wanted(&self, hold: f64, u_ref: &[f64]) -> ([f64; MAX_INPUTS], [f64; MAX_INPUTS]) {
+        let mut wish = [0.0; MAX_INPUTS];
+        wish[..u_ref.len()].copy_from_slice(u_ref);
+        if let Self::Integrated(own) = self {
+            wish[own.of.input] = own.wanted(hold, u_ref[own.of.input]);
+        }
+        let bounds = &self.filter().bounds;
+        let within = |i: usize| if i < u_ref.len() { bounds.clamp(i, wish[i]) } else { 0.0 };
+        (wish, core::array::from_fn(within))
+    }
+
+    /// Makes `u` of the filter inside one of the plant, for `hold` s; returns the integral after it.
+    fn finish(&self, hold: f64, u: &mut [f64]) -> f64 {
         match self {
-            Self::Plain(_) => (inside, 0.0),
-            Self::Integrated(integrated) => {
-                let (input, value) = (integrated.of.input, integrated.value());
-                inside[input] = 2.0 * (u[input] - value) / hold;
-                (inside, integrated.limited(2.0 * u[input] - value))
-            }
+            Self::Plain(_) => 0.0,
+            Self::Integrated(own) => own.finish(hold, u),
         }
     }
 }
@@ -288,32 +283,17 @@ impl AssuredFilter {
         Self::around(Rows::Plain(filter), bounds, period)
     }
 
-    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0. Plans are those of the plant outside,
-    /// which has the integrated state for its input, within its limits. `x`, `u` and `u_ref` are those of
+    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0. Plans account for the mean that the
+    /// plant is given over each period, and keep the limits of the integral. `x`, `u` and `u_ref` are those of
     /// [`IntegratedFilter::step`].
     ///
     /// # Errors
     ///
-    /// As for [`Self::new`]. Bounds on the rate; a barrier that depends on the integrated state.
+    /// As for [`Self::new`].
     pub fn integrated(filter: IntegratedFilter, period: f64) -> Result<Self, Error> {
-        let Integration { state, input, limits, .. } = filter.of;
-        let refuse = |message: &str| Err(Error::new(ErrorKind::Unsupported, "integrator", message));
-        if filter.rates != [f64::NEG_INFINITY, f64::INFINITY] {
-            return refuse("has a bounded rate, which no plan accounts for yet");
-        }
-        let depends = |slot: &BarrierSlot| {
-            let value = |held: f64| {
-                let mut x = vec![0.3; filter.filter.state_dim];
-                x[state] = held;
-                slot.source.predict().map(|model| model.value(0.0, &x).to_bits())
-            };
-            value(0.0) != value(0.1)
-        };
-        if filter.filter.slots.iter().any(depends) {
-            return refuse("has a state that a barrier depends on, which no plan accounts for yet");
-        }
         let mut bounds = filter.filter.bounds.clone();
-        [bounds.min[input], bounds.max[input]] = limits;
+        let input = filter.of.input;
+        [bounds.min[input], bounds.max[input]] = filter.rates;
         Self::around(Rows::Integrated(filter), bounds, period)
     }
 
@@ -400,7 +380,7 @@ impl AssuredFilter {
         (self.commitment.standing == Standing::Assured).then_some(&self.commitment.plan.witness)
     }
 
-    /// The states on the way of `witness` from `x` at `t`, in steps of at most `step` s, finite, > 0: each with the input
+    /// The states of the filter inside on the way of `witness` from `x` at `t`, in steps of at most `step` s, finite, > 0: each with the input
     /// that is held from there until the next. The last is the rest, with the input that holds it.
     pub fn way(
         &self,
@@ -409,9 +389,8 @@ impl AssuredFilter {
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
-        let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
-        let models = self.models();
-        let Some(plant) = models.first() else { return way };
+        let (mut at, mut x, mut way) = (t, self.rows.state(x), Vec::new());
+        let Some(plant) = self.models().next() else { return way };
         for (end, u) in &witness.inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
             for k in 1..=steps {
@@ -423,11 +402,6 @@ impl AssuredFilter {
         }
         way.extend(witness.inputs.last().map(|(_, u)| (at, x, *u)));
         way
-    }
-
-    /// h of every barrier at time `t` (s) and state `x`.
-    pub fn values(&self, t: f64, x: &[f64]) -> Vec<f64> {
-        self.models().iter().map(|model| model.value(t, x)).collect()
     }
 
     /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.
@@ -463,7 +437,7 @@ impl AssuredFilter {
             length("promises", promises.len(), self.filter().slots.len())?;
         }
         if *standing == Standing::Assured {
-            if let Some(flaw) = plan.flaw(self.rows.dims()) {
+            if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
                 return refuse("plan", flaw);
             }
             let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
@@ -537,8 +511,9 @@ impl AssuredFilter {
         }
         self.looked = None;
         self.rows.filter_mut().is_backed = self.commitment.standing == Standing::Assured;
-        self.next_value = self.rows.peek(t, hold, x, u_ref, u)?;
+        self.rows.peek(t, hold, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
+        self.next_value = self.rows.finish(hold, u);
         let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: [0.0; MAX_INPUTS] };
         looked.u[..u.len()].copy_from_slice(u);
         self.looked = Some(looked);
@@ -565,6 +540,7 @@ impl AssuredFilter {
         self.looked = None;
         let hold = self.expected.unwrap_or(self.period);
         self.rows.peek(t, hold, x, u_ref, rows)?;
+        self.rows.finish(hold, rows);
         if u != rows {
             return Ok(Some(NoDerivative::Plan));
         }
@@ -580,6 +556,7 @@ impl AssuredFilter {
         self.next.clone_from(&self.commitment);
         let mut rows = [0.0; MAX_INPUTS];
         rows[..u.len()].copy_from_slice(u);
+        let x = &self.rows.state(x)[..];
         let is_valid = t.is_finite() && all_finite(x);
         if is_valid || self.next.sample.is_some() {
             self.next.sample = Some([t, hold]);
@@ -607,7 +584,7 @@ impl AssuredFilter {
         }
         (self.assurance.standing, self.assurance.failure) = (self.next.standing, self.next.failure);
         if self.next.standing == Standing::Assured {
-            self.report_on(hold, &rows[..u.len()], u);
+            self.report_on(&rows[..u.len()], u);
         }
     }
 
@@ -636,18 +613,10 @@ impl AssuredFilter {
     }
 
     /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it.
-    fn report_on(&mut self, hold: f64, rows: &[f64], u: &[f64]) {
+    fn report_on(&mut self, rows: &[f64], u: &[f64]) {
         let driver = self.assurance.driver;
-        let (inside, value) = self.rows.inside(hold, u);
-        if let Some(input) = self.integrated_input()
-            && u != rows
-        {
-            // What a plan holds is where the integral is then.
-            let evenly = matches!(driver, Driver::Reference | Driver::Eased);
-            self.next_value = if evenly { value } else { u[input] };
-        }
         let Workspace { next, report, .. } = &mut self.rows.filter_mut().workspace;
-        next.input[..u.len()].copy_from_slice(&inside[..u.len()]);
+        next.input[..u.len()].copy_from_slice(u);
         report.status = match (report.status, driver) {
             (Status::InvalidInput, _) => Status::InvalidInput,
             (_, Driver::Reference) => Status::Unchanged,
@@ -660,7 +629,7 @@ impl AssuredFilter {
         {
             if u != rows {
                 (b.on_course, state.on_course) = (false, false);
-                b.slack = b.row.slack(&inside[..u.len()]);
+                b.slack = b.row.slack(u);
             }
             if promise.is_some() && b.phase != Phase::Released {
                 b.guaranteed = true;
@@ -691,12 +660,12 @@ impl AssuredFilter {
     /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
     /// deadline, or one without a deadline whose set `x` is outside of.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> {
-        self.promises(t, x, |_| 1.0).into_iter().map(|promise| promise.is_some())
+        self.promises(t, &self.rows.state(x), |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
 
     /// The promises from `x` at `t`, each deadline multiplied by the factor of its barrier.
     fn promises(&self, t: f64, x: &[f64], factor: impl Fn(&BarrierSlot) -> f64) -> Vec<Option<Promise>> {
-        let promise = |(slot, model): (&BarrierSlot, Model<'_>)| {
+        let promise = |(slot, model): (&BarrierSlot, &dyn Predict)| {
             // Not that of the report, which has none where u_ref is no number.
             let h = model.value(t, x);
             let from = match slot.promise.settings().deadline {
@@ -712,21 +681,14 @@ impl AssuredFilter {
                 End::OnArrival => from + self.period,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
-            (!soft && until > from).then_some(Promise { from, until, margin: margin(&*model, t, x, h) })
+            (!soft && until > from).then_some(Promise { from, until, margin: margin(model, t, x, h) })
         };
         self.filter().slots.iter().zip(self.models()).map(promise).collect()
     }
 
-    /// Every barrier along the plant outside.
-    fn models(&self) -> Vec<Model<'_>> {
-        let slots = self.filter().slots.iter();
-        let predicts = slots.filter_map(|slot| slot.source.predict());
-        match &self.rows {
-            Rows::Plain(_) => predicts.map(Model::Plain).collect(),
-            Rows::Integrated(IntegratedFilter { of: Integration { state, input, .. }, .. }) => {
-                predicts.map(|inside| Model::Outer(Outer { inside, state: *state, input: *input })).collect()
-            }
-        }
+    /// Every barrier along the plant, run ahead.
+    fn models(&self) -> impl Iterator<Item = &dyn Predict> {
+        self.filter().slots.iter().filter_map(|slot| slot.source.predict())
     }
 
     /// The plan that a first sample at `t` and `x` would find, with every deadline `factor` times as long. Remembers
@@ -736,6 +698,7 @@ impl AssuredFilter {
     ///
     /// What the nearest trial fails at.
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
+        let x = &self.rows.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
         self.planned(&promises, (t, self.period), &[], |planner| planner.search(t, x))
             .map(|plan| plan.witness)
@@ -804,34 +767,46 @@ impl AssuredFilter {
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let models = self.models();
-        let requirements: Vec<Requirement<'_>> = models
-            .iter()
+        let mut requirements: Vec<Requirement<'_>> = self
+            .models()
             .zip(promises)
             .enumerate()
             .filter_map(|(barrier, (model, promise))| {
                 let Promise { from, until, margin } = (*promise)?;
-                Some(Requirement { barrier, model: &**model, from, until, margin })
+                Some(Requirement { barrier, is_limit: false, model, from, until, margin })
             })
             .collect();
         if requirements.is_empty() {
             return Err(Failure::Nothing);
         }
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
-        let planner =
-            Planner::new(requirements[0].model, self.rows.dims(), &self.bounds, &requirements, period, size);
+        let (plant, dims) = (requirements[0].model, [self.filter().state_dim, self.filter().input_dim]);
+        let limits = self.limits(plant);
+        requirements.extend(limits.iter().zip(promises.len()..).map(|(limit, barrier)| {
+            let (from, until) = (t, f64::INFINITY);
+            Requirement { barrier, is_limit: true, model: limit, from, until, margin: 0.0 }
+        }));
+        let mut planner = Planner::new(plant, dims, &self.bounds, &requirements, period, size);
+        if let Rows::Integrated(own) = &self.rows {
+            planner = planner.integrated(Integral { state: own.of.state, input: own.of.input });
+        }
         f(&planner.irregular(!self.is_regular(t, period)))
+    }
+
+    /// The limits of the integral as barriers along `plant`.
+    fn limits<'a>(&self, plant: &'a dyn Predict) -> Vec<Limit<'a>> {
+        let Rows::Integrated(own) = &self.rows else { return Vec::new() };
+        let Integration { state, limits: [min, max], .. } = own.of;
+        let sides = [(1.0, min), (-1.0, max)].into_iter().filter(|(_, limit)| limit.is_finite());
+        sides.map(|(sign, limit)| Limit { plant, state, sign, limit }).collect()
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
     /// does, else the plan's own.
     fn choose(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
-        let mut wanted = [0.0; MAX_INPUTS];
-        let wanted = &mut wanted[..u.len()];
-        let is_wish = self.rows.wanted(hold, u_ref, wanted);
-        let wish: [f64; MAX_INPUTS] = core::array::from_fn(|i| wanted.get(i).copied().unwrap_or_default());
-        let wish = &wish[..u.len()];
+        let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
+        let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
         let plan = &self.next.plan;
         // Gentle, and with the margin that is aimed at.
         let comfortable = |witness: &Witness| {
@@ -839,7 +814,7 @@ impl AssuredFilter {
             witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            let passes = reached && is_wish;
+            let passes = reached && wanted == wish;
             if passes
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
@@ -884,23 +859,6 @@ impl AssuredFilter {
                 self.end(standing, Some(failure));
                 Driver::Rows
             }
-        }
-    }
-}
-
-/// A barrier along the plant outside.
-enum Model<'a> {
-    Plain(&'a dyn Predict),
-    Outer(Outer<'a>),
-}
-
-impl<'a> Deref for Model<'a> {
-    type Target = dyn Predict + 'a;
-
-    fn deref(&self) -> &Self::Target {
-        match self {
-            Self::Plain(model) => *model,
-            Self::Outer(outer) => outer,
         }
     }
 }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use super::{FilterState, NoDerivative, Report, SafetyFilter, SampleDerivative};
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::{Ahead, COURSE, Course, DerivativeSource, Direction, Predict};
+use crate::lie::{DerivativeSource, Direction};
 use crate::qp::Bounds;
 
 /// A filter with an integrator between it and its plant. The filter inside is one of a plant whose state
@@ -157,7 +157,7 @@ impl IntegratedFilter {
         self.value = self.limited(value);
     }
 
-    pub(super) fn limited(&self, value: f64) -> f64 {
+    fn limited(&self, value: f64) -> f64 {
         value.max(self.of.limits[0]).min(self.of.limits[1])
     }
 
@@ -187,8 +187,7 @@ impl IntegratedFilter {
     ///
     /// As for [`Self::step`].
     pub fn peek(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<f64, Error> {
-        self.begin(hold, x, u_ref)?;
-        self.filter.peek(t, &self.x[0], &self.u_ref[0], u)?;
+        self.peek_rate(t, hold, x, u_ref, u)?;
         Ok(self.finish(hold, u))
     }
 
@@ -220,6 +219,19 @@ impl IntegratedFilter {
         Ok(unknown)
     }
 
+    /// The filter's own answer, with the rate.
+    pub(super) fn peek_rate(
+        &mut self,
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &mut [f64],
+    ) -> Result<(), Error> {
+        self.begin(hold, x, u_ref)?;
+        self.filter.peek(t, &self.x[0], &self.u_ref[0], u).map(|_| ())
+    }
+
     /// Completes state, wish and bounds of the filter for a sample.
     fn begin(&mut self, hold: f64, x: &[f64], u_ref: &[f64]) -> Result<(), Error> {
         let Self { filter, of: Integration { state, input, limits, gain }, value, .. } = self;
@@ -237,20 +249,15 @@ impl IntegratedFilter {
         Ok(())
     }
 
-    /// Writes what the plant would be given for `hold` s if nothing but the bounds were in the way of `u_ref`.
-    pub(super) fn wanted(&self, hold: f64, u_ref: &[f64], u: &mut [f64]) {
-        let Integration { input, gain, limits, .. } = self.of;
-        let ends = [0, 1].map(|side| (limits[side] - self.value) / hold);
-        let rate = rate_to(u_ref[input] - self.value, gain, hold);
-        let rate = rate.max(self.rates[0].max(ends[0])).min(self.rates[1].min(ends[1]));
-        for (i, (u, wish)) in u.iter_mut().zip(u_ref).enumerate() {
-            *u = if i == input { rate } else { self.filter.bounds.clamp(i, *wish) };
-        }
-        self.finish(hold, u);
+    /// The rate for `hold` s if nothing but the bounds were in the way of the `wish` for the value.
+    pub(super) fn wanted(&self, hold: f64, wish: f64) -> f64 {
+        let ends = self.of.limits.map(|limit| (limit - self.value) / hold);
+        let rate = rate_to(wish - self.value, self.of.gain, hold);
+        rate.max(self.rates[0].max(ends[0])).min(self.rates[1].min(ends[1]))
     }
 
     /// Puts the mean over `hold` s in the place of the rate; returns the value then.
-    fn finish(&self, hold: f64, u: &mut [f64]) -> f64 {
+    pub(super) fn finish(&self, hold: f64, u: &mut [f64]) -> f64 {
         let rate = u[self.of.input];
         u[self.of.input] = self.limited(self.value + rate * hold / 2.0);
         self.limited(self.value + rate * hold)
@@ -262,72 +269,9 @@ fn rate_to(way: f64, gain: f64, hold: f64) -> f64 {
     way * gain.min(1.0 / hold)
 }
 
-/// The plant outside an integrator, run ahead: the one inside with the integrated state held. No barrier may depend on it.
-pub(super) struct Outer<'a> {
-    pub(super) inside: &'a dyn Predict,
-    /// The number of the state, and of the input in whose place it is held.
-    pub(super) state: usize,
-    pub(super) input: usize,
-}
-
-impl Outer<'_> {
-    /// State and input of the plant inside.
-    fn inside(&self, x: &[f64], u: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let (mut own_x, mut own_u) = (vec![0.0; x.len() + 1], u.to_vec());
-        insert(&mut own_x, x, self.state, u.get(self.input).copied().unwrap_or_default());
-        if let Some(rate) = own_u.get_mut(self.input) {
-            *rate = 0.0;
-        }
-        (own_x, own_u)
-    }
-}
-
-impl Predict for Outer<'_> {
-    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
-        let (mut own_x, own_u) = self.inside(x, u);
-        self.inside.flow(&mut own_x, &own_u, duration);
-        remove(x, &own_x, self.state);
-    }
-
-    fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        let (own_x, own_u) = self.inside(x, u);
-        self.inside.ahead(t, &own_x, &own_u, duration, out);
-    }
-
-    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        let (own_x, own_u) = self.inside(x, u);
-        let mut rate = vec![0.0; own_x.len()];
-        self.inside.rate(&own_x, &own_u, &mut rate);
-        remove(out, &rate, self.state);
-    }
-
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
-        let (own_x, own_u) = self.inside(x, u);
-        let mut path = vec![[0.0; COURSE]; own_x.len()];
-        self.inside.path(&own_x, &own_u, &mut path);
-        remove(out, &path, self.state);
-    }
-
-    fn value(&self, t: f64, x: &[f64]) -> f64 {
-        self.inside.value(t, &self.inside(x, &[]).0)
-    }
-
-    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
-        let mut own = vec![[0.0; COURSE]; path.len() + 1];
-        insert(&mut own, path, self.state, [0.0; COURSE]);
-        self.inside.value_along(t, &own, out);
-    }
-}
-
 /// `to` = `from` with `value` put in at `place`.
-fn insert<T: Copy>(to: &mut [T], from: &[T], place: usize, value: T) {
+pub(super) fn insert(to: &mut [f64], from: &[f64], place: usize, value: f64) {
     to[..place].copy_from_slice(&from[..place]);
     to[place] = value;
     to[place + 1..].copy_from_slice(&from[place..]);
-}
-
-/// `to` = `from` without what is at `place`.
-fn remove<T: Copy>(to: &mut [T], from: &[T], place: usize) {
-    to[..place].copy_from_slice(&from[..place]);
-    to[place..].copy_from_slice(&from[place + 1..]);
 }

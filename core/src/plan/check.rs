@@ -10,10 +10,10 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::Requirement;
 use super::course::{self, at, shifted};
 use super::law::{Brake, Reference};
 use super::model::Model;
+use super::{Integral, Requirement};
 use crate::MAX_INPUTS;
 use crate::lie::{COURSE, Course};
 use crate::scalar::all_finite;
@@ -205,7 +205,8 @@ impl<'a> Walk<'a> {
         if slack.is_nan() || slack < 0.0 {
             return Err(Failure::Broken { barrier, time: t, slack });
         }
-        if self.witness.tightest.is_none_or(|least| slack < least.slack) {
+        let counts = !self.requirements[i].is_limit;
+        if counts && self.witness.tightest.is_none_or(|least| slack < least.slack) {
             self.witness.tightest = Some(Tightest { barrier, time: t, slack });
         }
         Ok(())
@@ -226,14 +227,9 @@ impl<'a> Walk<'a> {
 
     /// Holds `u` until `end`.
     fn hold(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
-        // Requirements begin and end at nodes.
-        while self.t < end {
-            let ahead = self.t + 1e-9 * (end - self.t);
-            let event = |node: f64, time: f64| if ahead < time && time < node { time } else { node };
-            let node = self.requirements.iter().fold(end, |node, r| event(event(node, r.from), r.until));
-            while self.t < node {
-                self.advance(u, node)?;
-            }
+        match self.model.integral {
+            None => self.move_to(u, end)?,
+            Some(integral) => self.integrate(u, integral, end)?,
         }
         let mut input = [0.0; MAX_INPUTS];
         input[..u.len()].copy_from_slice(u);
@@ -247,6 +243,46 @@ impl<'a> Walk<'a> {
             }
         }
         self.witness.inputs.push((end, input));
+        Ok(())
+    }
+
+    /// Moves on to `end` under `u`.
+    fn move_to(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        // Requirements begin and end at nodes.
+        while self.t < end {
+            let ahead = self.t + 1e-9 * (end - self.t);
+            let event = |node: f64, time: f64| if ahead < time && time < node { time } else { node };
+            let node = self.requirements.iter().fold(end, |node, r| event(event(node, r.from), r.until));
+            while self.t < node {
+                self.advance(u, node)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves on to `end` with the mean of the integral held over each period.
+    fn integrate(&mut self, u: &[f64], integral: Integral, end: f64) -> Result<(), Failure> {
+        let Integral { state, input } = integral;
+        let (rate, mut held) = (u[input], u.to_vec());
+        held[input] = 0.0;
+        self.witness.rates[state] = self.witness.rates[state].max(rate.abs());
+        let period = self.grid.period;
+        while self.t < end {
+            // The next sample; one that is here but for round-off has passed.
+            let passed = ((self.t - self.started) / period + 1e-6) as u64;
+            let sample = self.started + (passed + 1) as f64 * period;
+            let sample = if sample < end - 1e-6 * period { sample } else { end };
+            let (from, to) = (self.x[state], self.x[state] + rate * (sample - self.t));
+            self.x[state] = 0.5 * (from + to);
+            self.move_to(&held, sample)?;
+            self.x[state] = to;
+            for (i, requirement) in self.requirements.iter().enumerate() {
+                if requirement.is_in_force(sample) {
+                    let value = requirement.model.value(sample, &self.x);
+                    self.note(i, sample, value)?;
+                }
+            }
+        }
         Ok(())
     }
 

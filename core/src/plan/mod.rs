@@ -11,6 +11,7 @@
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
 //! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
 //! | `course` | polynomials in time, and what they do not fall below |
+//! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
 //!
@@ -18,6 +19,7 @@
 
 mod check;
 mod course;
+mod integral;
 mod law;
 mod model;
 mod planner;
@@ -25,6 +27,8 @@ mod search;
 
 pub(crate) use check::ON_TIME;
 pub use check::{Failure, Tightest, Witness};
+pub use integral::Integral;
+pub(crate) use integral::Limit;
 pub use planner::Planner;
 
 use alloc::sync::Arc;
@@ -38,6 +42,8 @@ use law::{Brake, Reference};
 pub struct Requirement<'a> {
     /// The number of its barrier, to name it by.
     pub barrier: usize,
+    /// Whether it is one of the limits of an integral, which come after the barriers and may be reached.
+    pub is_limit: bool,
     /// The barrier along the plant, run ahead.
     pub model: &'a dyn Predict,
     /// First time in s.

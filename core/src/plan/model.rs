@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Integral;
 use super::check::ROUND_OFF;
 use crate::lie::Predict;
 use crate::qp::Bounds;
@@ -23,6 +24,8 @@ pub(super) struct Model<'a> {
     /// Number of states, and of inputs.
     pub(super) dims: [usize; 2],
     pub(super) bounds: &'a Bounds,
+    /// What the plant is given the mean of over each period.
+    pub(super) integral: Option<Integral>,
     pub(super) step: f64,
 }
 

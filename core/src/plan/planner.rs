@@ -8,7 +8,7 @@ use super::check::{Failure, Grid, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
 use super::search::{Descent, Search, Trajectory};
-use super::{Plan, Requirement};
+use super::{Integral, Plan, Requirement};
 use crate::MAX_INPUTS;
 use crate::lie::Predict;
 use crate::qp::Bounds;
@@ -27,6 +27,8 @@ const SEARCHED: f64 = 3.0;
 const KEPT: f64 = 0.5;
 /// Margins for another input where the next sample may come at any time: what is left is for the plan to move by.
 const WARY: f64 = 4.0;
+/// Margin of a limit of an integral in the search, as a part of the way to it at the start.
+const ROOM: f64 = 1e-3;
 /// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
 const TIGHTENED: u32 = 4;
 const TIGHTENING: u32 = 4;
@@ -55,6 +57,7 @@ pub struct Planner<'a> {
     size: f64,
     /// Whether samples come as those before did.
     regular: bool,
+    integral: Option<Integral>,
 }
 
 impl<'a> Planner<'a> {
@@ -68,7 +71,7 @@ impl<'a> Planner<'a> {
         period: f64,
         size: f64,
     ) -> Self {
-        Self { plant, dims, bounds, requirements, period, size, regular: true }
+        Self { plant, dims, bounds, requirements, period, size, regular: true, integral: None }
     }
 
     /// The same planner at a sample that did not come as those before did, or is held for another time.
@@ -77,8 +80,15 @@ impl<'a> Planner<'a> {
         Self { regular: !irregular, ..self }
     }
 
+    /// The same planner for a plant that is given the mean of an integral over each period.
+    #[must_use]
+    pub fn integrated(self, integral: Integral) -> Self {
+        Self { integral: Some(integral), ..self }
+    }
+
     fn model(&self, step: f64) -> Model<'a> {
-        Model { plant: self.plant, dims: self.dims, bounds: self.bounds, step }
+        let Self { plant, dims, bounds, integral, .. } = *self;
+        Model { plant, dims, bounds, integral, step }
     }
 
     /// Searches for a plan from `x` at `t`.
@@ -89,7 +99,10 @@ impl<'a> Planner<'a> {
     pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let mut failure = Failure::NoRest;
         for (part, holds) in GRIDS {
-            let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
+            let sooner = |r: &Requirement<'a>| {
+                let margin = if r.is_limit { ROOM * r.model.value(t, x).abs() } else { r.margin };
+                Requirement { from: t + part * (r.from - t), margin, ..*r }
+            };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
             let Some((hold, times)) = self.grid(t, &requirements, holds) else {
                 failure = Failure::TooLong;
@@ -265,7 +278,8 @@ impl<'a> Planner<'a> {
     /// was made for from the next one on.
     fn on_a_grid(&self, find: impl Fn(Grid) -> Result<Witness, Failure>) -> Result<Witness, Failure> {
         let grid = Grid { period: self.period, even: true };
-        find(grid).or_else(|failure| match self.regular {
+        // Of periods that are not known there are no means.
+        find(grid).or_else(|failure| match self.regular || self.integral.is_some() {
             true => Err(failure),
             false => find(Grid { even: false, ..grid }).map_err(|_| failure),
         })

@@ -1,0 +1,47 @@
+//! Plans behind an integrator: the plant is given the mean of an integral over each period.
+
+use crate::lie::{Ahead, Course, Predict};
+
+/// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
+#[derive(Clone, Copy, Debug)]
+pub struct Integral {
+    /// The number of the state.
+    pub state: usize,
+    /// The number of the input that is its derivative.
+    pub input: usize,
+}
+
+/// A limit of a state as a barrier: h = `sign` (x − `limit`).
+pub(crate) struct Limit<'a> {
+    pub(crate) plant: &'a dyn Predict,
+    pub(crate) state: usize,
+    pub(crate) sign: f64,
+    pub(crate) limit: f64,
+}
+
+impl Predict for Limit<'_> {
+    fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
+        self.plant.flow(x, u, duration);
+    }
+
+    fn ahead(&self, _: f64, _: &[f64], _: &[f64], _: f64, out: &mut Ahead) {
+        *out = Ahead::ZERO;
+    }
+
+    fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
+        self.plant.rate(x, u, out);
+    }
+
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+        self.plant.path(x, u, out);
+    }
+
+    fn value(&self, _: f64, x: &[f64]) -> f64 {
+        self.sign * (x[self.state] - self.limit)
+    }
+
+    fn value_along(&self, _: f64, path: &[Course], out: &mut Course) {
+        *out = path[self.state].map(|c| self.sign * c);
+        out[0] -= self.sign * self.limit;
+    }
+}
