@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use super::check::{Failure, Grid, Walk, Witness};
 use super::law::{Brake, Reference};
 use super::model::Model;
-use super::search::{Descent, Search, Trajectory};
+use super::search::{Beside, Descent, Search, Trajectory};
 use super::{Plan, Requirement};
 use crate::MAX_INPUTS;
 use crate::lie::{DerivativeSource, Predict};
@@ -101,7 +101,7 @@ impl<'a> Planner<'a> {
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
-            let Some(brake) = Brake::around(&model, x, hold) else { continue };
+            let Some(brake) = Brake::around(&model, x, hold, self.period) else { continue };
             let brake = Arc::new(brake);
             let mut search = Search {
                 model: sketch,
@@ -128,7 +128,8 @@ impl<'a> Planner<'a> {
                     }
                     // What is broken between the nodes is asked for with more margin at them.
                     for _ in 0..TIGHTENED {
-                        let found = match self.finish(&model, &times, x, &descent.best, &brake) {
+                        let beside = search.beside(&descent.best);
+                        let found = match self.finish(&model, &times, &descent.best, beside, &brake) {
                             Ok(plan) => return Ok(plan),
                             Err(found) => found,
                         };
@@ -184,13 +185,14 @@ impl<'a> Planner<'a> {
         &self,
         model: &Model<'a>,
         times: &[f64],
-        x: &[f64],
         found: &Trajectory,
+        beside: Beside,
         brake: &Arc<Brake>,
     ) -> Result<Plan, Failure> {
-        let mut inputs = found.inputs.clone();
+        let (mut inputs, states) = (found.inputs.clone(), found.states.clone());
         inputs.pop();
-        let reference = Reference::along(model, times, x, inputs).ok_or(Failure::Singular)?;
+        let gains = beside.gains.ok_or(Failure::Singular)?;
+        let reference = Reference { times: times.to_vec(), inputs, states, gains };
         let mut plan = Plan {
             reference: Some(Arc::new(reference)),
             brake: Some(brake.clone()),
@@ -198,7 +200,7 @@ impl<'a> Planner<'a> {
             step: model.step,
         };
         let grid = Grid { period: self.period, even: true };
-        plan.witness = self.walk(&plan, 1.0, grid, (times[0], x), None, true)?;
+        plan.witness = self.walk(&plan, 1.0, grid, (times[0], &found.states[0]), None, true)?;
         Ok(plan)
     }
 
@@ -222,8 +224,8 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are, or the feedback along its
-    /// reference where the plant is not quite the model.
+    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
+    /// the model, or forgets no round-off, the feedback that they came from.
     ///
     /// # Errors
     ///
@@ -231,7 +233,8 @@ impl<'a> Planner<'a> {
     pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
-        let replay = |grid: Grid| {
+        // As many of its holds as `held`, then the law behind it.
+        let replay = |grid: Grid, held: usize, follows: bool| {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
             let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
@@ -242,7 +245,8 @@ impl<'a> Planner<'a> {
                 at += grid.period;
                 hold(&mut walk, plan.witness.mean(t, at), at)?;
             }
-            for (end, u) in &plan.witness.inputs {
+            let left = plan.witness.inputs.iter().filter(|(end, _)| *end > t + grid.slack());
+            for (end, u) in left.take(held) {
                 if *end > at + grid.slack() {
                     // Not again what has come to its end, which grows by a hold at every sample.
                     if walk.may_end(brake) {
@@ -252,10 +256,18 @@ impl<'a> Planner<'a> {
                     at = *end;
                 }
             }
+            if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
+                walk.follow(reference)?;
+            }
             walk.stop(brake)
         };
         self.on_a_grid(|grid| {
-            replay(grid).or_else(|failure| {
+            let kept = match plan.stays() {
+                true => replay(grid, usize::MAX, false),
+                // The law took over at the end of the present hold.
+                false => replay(grid, 1, true).or_else(|failure| replay(grid, 1, false).map_err(|_| failure)),
+            };
+            kept.or_else(|failure| {
                 let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
                 follow(true).or_else(|_| follow(false)).map_err(|_| failure)
             })
@@ -364,8 +376,13 @@ impl<'a> Planner<'a> {
             for k in 0..holds {
                 if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
                 {
+                    // What would fall is held upright meanwhile.
+                    match brake.stays {
+                        true => u.copy_from_slice(&brake.input),
+                        false => brake.input(model, &x, &mut u),
+                    }
                     for i in 0..nu {
-                        u[i] = brake.input[i] + side[i] * size * model.reach(i, self.size);
+                        u[i] += side[i] * size * model.reach(i, self.size);
                     }
                     model.clamp(&mut u);
                 } else {
