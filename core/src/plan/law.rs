@@ -25,8 +25,8 @@ pub(super) struct Brake {
     pub(super) gain: Gain,
     /// The length of a hold in s.
     pub(super) hold: f64,
-    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
-    pub(super) stays: bool,
+    /// How many times a deviation from the rest grows over a hold under `input` alone: the largest eigenvalue.
+    growth: f64,
 }
 
 /// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
@@ -37,20 +37,36 @@ const LOST: f64 = 1.35;
 const HASTE: f64 = 0.6;
 
 impl Brake {
-    /// The law around the rest near `x`, with inputs held for `hold` s, which are so many times `period`; for less where
-    /// the rest is lost sooner. `None` where no rest or no law is found.
-    pub(super) fn around(model: &Model<'_>, x: &[f64], mut hold: f64, period: f64) -> Option<Self> {
+    /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
+    pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
         let (state, input) = model.rest(x, hold)?;
-        let mut linear = model.linear(&state, &input, hold);
-        let squared = linear.a.complex_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(v.norm_sqr()));
-        let grown = elementary::sqrt(squared);
-        let stays = grown <= STAYS;
-        if grown > LOST {
-            let part = elementary::ln(LOST) / elementary::ln(grown);
-            hold = ((part * hold / period) as u32).max(1) as f64 * period;
-            linear = model.linear(&state, &input, hold);
+        Self::at(model, state, input, hold)
+    }
+
+    /// The same law with shorter holds where the rest is lost sooner; they are so many times `period`.
+    pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
+        let hold = (self.longest(LOST) / period) as u32;
+        let hold = f64::from(hold.max(1)) * period;
+        match self.stays() || hold >= self.hold {
+            true => Some(self.clone()),
+            false => Self::at(model, self.state.clone(), self.input.clone(), hold),
         }
-        let Linear { a, b } = linear;
+    }
+
+    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
+    pub(super) fn stays(&self) -> bool {
+        self.growth <= STAYS
+    }
+
+    /// The time in s in which a deviation from the rest grows so many times; at most a hold.
+    pub(super) fn longest(&self, growth: f64) -> f64 {
+        self.hold * (elementary::ln(growth) / elementary::ln(self.growth.max(growth)))
+    }
+
+    fn at(model: &Model<'_>, state: Vec<f64>, input: Vec<f64>, hold: f64) -> Option<Self> {
+        let Linear { a, b } = model.linear(&state, &input, hold);
+        let growth = a.complex_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(v.norm_sqr()));
+        let growth = elementary::sqrt(growth);
         let nx = a.nrows();
         let rate = (&a - DMatrix::identity(nx, nx)) / hold;
         let q = rate.transpose() * rate;
@@ -59,16 +75,20 @@ impl Brake {
         let most = gained.diagonal().max().max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
         // What no input hastens is left as it is.
-        let sooner = if stays { 1.0 } else { elementary::powf(grown.min(LOST), HASTE) };
+        let sooner = if growth <= STAYS { 1.0 } else { elementary::powf(growth.min(LOST), HASTE) };
         let hastened = regulator(&(&a * sooner), &(&b * sooner), &q, &r);
         let gain = hastened.or_else(|| regulator(&a, &b, &q, &r))?;
-        Some(Self { state, input, gain: Gain::from(&gain), hold, stays })
+        Some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
     /// Whether it is a law of a plant with so many states and inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
-        let Self { state, input, gain, hold, stays: _ } = self;
-        is_of(state, states) && is_of(input, inputs) && is_of(&gain.0, inputs * states) && *hold > 0.0
+        let Self { state, input, gain, hold, growth } = self;
+        is_of(state, states)
+            && is_of(input, inputs)
+            && is_of(&gain.0, inputs * states)
+            && *hold > 0.0
+            && growth.is_finite()
     }
 
     /// Writes the input at `x`.
@@ -159,9 +179,10 @@ impl Gain {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
             high - low
         };
-        let largest = (0..nx).map(span).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
-        let q =
-            DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / span(i).max(0.01 * largest))));
+        let largest = (0..nx).map(span).fold(0.0, f64::max);
+        let size = |i: usize| if largest > 0.0 { span(i).max(0.01 * largest) } else { 1.0 };
+        let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / size(i))));
+        let inputs = &inputs[..linear.len()];
         let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
         let r = DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| {
             0.01 * square(1.0 / model.reach(i, reached(i)))

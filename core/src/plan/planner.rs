@@ -5,9 +5,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::check::{Failure, Grid, Walk, Witness};
-use super::law::{Brake, Reference};
+use super::law::{Brake, Gain, Reference};
 use super::model::Model;
-use super::search::{Beside, Descent, Search, Trajectory};
+use super::search::{Descent, Search, Trajectory};
 use super::{Plan, Requirement};
 use crate::MAX_INPUTS;
 use crate::lie::{DerivativeSource, Predict};
@@ -37,6 +37,9 @@ const COARSE: f64 = 4.0;
 const FINE: f64 = 32.0;
 /// The most samples until a deadline.
 const MOST_SAMPLES: usize = 100_000_000;
+/// Growth of a deviation over a hold of the search, and how much finer its grid is made for that.
+const LED: f64 = 1.8;
+const FINEST: usize = 3;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
@@ -91,7 +94,7 @@ impl<'a> Planner<'a> {
         for (part, holds) in GRIDS {
             let sooner = |r: &Requirement<'a>| Requirement { from: t + part * (r.from - t), ..*r };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let Some((hold, times)) = self.grid(t, &requirements, holds) else {
+            let Some((mut hold, mut times)) = self.grid(t, &requirements, holds) else {
                 failure = Failure::TooLong;
                 continue;
             };
@@ -101,7 +104,16 @@ impl<'a> Planner<'a> {
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
-            let Some(brake) = Brake::around(&model, x, hold, self.period) else { continue };
+            let Some(mut guide) = Brake::around(&model, x, hold) else { continue };
+            // What is lost within a hold is led in shorter ones.
+            let finer = (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1;
+            if finer > 1
+                && let Some(grid) = self.grid(t, &requirements, holds.map(|n| n * finer.min(FINEST)))
+            {
+                (hold, times) = grid;
+                guide = Brake::around(&model, x, hold).unwrap_or(guide);
+            }
+            let Some(brake) = guide.shorter(&model, self.period) else { continue };
             let brake = Arc::new(brake);
             let mut search = Search {
                 model: sketch,
@@ -111,7 +123,7 @@ impl<'a> Planner<'a> {
                 x,
                 size: self.size,
             };
-            let guesses = self.guesses(&sketch, &brake, x, &times);
+            let guesses = self.guesses(&sketch, &guide, x, &times);
             let mut descents: Vec<Descent> =
                 guesses.into_iter().map(|inputs| Descent::from(search.run(inputs))).collect();
             // A few steps show which guesses lead somewhere.
@@ -128,8 +140,8 @@ impl<'a> Planner<'a> {
                     }
                     // What is broken between the nodes is asked for with more margin at them.
                     for _ in 0..TIGHTENED {
-                        let beside = search.beside(&descent.best);
-                        let found = match self.finish(&model, &times, &descent.best, beside, &brake) {
+                        let gains = search.gains(descent);
+                        let found = match self.finish(&model, &times, &descent.best, gains, &brake) {
                             Ok(plan) => return Ok(plan),
                             Err(found) => found,
                         };
@@ -186,12 +198,12 @@ impl<'a> Planner<'a> {
         model: &Model<'a>,
         times: &[f64],
         found: &Trajectory,
-        beside: Beside,
+        gains: Option<Vec<Gain>>,
         brake: &Arc<Brake>,
     ) -> Result<Plan, Failure> {
         let (mut inputs, states) = (found.inputs.clone(), found.states.clone());
         inputs.pop();
-        let gains = beside.gains.ok_or(Failure::Singular)?;
+        let gains = gains.ok_or(Failure::Singular)?;
         let reference = Reference { times: times.to_vec(), inputs, states, gains };
         let mut plan = Plan {
             reference: Some(Arc::new(reference)),
@@ -377,7 +389,7 @@ impl<'a> Planner<'a> {
                 if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
                 {
                     // What would fall is held upright meanwhile.
-                    match brake.stays {
+                    match brake.stays() {
                         true => u.copy_from_slice(&brake.input),
                         false => brake.input(model, &x, &mut u),
                     }

@@ -76,14 +76,8 @@ pub(super) struct Descent {
     trust: Vec<f64>,
     /// The price of each row: where it is violated at first, that of its slack, then its multiplier.
     prices: Vec<f64>,
-    /// The plant beside the best, once it is asked for.
-    beside: Option<Beside>,
-}
-
-/// The plant beside a trajectory: one linear model for every hold, and the gains of a feedback along it, if there are any.
-pub(super) struct Beside {
-    pub(super) linear: Vec<Linear>,
-    pub(super) gains: Option<Vec<Gain>>,
+    /// The plant beside the best, once it is asked for: one linear model for every hold.
+    linear: Option<Vec<Linear>>,
 }
 
 impl Descent {
@@ -91,7 +85,7 @@ impl Descent {
         let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { PENALTY } else { 0.0 };
         let prices = guess.values.iter().map(price).collect();
         let trust = vec![TRUST; guess.inputs[0].len()];
-        Self { best: guess, trust, prices, beside: None }
+        Self { best: guess, trust, prices, linear: None }
     }
 }
 
@@ -203,12 +197,12 @@ impl Search<'_> {
     /// Improves the best of `descent`; at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
         for _ in 0..iterations {
-            let Descent { best, trust, prices, beside } = descent;
+            let Descent { best, trust, prices, linear } = descent;
             if !best.merit.is_finite() || trust.iter().all(|t| *t < LEAST_TRUST) {
                 break;
             }
-            let Beside { linear, gains } = beside.get_or_insert_with(|| self.beside(best));
-            let Some(answer) = self.program(best, linear, prices, trust) else {
+            let along = linear.get_or_insert_with(|| self.linear(best));
+            let Some(answer) = self.program(best, along, prices, trust) else {
                 trust.iter_mut().for_each(|t| *t *= 0.3);
                 continue;
             };
@@ -216,9 +210,9 @@ impl Search<'_> {
             let mut next = self.run(answer.inputs.clone());
             // What leads elsewhere by itself may be led there: an unstable plant forgets no deviation.
             if best.merit - next.merit <= AS_EXPECTED * expected
-                && let Some(gains) = gains
+                && let Some(gains) = Gain::along(&self.model, &answer.states, &answer.inputs, along)
             {
-                let led = self.steer(answer.inputs, Some((&answer.states, gains)));
+                let led = self.steer(answer.inputs, Some((&answer.states, &gains)));
                 // Not-a-number is no better.
                 if led.merit < next.merit {
                     next = led;
@@ -232,7 +226,7 @@ impl Search<'_> {
             }
             if gain > 0.0 {
                 let settled = next.violation <= 0.0 && gain <= 1e-2 * best.merit;
-                (*best, *prices, *beside) = (next, answer.prices, None);
+                (*best, *prices, *linear) = (next, answer.prices, None);
                 if settled {
                     // Nothing is left to gain.
                     trust.fill(0.0);
@@ -241,13 +235,17 @@ impl Search<'_> {
         }
     }
 
-    /// The plant beside `at`.
-    pub(super) fn beside(&self, at: &Trajectory) -> Beside {
+    /// The plant beside `at`, hold by hold.
+    fn linear(&self, at: &Trajectory) -> Vec<Linear> {
         let holds = at.inputs.len() - 1;
-        let linear: Vec<Linear> =
-            (0..holds).map(|k| self.model.linear(&at.states[k], &at.inputs[k], self.hold(k))).collect();
-        let gains = Gain::along(&self.model, &at.states, &at.inputs[..holds], &linear);
-        Beside { linear, gains }
+        (0..holds).map(|k| self.model.linear(&at.states[k], &at.inputs[k], self.hold(k))).collect()
+    }
+
+    /// The gains of a feedback along the best of `descent`, if there are any.
+    pub(super) fn gains(&self, descent: &mut Descent) -> Option<Vec<Gain>> {
+        let Descent { best, linear, .. } = descent;
+        let linear = linear.get_or_insert_with(|| self.linear(best));
+        Gain::along(&self.model, &best.states, &best.inputs, linear)
     }
 
     /// Shrinks the trust in those inputs whose change from `from` to `to` bends the trajectory: an input that turns a vehicle
