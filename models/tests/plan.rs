@@ -17,6 +17,9 @@ impl Random {
     }
 }
 
+/// ẋ at x and u.
+type Rate<'a> = dyn Fn(&[f64], &[f64]) -> Vec<f64> + 'a;
+
 /// A plant twice: as expressions, and as code to judge by.
 struct Case<'a> {
     period: f64,
@@ -27,7 +30,7 @@ struct Case<'a> {
     /// h, its relative degree, and whether it has the deadline.
     barriers: &'a [(&'a str, usize, bool)],
     bounds: &'a [[f64; 2]],
-    rate: &'a dyn Fn(&[f64], &[f64]) -> Vec<f64>,
+    rate: &'a Rate<'a>,
     /// The same h.
     h: &'a dyn Fn(&[f64]) -> Vec<f64>,
 }

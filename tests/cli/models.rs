@@ -230,6 +230,6 @@ fn the_pole_stays_up_whatever_is_wanted() {
             (table.column("time"), table.column("plant.x.x"), table.column("plant.x.theta"));
         assert!(theta.iter().all(|theta| theta.abs() <= 0.5), "{push} N");
         assert!(time.iter().zip(x).all(|(t, x)| *t < 3.0 || (x - 2.0).abs() <= 0.2), "{push} N");
-        assert!(table.column("filter.assured").iter().all(|assured| *assured == 1.0), "{push} N");
+        assert!(table.column("filter.assurance").iter().all(|standing| *standing == 1.0), "{push} N");
     }
 }
