@@ -211,3 +211,25 @@ fn the_models_keep_their_promises_with_the_figures_of_the_page() {
     let found = found.join("\n");
     assert!(text.contains(&found), "docs/models.md should have\n{found}");
 }
+
+/// A plant that falls by itself, from a file: promised, and kept while u_ref pushes either way or not at all.
+#[test]
+fn the_pole_stays_up_whatever_is_wanted() {
+    let workshop = Workshop::with_library();
+    for kind in ["filter", "plant"] {
+        let name = format!("cart-pole-{kind}.toml");
+        workshop.write(&name, example(&name));
+        workshop.punctual(["build", &name, "-o", &name.replace(".toml", ".fmu")]).success();
+    }
+    let system = String::from_utf8(example("cart-pole.toml")).expect("text");
+    for push in ["-30.0", "30.0", "0.0"] {
+        workshop.write("system.toml", system.replace("-30.0", push));
+        workshop.punctual(["run", "system.toml", "--out", "out", "--require", "kept"]).success();
+        let table = Table::parse(&workshop.text("out/system.csv"));
+        let (time, x, theta) =
+            (table.column("time"), table.column("plant.x.x"), table.column("plant.x.theta"));
+        assert!(theta.iter().all(|theta| theta.abs() <= 0.5), "{push} N");
+        assert!(time.iter().zip(x).all(|(t, x)| *t < 3.0 || (x - 2.0).abs() <= 0.2), "{push} N");
+        assert!(table.column("filter.assurance").iter().all(|standing| *standing == 1.0), "{push} N");
+    }
+}

@@ -1,11 +1,11 @@
 //! Two laws of feedback: one stops the plant, the other follows a reference.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::model::{Linear, Model};
+use crate::elementary;
 use crate::scalar::all_finite;
 
 /// Price of an input against what one hold of it gains: near 0 the plant is stopped in as few holds as it can be.
@@ -25,18 +25,48 @@ pub(super) struct Brake {
     pub(super) gain: Gain,
     /// The length of a hold in s.
     pub(super) hold: f64,
-    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
-    pub(super) stays: bool,
+    /// How many times a deviation from the rest grows over a hold under `input` alone: the largest eigenvalue.
+    growth: f64,
 }
 
 /// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
 const STAYS: f64 = 1.0 + 1e-4;
+/// Growth of a deviation from a rest over the longest hold that holds it there.
+const LOST: f64 = 1.35;
+/// How fast a rest that does not stay is come to, against how fast it is lost.
+const HASTE: f64 = 0.6;
 
 impl Brake {
     /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
     pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
         let (state, input) = model.rest(x, hold)?;
+        Self::at(model, state, input, hold)
+    }
+
+    /// The same law with shorter holds where the rest is lost sooner; they are so many times `period`.
+    pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
+        let hold = (self.longest(LOST) / period) as u32;
+        let hold = f64::from(hold.max(1)) * period;
+        match self.stays() || hold >= self.hold {
+            true => Some(self.clone()),
+            false => Self::at(model, self.state.clone(), self.input.clone(), hold),
+        }
+    }
+
+    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
+    pub(super) fn stays(&self) -> bool {
+        self.growth <= STAYS
+    }
+
+    /// The time in s in which a deviation from the rest grows so many times; at most a hold.
+    pub(super) fn longest(&self, growth: f64) -> f64 {
+        self.hold * (elementary::ln(growth) / elementary::ln(self.growth.max(growth)))
+    }
+
+    fn at(model: &Model<'_>, state: Vec<f64>, input: Vec<f64>, hold: f64) -> Option<Self> {
         let Linear { a, b } = model.linear(&state, &input, hold);
+        let growth = a.complex_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(v.norm_sqr()));
+        let growth = elementary::sqrt(growth);
         let nx = a.nrows();
         let rate = (&a - DMatrix::identity(nx, nx)) / hold;
         let q = rate.transpose() * rate;
@@ -44,32 +74,26 @@ impl Brake {
         // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
         let most = gained.diagonal().max().max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
-        let mut p = q.clone();
-        for _ in 0..RICCATI {
-            let (next, _) = riccati(&p, &a, &b, &q, &r)?;
-            let change = (&next - &p).amax();
-            p = next;
-            if !p.iter().all(|v| v.is_finite()) {
-                return None;
-            }
-            if change <= 1e-12 * p.amax() {
-                break;
-            }
-        }
-        let (_, gain) = riccati(&p, &a, &b, &q, &r)?;
-        let stays = a.complex_eigenvalues().iter().all(|v| v.norm_sqr() <= STAYS * STAYS);
-        Some(Self { state, input, gain: Gain::from(&gain), hold, stays })
+        // What no input hastens is left as it is.
+        let sooner = if growth <= STAYS { 1.0 } else { elementary::powf(growth.min(LOST), HASTE) };
+        let hastened = regulator(&(&a * sooner), &(&b * sooner), &q, &r);
+        let gain = hastened.or_else(|| regulator(&a, &b, &q, &r))?;
+        Some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
     /// Whether it is a law of a plant with so many states and inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
-        let Self { state, input, gain, hold, stays: _ } = self;
-        is_of(state, states) && is_of(input, inputs) && is_of(&gain.0, inputs * states) && *hold > 0.0
+        let Self { state, input, gain, hold, growth } = self;
+        is_of(state, states)
+            && is_of(input, inputs)
+            && is_of(&gain.0, inputs * states)
+            && *hold > 0.0
+            && growth.is_finite()
     }
 
     /// Writes the input at `x`.
     pub(super) fn input(&self, model: &Model<'_>, x: &[f64], u: &mut [f64]) {
-        feedback(&self.input, &self.gain, |i| x[i] - self.state[i], u);
+        self.gain.feedback(&self.input, |i| x[i] - self.state[i], u);
         model.clamp(u);
     }
 }
@@ -88,42 +112,6 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// The reference `inputs` from `x` between `times`, with gains by the Riccati equation backwards along it.
-    pub(super) fn along(model: &Model<'_>, times: &[f64], x: &[f64], inputs: Vec<Vec<f64>>) -> Option<Self> {
-        let (nx, nu) = (model.states(), model.inputs());
-        let mut states = vec![x.to_vec()];
-        for (k, u) in inputs.iter().enumerate() {
-            let mut x = states[k].clone();
-            model.flow(&mut x, u, times[k + 1] - times[k]);
-            states.push(x);
-        }
-        // A deviation is priced by how far its state moves along the reference, an input by its bounds.
-        let span = |i: usize| {
-            let (low, high) = states
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
-            high - low
-        };
-        let largest = (0..nx).map(span).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
-        let q =
-            DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / span(i).max(0.01 * largest))));
-        let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
-        let r = DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| {
-            0.01 * square(1.0 / model.reach(i, reached(i)))
-        }));
-        let mut p = &q * 10.0;
-        let mut gains = Vec::with_capacity(inputs.len());
-        for (k, u) in inputs.iter().enumerate().rev() {
-            let Linear { a, b } = model.linear(&states[k], u, times[k + 1] - times[k]);
-            let (next, gain) = riccati(&p, &a, &b, &q, &r)?;
-            p = next;
-            gains.push(Gain::from(&gain));
-        }
-        gains.reverse();
-        let finite = gains.iter().all(|gain| all_finite(&gain.0));
-        finite.then_some(Self { times: times.to_vec(), inputs, states, gains })
-    }
-
     /// Whether it is one of a plant with so many states and inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
         let Self { times, inputs: held, states: nodes, gains } = self;
@@ -144,9 +132,13 @@ impl Reference {
 
     /// Writes the input for the rest of hold `k`, at time `t` and `x`.
     pub(super) fn input(&self, model: &Model<'_>, k: usize, t: f64, x: &[f64], u: &mut [f64]) {
-        let part = ((t - self.times[k]) / (self.times[k + 1] - self.times[k])).clamp(0.0, 1.0);
-        let (from, to) = (&self.states[k], &self.states[k + 1]);
-        feedback(&self.inputs[k], &self.gains[k], |i| x[i] - (from[i] + part * (to[i] - from[i])), u);
+        let (begin, end) = (self.times[k], self.times[k + 1]);
+        let mut at = self.states[k].clone();
+        // The chord of a long hold is far from its arc.
+        if t > begin + 1e-6 * (end - begin) {
+            model.flow(&mut at, &self.inputs[k], t.min(end) - begin);
+        }
+        self.gains[k].feedback(&self.inputs[k], |i| x[i] - at[i], u);
         model.clamp(u);
     }
 }
@@ -162,12 +154,66 @@ impl From<&DMatrix<f64>> for Gain {
     }
 }
 
-/// `u` = `input` + `gain` · `deviation`.
-fn feedback(input: &[f64], gain: &Gain, deviation: impl Fn(usize) -> f64, u: &mut [f64]) {
-    let columns = gain.0.len() / u.len();
-    for ((u, input), row) in u.iter_mut().zip(input).zip(gain.0.chunks_exact(columns)) {
-        *u = row.iter().enumerate().fold(*input, |sum, (j, gain)| sum + gain * deviation(j));
+impl Gain {
+    /// `u` = `input` + gain · `deviation`.
+    pub(super) fn feedback(&self, input: &[f64], deviation: impl Fn(usize) -> f64, u: &mut [f64]) {
+        let columns = self.0.len() / u.len();
+        for ((u, input), row) in u.iter_mut().zip(input).zip(self.0.chunks_exact(columns)) {
+            *u = row.iter().enumerate().fold(*input, |sum, (j, gain)| sum + gain * deviation(j));
+        }
     }
+
+    /// The gains of a feedback along `states` and `inputs`, beside which the plant is `linear`: by the Riccati equation,
+    /// backwards. `None` where there are none.
+    pub(super) fn along(
+        model: &Model<'_>,
+        states: &[Vec<f64>],
+        inputs: &[Vec<f64>],
+        linear: &[Linear],
+    ) -> Option<Vec<Self>> {
+        let (nx, nu) = (model.states(), model.inputs());
+        // A deviation is priced by how far its state moves along the reference, an input by its bounds.
+        let span = |i: usize| {
+            let (low, high) = states
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
+            high - low
+        };
+        let largest = (0..nx).map(span).fold(0.0, f64::max);
+        let size = |i: usize| if largest > 0.0 { span(i).max(0.01 * largest) } else { 1.0 };
+        let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / size(i))));
+        let inputs = &inputs[..linear.len()];
+        let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
+        let r = DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| {
+            0.01 * square(1.0 / model.reach(i, reached(i)))
+        }));
+        let mut p = &q * 10.0;
+        let mut gains = Vec::with_capacity(linear.len());
+        for Linear { a, b } in linear.iter().rev() {
+            let (next, gain) = riccati(&p, a, b, &q, &r)?;
+            p = next;
+            gains.push(Self::from(&gain));
+        }
+        gains.reverse();
+        gains.iter().all(|gain| all_finite(&gain.0)).then_some(gains)
+    }
+}
+
+/// The gain that is best in the long run, where the Riccati equation settles.
+fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut p = q.clone();
+    for _ in 0..RICCATI {
+        let (next, _) = riccati(&p, a, b, q, r)?;
+        let change = (&next - &p).amax();
+        p = next;
+        if !p.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        if change <= 1e-12 * p.amax() {
+            break;
+        }
+    }
+    riccati(&p, a, b, q, r).map(|(_, gain)| gain)
 }
 
 /// One step of the Riccati equation backwards: the price of a state before it, and the gain.

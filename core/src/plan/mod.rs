@@ -73,7 +73,7 @@ pub struct Plan {
 impl Plan {
     /// Whether the last input alone holds the plant at the rest of the plan, without feedback.
     pub fn stays(&self) -> bool {
-        self.brake.as_ref().is_some_and(|brake| brake.stays)
+        self.brake.as_ref().is_some_and(|brake| brake.stays())
     }
 
     /// What is wrong with it as a plan of a plant with so many states and inputs; one from a file may be.

@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::check::{Failure, Grid, Walk, Witness};
-use super::law::{Brake, Reference};
+use super::law::{Brake, Gain, Reference};
 use super::model::Model;
 use super::search::{Descent, Search, Trajectory};
 use super::{Integral, Plan, Requirement};
@@ -39,6 +39,9 @@ const COARSE: f64 = 4.0;
 const FINE: f64 = 32.0;
 /// The most samples until a deadline.
 const MOST_SAMPLES: usize = 100_000_000;
+/// Growth of a deviation over a hold of the search, and how much finer its grid is made for that.
+const LED: f64 = 1.8;
+const FINEST: usize = 3;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
@@ -104,7 +107,7 @@ impl<'a> Planner<'a> {
                 Requirement { from: t + part * (r.from - t), margin, ..*r }
             };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let Some((hold, times)) = self.grid(t, &requirements, holds) else {
+            let Some((mut hold, mut times)) = self.grid(t, &requirements, holds) else {
                 failure = Failure::TooLong;
                 continue;
             };
@@ -114,7 +117,16 @@ impl<'a> Planner<'a> {
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
-            let Some(brake) = Brake::around(&model, x, hold) else { continue };
+            let Some(mut guide) = Brake::around(&model, x, hold) else { continue };
+            // What is lost within a hold is led in shorter ones.
+            let finer = (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1;
+            if finer > 1
+                && let Some(grid) = self.grid(t, &requirements, holds.map(|n| n * finer.min(FINEST)))
+            {
+                (hold, times) = grid;
+                guide = Brake::around(&model, x, hold).unwrap_or(guide);
+            }
+            let Some(brake) = guide.shorter(&model, self.period) else { continue };
             let brake = Arc::new(brake);
             let mut search = Search {
                 model: sketch,
@@ -124,7 +136,7 @@ impl<'a> Planner<'a> {
                 x,
                 size: self.size,
             };
-            let guesses = self.guesses(&sketch, &brake, x, &times);
+            let guesses = self.guesses(&sketch, &guide, x, &times);
             let mut descents: Vec<Descent> =
                 guesses.into_iter().map(|inputs| Descent::from(search.run(inputs))).collect();
             // A few steps show which guesses lead somewhere.
@@ -141,7 +153,8 @@ impl<'a> Planner<'a> {
                     }
                     // What is broken between the nodes is asked for with more margin at them.
                     for _ in 0..TIGHTENED {
-                        let found = match self.finish(&model, &times, x, &descent.best, &brake) {
+                        let gains = search.gains(descent);
+                        let found = match self.finish(&model, &times, &descent.best, gains, &brake) {
                             Ok(plan) => return Ok(plan),
                             Err(found) => found,
                         };
@@ -197,20 +210,21 @@ impl<'a> Planner<'a> {
         &self,
         model: &Model<'a>,
         times: &[f64],
-        x: &[f64],
         found: &Trajectory,
+        gains: Option<Vec<Gain>>,
         brake: &Arc<Brake>,
     ) -> Result<Plan, Failure> {
-        let mut inputs = found.inputs.clone();
+        let (mut inputs, states) = (found.inputs.clone(), found.states.clone());
         inputs.pop();
-        let reference = Reference::along(model, times, x, inputs).ok_or(Failure::Singular)?;
+        let gains = gains.ok_or(Failure::Singular)?;
+        let reference = Reference { times: times.to_vec(), inputs, states, gains };
         let mut plan = Plan {
             reference: Some(Arc::new(reference)),
             brake: Some(brake.clone()),
             witness: Witness::default(),
         };
         let grid = Grid { period: self.period, even: true };
-        plan.witness = self.walk(&plan, 1.0, grid, (times[0], x), None, true)?;
+        plan.witness = self.walk(&plan, 1.0, grid, (times[0], &found.states[0]), None, true)?;
         Ok(plan)
     }
 
@@ -234,8 +248,8 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are, or the feedback along its
-    /// reference where the plant is not quite the model.
+    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
+    /// the model, or forgets no round-off, the feedback that they came from.
     ///
     /// # Errors
     ///
@@ -243,7 +257,8 @@ impl<'a> Planner<'a> {
     pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
-        let replay = |grid: Grid| {
+        // As many of its holds as `held`, then the law behind it.
+        let replay = |grid: Grid, held: usize, follows: bool| {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
             let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
@@ -254,7 +269,8 @@ impl<'a> Planner<'a> {
                 at += grid.period;
                 hold(&mut walk, plan.witness.mean(t, at), at)?;
             }
-            for (end, u) in &plan.witness.inputs {
+            let left = plan.witness.inputs.iter().filter(|(end, _)| *end > t + grid.slack());
+            for (end, u) in left.take(held) {
                 if *end > at + grid.slack() {
                     // Not again what has come to its end, which grows by a hold at every sample.
                     if walk.may_end(brake) {
@@ -264,10 +280,18 @@ impl<'a> Planner<'a> {
                     at = *end;
                 }
             }
+            if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
+                walk.follow(reference)?;
+            }
             walk.stop(brake)
         };
         self.on_a_grid(|grid| {
-            replay(grid).or_else(|failure| {
+            let kept = match plan.stays() {
+                true => replay(grid, usize::MAX, false),
+                // The law took over at the end of the present hold.
+                false => replay(grid, 1, true).or_else(|failure| replay(grid, 1, false).map_err(|_| failure)),
+            };
+            kept.or_else(|failure| {
                 let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
                 follow(true).or_else(|_| follow(false)).map_err(|_| failure)
             })
@@ -377,8 +401,13 @@ impl<'a> Planner<'a> {
             for k in 0..holds {
                 if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
                 {
+                    // What would fall is held upright meanwhile.
+                    match brake.stays() {
+                        true => u.copy_from_slice(&brake.input),
+                        false => brake.input(model, &x, &mut u),
+                    }
                     for i in 0..nu {
-                        u[i] = brake.input[i] + side[i] * size * model.reach(i, self.size);
+                        u[i] += side[i] * size * model.reach(i, self.size);
                     }
                     model.clamp(&mut u);
                 } else {

@@ -21,6 +21,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeCone
 use nalgebra::DMatrix;
 
 use super::Requirement;
+use super::law::Gain;
 use super::model::{Linear, Model};
 
 /// Price of a violation of the size of h on the way, against the price of full inputs all the time.
@@ -31,6 +32,8 @@ const TRUST: f64 = 0.7;
 const LEAST_TRUST: f64 = 1e-3;
 /// Margin that is added for what was missing, in units of it.
 const TIGHTER: f64 = 1.5;
+/// Part of the expected gain from which a step counts as one that went as expected.
+const AS_EXPECTED: f64 = 0.7;
 /// Part of a trajectory's change that its curvature may be for the linear model to count.
 const BENT: f64 = 0.2;
 
@@ -51,7 +54,7 @@ pub(super) struct Search<'a> {
 #[derive(Clone, Default)]
 pub(super) struct Trajectory {
     pub(super) inputs: Vec<Vec<f64>>,
-    states: Vec<Vec<f64>>,
+    pub(super) states: Vec<Vec<f64>>,
     /// h − margin at the nodes at which requirements are in force: requirement, node, value.
     values: Vec<(usize, usize, f64)>,
     /// Largest |h| of each requirement on the way.
@@ -72,6 +75,8 @@ pub(super) struct Descent {
     trust: Vec<f64>,
     /// The price of each row: where it is violated at first, that of its slack, then its multiplier.
     prices: Vec<f64>,
+    /// The plant beside the best, once it is asked for: one linear model for every hold.
+    linear: Option<Vec<Linear>>,
 }
 
 impl Descent {
@@ -79,13 +84,15 @@ impl Descent {
         let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { PENALTY } else { 0.0 };
         let prices = guess.values.iter().map(price).collect();
         let trust = vec![TRUST; guess.inputs[0].len()];
-        Self { best: guess, trust, prices }
+        Self { best: guess, trust, prices, linear: None }
     }
 }
 
 /// The answer of a quadratic program.
 struct Answer {
     inputs: Vec<Vec<f64>>,
+    /// Where the linear model expects them to lead.
+    states: Vec<Vec<f64>>,
     /// The multiplier of each row.
     prices: Vec<f64>,
     /// The merit that the linear model expects.
@@ -111,12 +118,22 @@ impl Search<'_> {
 
     /// Runs `inputs` ahead, of which the last is for the rest.
     pub(super) fn run(&self, inputs: Vec<Vec<f64>>) -> Trajectory {
+        self.steer(inputs, None)
+    }
+
+    /// Runs `inputs` ahead, with the feedback `along` states where there is one. Those of the trajectory are what it made
+    /// of them.
+    fn steer(&self, mut inputs: Vec<Vec<f64>>, along: Option<(&[Vec<f64>], &[Gain])>) -> Trajectory {
         let (holds, nx) = (inputs.len() - 1, self.x.len());
         let mut states = vec![self.x.to_vec()];
         let mut rates = vec![0.0_f64; nx];
-        for (k, u) in inputs[..holds].iter().enumerate() {
+        for (k, u) in inputs[..holds].iter_mut().enumerate() {
             let (from, hold) = (&states[k], self.hold(k));
             let mut x = from.clone();
+            if let Some((expected, gains)) = along {
+                gains[k].feedback(&u.clone(), |i| x[i] - expected[k][i], u);
+                self.model.clamp(u);
+            }
             self.model.flow(&mut x, u, hold);
             for (rate, (x, from)) in rates.iter_mut().zip(x.iter().zip(from)) {
                 *rate = rate.max((x - from).abs() / hold);
@@ -177,30 +194,55 @@ impl Search<'_> {
     /// Improves the best of `descent`; at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
         for _ in 0..iterations {
-            let Descent { best, trust, prices } = descent;
+            let Descent { best, trust, prices, linear } = descent;
             if !best.merit.is_finite() || trust.iter().all(|t| *t < LEAST_TRUST) {
                 break;
             }
-            let Some(answer) = self.program(best, prices, trust) else {
+            let along = linear.get_or_insert_with(|| self.linear(best));
+            let Some(answer) = self.program(best, along, prices, trust) else {
                 trust.iter_mut().for_each(|t| *t *= 0.3);
                 continue;
             };
-            let next = self.run(answer.inputs);
-            let (gain, expected) = (best.merit - next.merit, best.merit - answer.merit);
-            if gain > 0.7 * expected {
+            let expected = best.merit - answer.merit;
+            let mut next = self.run(answer.inputs.clone());
+            // What leads elsewhere by itself may be led there: an unstable plant forgets no deviation.
+            if best.merit - next.merit <= AS_EXPECTED * expected
+                && let Some(gains) = Gain::along(&self.model, &answer.states, &answer.inputs, along)
+            {
+                let led = self.steer(answer.inputs, Some((&answer.states, &gains)));
+                // Not-a-number is no better.
+                if led.merit < next.merit {
+                    next = led;
+                }
+            }
+            let gain = best.merit - next.merit;
+            if gain > AS_EXPECTED * expected {
                 trust.iter_mut().for_each(|t| *t = (2.0 * *t).min(2.0));
             } else if gain < 0.3 * expected {
                 self.shrink(trust, best, &next, if gain > 0.0 { 0.5 } else { 0.3 });
             }
             if gain > 0.0 {
                 let settled = next.violation <= 0.0 && gain <= 1e-2 * best.merit;
-                (*best, *prices) = (next, answer.prices);
+                (*best, *prices, *linear) = (next, answer.prices, None);
                 if settled {
                     // Nothing is left to gain.
                     trust.fill(0.0);
                 }
             }
         }
+    }
+
+    /// The plant beside `at`, hold by hold.
+    fn linear(&self, at: &Trajectory) -> Vec<Linear> {
+        let holds = at.inputs.len() - 1;
+        (0..holds).map(|k| self.model.linear(&at.states[k], &at.inputs[k], self.hold(k))).collect()
+    }
+
+    /// The gains of a feedback along the best of `descent`, if there are any.
+    pub(super) fn gains(&self, descent: &mut Descent) -> Option<Vec<Gain>> {
+        let Descent { best, linear, .. } = descent;
+        let linear = linear.get_or_insert_with(|| self.linear(best));
+        Gain::along(&self.model, &best.states, &best.inputs, linear)
     }
 
     /// Shrinks the trust in those inputs whose change from `from` to `to` bends the trajectory: an input that turns a vehicle
@@ -234,7 +276,7 @@ impl Search<'_> {
     }
 
     /// The answer of the quadratic program around `at`.
-    fn program(&self, at: &Trajectory, prices: &[f64], trust: &[f64]) -> Option<Answer> {
+    fn program(&self, at: &Trajectory, linear: &[Linear], prices: &[f64], trust: &[f64]) -> Option<Answer> {
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
         // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the rest.
@@ -252,8 +294,7 @@ impl Search<'_> {
             }
         };
         // The linear model, as equations.
-        for k in 0..holds {
-            let Linear { a, b: by } = self.model.linear(&at.states[k], &at.inputs[k], self.hold(k));
+        for (k, Linear { a, b: by }) in linear.iter().enumerate() {
             for i in 0..nx {
                 entry(b.len(), state(k + 1, i), 1.0);
                 for j in 0..nx {
@@ -369,8 +410,12 @@ impl Search<'_> {
             }
             self.model.clamp(u);
         }
+        let mut states = at.states.clone();
+        for (k, x) in states.iter_mut().enumerate().skip(1) {
+            x.iter_mut().enumerate().for_each(|(i, x)| *x += solution.x[state(k, i)]);
+        }
         let prices = solution.z[equations..equations + at.values.len()].to_vec();
-        Some(Answer { inputs, prices, merit })
+        Some(Answer { inputs, states, prices, merit })
     }
 
     /// The part of −∂²h/∂x² that is convex, of requirement `i` at node `k`, by differences.

@@ -1,0 +1,237 @@
+//! Plans for plants written as expressions: accepted, and kept whatever is wanted; judged by an integrator of its own.
+
+#![expect(clippy::print_stdout, reason = "the figures of the search")]
+
+use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_models::Model;
+
+/// Numbers that are the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// ẋ at x and u.
+type Rate<'a> = dyn Fn(&[f64], &[f64]) -> Vec<f64> + 'a;
+
+/// A plant twice: as expressions, and as code to judge by.
+struct Case<'a> {
+    period: f64,
+    deadline: f64,
+    /// Number of states.
+    states: usize,
+    model: Model,
+    /// h, its relative degree, and whether it has the deadline.
+    barriers: &'a [(&'a str, usize, bool)],
+    bounds: &'a [[f64; 2]],
+    rate: &'a Rate<'a>,
+    /// The same h.
+    h: &'a dyn Fn(&[f64]) -> Vec<f64>,
+}
+
+impl Case<'_> {
+    fn filter(&self) -> AssuredFilter {
+        let [min, max] = [0, 1].map(|side| self.bounds.iter().map(|b| b[side]).collect::<Vec<f64>>());
+        let mut builder = SafetyFilter::builder(self.states, self.bounds.len());
+        for (k, (expression, n, is_goal)) in self.barriers.iter().enumerate() {
+            let settings =
+                if *is_goal { BarrierSettings::within(self.deadline) } else { BarrierSettings::keeping() };
+            let source = self.model.barrier(expression).and_then(|b| b.source(*n)).expect("a barrier");
+            builder = builder.source(&k.to_string(), source, settings).expect("valid settings");
+        }
+        let filter = builder
+            .bounds(&min, &max)
+            .and_then(|b| b.sampling(Sampling::Period(self.period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        AssuredFilter::new(filter, self.period).expect("a filter that can be assured")
+    }
+
+    fn move_by(&self, x: &mut [f64], u: &[f64], dt: f64) {
+        let at = |k: &[f64], s: f64| x.iter().zip(k).map(|(x, k)| x + s * k).collect::<Vec<f64>>();
+        let a = (self.rate)(x, u);
+        let b = (self.rate)(&at(&a, dt / 2.0), u);
+        let c = (self.rate)(&at(&b, dt / 2.0), u);
+        let d = (self.rate)(&at(&c, dt), u);
+        for i in 0..x.len() {
+            x[i] += dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
+        }
+    }
+
+    /// Whether a plan is found from `x`. What is promised is kept for `more` s after the deadline, with the `wanted` input.
+    fn is_kept(&self, x: &[f64], more: f64, mut wanted: impl FnMut(f64, &[f64]) -> Vec<f64>) -> bool {
+        const PARTS: u32 = 20;
+        let (mut filter, mut x, mut u) = (self.filter(), x.to_vec(), vec![0.0; self.bounds.len()]);
+        for k in 0..((self.deadline + more) / self.period) as u32 {
+            let t = f64::from(k) * self.period;
+            let assurance = *filter.step(t, &x, &wanted(t, &x), &mut u).expect("right dimensions");
+            if k == 0 && !assurance.is_assured() {
+                return false;
+            }
+            assert!(assurance.is_assured(), "{t}: {assurance:?}");
+            assert!(u.iter().zip(self.bounds).all(|(u, b)| (b[0]..=b[1]).contains(u)), "{t}: {u:?}");
+            for part in 1..=PARTS {
+                self.move_by(&mut x, &u, self.period / f64::from(PARTS));
+                let t = t + self.period * f64::from(part) / f64::from(PARTS);
+                for (h, (name, _, is_goal)) in (self.h)(&x).iter().zip(self.barriers) {
+                    assert!(*h >= 0.0 || (*is_goal && t < self.deadline), "{t}: {name} = {h} at {x:?}");
+                }
+            }
+        }
+        true
+    }
+}
+
+const LENGTH: f64 = 0.5;
+const GRAVITY: f64 = 9.81;
+
+/// A cart of 1 kg with a pole of `mass` upright, states x, theta, v, omega; by the `deadline` within 0.2 m of `target`.
+fn cart_pole<R>([mass, deadline, target, force]: [f64; 4], judge: impl FnOnce(&Case<'_>) -> R) -> R {
+    let acc = "(f + m * sin(theta) * (l * omega^2 - g * cos(theta))) / (1 + m * sin(theta)^2)";
+    let alpha = format!("(g * sin(theta) - cos(theta) * {acc}) / l");
+    let parameters = [("m", mass), ("l", LENGTH), ("g", GRAVITY), ("d", target)];
+    let model = Model::new(&["x", "theta", "v", "omega"], &["f"], &parameters, &["v", "omega", acc, &alpha])
+        .expect("a model");
+    judge(&Case {
+        period: 0.02,
+        deadline,
+        states: 4,
+        model,
+        barriers: &[("0.2^2 - (x - d)^2", 2, true), ("theta + 0.5", 2, false), ("0.5 - theta", 2, false)],
+        bounds: &[[-force, force]],
+        rate: &|x, u| {
+            // The equations of motion as they are, solved: the pole's mass is a point at its end.
+            let (sin, cos) = x[1].sin_cos();
+            let [[a, b], [c, d]] = [[1.0 + mass, mass * LENGTH * cos], [cos, LENGTH]];
+            let [p, q] = [u[0] + mass * LENGTH * x[3] * x[3] * sin, GRAVITY * sin];
+            let det = a * d - b * c;
+            vec![x[2], x[3], (p * d - b * q) / det, (a * q - c * p) / det]
+        },
+        h: &|x| vec![0.2 - (x[0] - target).abs(), x[1] + 0.5, 0.5 - x[1]],
+    })
+}
+
+#[test]
+fn a_cart_with_a_pole_gets_there_in_time_and_the_pole_stays_up() {
+    cart_pole([0.2, 3.0, 2.0, 40.0], |case| {
+        for push in [0.0, 60.0, -60.0] {
+            assert!(case.is_kept(&[0.0; 4], 2.0, |_, _| vec![push]), "{push} N: refused");
+        }
+    });
+}
+
+/// From starts around, with pushes of all kinds; and with other poles, deadlines, places and bounds.
+#[test]
+fn a_cart_with_a_pole_is_promised_only_what_is_kept() {
+    let starts = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 100 } else { 3 };
+    for around in [false, true] {
+        let mut accepted = 0;
+        for seed in 1..=starts {
+            let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+            let mut draw = |low: f64, high: f64| random.between(low, high);
+            let numbers = match around {
+                false => [0.2, 3.0, 2.0, 40.0],
+                true => [draw(0.1, 0.3), draw(2.0, 5.0), draw(1.0, 3.0), draw(20.0, 60.0)],
+            };
+            let x = [draw(-0.3, 0.3), draw(-0.1, 0.1), draw(-0.2, 0.2), draw(-0.2, 0.2)];
+            let force = numbers[3];
+            let is_kept = cart_pole(numbers, |case| {
+                case.is_kept(&x, 2.0, |t, x| {
+                    vec![match seed % 5 {
+                        0 => random.between(-force, force),
+                        1 => 2.0 * force,
+                        2 => -2.0 * force,
+                        3 => {
+                            if t % 1.0 < 0.5 {
+                                force
+                            } else {
+                                -force
+                            }
+                        }
+                        // To fell it.
+                        _ => -force * x[1].signum(),
+                    }]
+                })
+            });
+            accepted += u64::from(is_kept);
+        }
+        println!("cart and pole, others {around}: {accepted} of {starts} accepted and kept");
+        assert!(100 * accepted >= 95 * starts, "{accepted} of {starts} accepted");
+    }
+}
+
+/// The two links of `examples/models/arm-filter.toml`.
+#[test]
+fn an_arm_comes_within_its_limits() {
+    const P: [f64; 3] = [3.2, 0.9, 1.1];
+    let (first, second) =
+        ("(tau_1 + p_3 * sin(q_2) * (2 * w_1 * w_2 + w_2^2))", "(tau_2 - p_3 * sin(q_2) * w_1^2)");
+    let det = "(p_1 * p_2 - (p_3 * cos(q_2))^2)";
+    let w_1 = format!("(p_2 * {first} - (p_2 + p_3 * cos(q_2)) * {second}) / {det}");
+    let w_2 =
+        format!("((p_1 + p_2 + 2 * p_3 * cos(q_2)) * {second} - (p_2 + p_3 * cos(q_2)) * {first}) / {det}");
+    let parameters = [("p_1", P[0]), ("p_2", P[1]), ("p_3", P[2])];
+    let states = ["q_1", "q_2", "w_1", "w_2"];
+    let model = Model::new(&states, &["tau_1", "tau_2"], &parameters, &["w_1", "w_2", &w_1, &w_2]);
+    let case = Case {
+        period: 0.01,
+        deadline: 2.0,
+        states: 4,
+        model: model.expect("a model"),
+        barriers: &[("1.5 - q_1", 2, false), ("2.0 - q_2", 2, true)],
+        bounds: &[[-40.0, 40.0], [-25.0, 25.0]],
+        rate: &|x, u| {
+            let (sin, cos) = x[1].sin_cos();
+            let [[a, b], [c, d]] =
+                [[P[0] + P[1] + 2.0 * P[2] * cos, P[1] + P[2] * cos], [P[1] + P[2] * cos, P[1]]];
+            let p = u[0] + P[2] * sin * (2.0 * x[2] * x[3] + x[3] * x[3]);
+            let q = u[1] - P[2] * sin * x[2] * x[2];
+            let det = a * d - b * c;
+            vec![x[2], x[3], (p * d - b * q) / det, (a * q - c * p) / det]
+        },
+        h: &|x| vec![1.5 - x[0], 2.0 - x[1]],
+    };
+    for push in [[0.0, 0.0], [40.0, 25.0], [-40.0, 25.0]] {
+        assert!(case.is_kept(&[0.5, 2.6, 1.0, 0.0], 1.0, |_, _| push.to_vec()), "{push:?} N m: refused");
+    }
+}
+
+/// That of `examples/models/quadrotor-filter.toml`, with bounds.
+#[test]
+fn a_quadrotor_in_a_plane_gets_there_below_the_ceiling() {
+    let states = ["x", "z", "theta", "v_x", "v_z", "omega", "thrust", "thrust_rate"];
+    let derivatives = [
+        "v_x",
+        "v_z",
+        "omega",
+        "thrust * sin(theta)",
+        "thrust * cos(theta) - 9.81",
+        "alpha",
+        "thrust_rate",
+        "thrust_acc",
+    ];
+    let model = Model::new(&states, &["thrust_acc", "alpha"], &[], &derivatives);
+    let case = Case {
+        period: 0.02,
+        deadline: 4.0,
+        states: states.len(),
+        model: model.expect("a model"),
+        barriers: &[("z - 3", 4, true), ("x - 4", 4, true), ("5 - z", 4, false), ("6 - x", 4, false)],
+        bounds: &[[-300.0, 300.0], [-30.0, 30.0]],
+        rate: &|x, u| {
+            let [a, b] = [x[6] * x[2].sin(), x[6] * x[2].cos() - GRAVITY];
+            vec![x[3], x[4], x[5], a, b, u[1], x[7], u[0]]
+        },
+        h: &|x| vec![x[1] - 3.0, x[0] - 4.0, 5.0 - x[1], 6.0 - x[0]],
+    };
+    let start = [0.0, 0.0, -0.2, 0.0, 0.0, 0.0, GRAVITY, 0.0];
+    for push in [[0.0, 0.0], [100.0, 10.0], [-100.0, -10.0]] {
+        assert!(case.is_kept(&start, 0.5, |_, _| push.to_vec()), "{push:?}: refused");
+    }
+}
