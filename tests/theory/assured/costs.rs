@@ -76,9 +76,9 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
     (all, first, searches, samples)
 }
 
-/// Of a hundred thousand steps, or a million in `tests/nightly`.
+/// Of a million steps each in `tests/nightly`.
 #[test]
-fn table_of_the_cost_of_a_step() {
+fn the_cost_of_a_step() {
     let steps = cases(1000, 1_000_000) as usize;
     println!(
         "| unicycle, 10 ms | steps | median | 99 % | 99.99 % | largest | first steps: median | largest | searches |"

@@ -59,15 +59,15 @@ fn table_of_assured_bicycles_with_an_integrator() {
                 size.title,
                 runs.len(),
             );
+            for (start, run) in starts.iter().zip(&runs) {
+                if let Some(failure) = run.refused {
+                    println!("{}, {plant:?}, refused from {start:?}: {failure:?}", size.title);
+                }
+            }
             rows.push((size, plant, runs, [accepted, kept]));
         }
     }
     for (size, plant, runs, [accepted, kept]) in &rows {
-        for (start, run) in starts.iter().zip(runs) {
-            if let Some(failure) = run.refused {
-                println!("{}, {plant:?}, refused from {start:?}: {failure:?}", size.title);
-            }
-        }
         let lost = starts.iter().zip(runs).find(|(_, run)| run.broken().is_some());
         assert!(lost.is_none() && accepted == kept, "{}, {plant:?}: {lost:?}", size.title);
         assert!(*accepted as f64 >= ACCEPTED * runs.len() as f64, "{}, {plant:?}: {accepted}", size.title);
