@@ -74,8 +74,8 @@ def programme(case):
     opti.subject_to(casadi.sumsqr(x[:2, len(holds)]) <= inside)
     opti.subject_to(x[3, len(holds)] == 0)
     opti.minimize(outside)
-    quiet = {"print_level": 0, "max_iter": 400, "tol": 1e-8, "sb": "yes"}
-    opti.solver("ipopt", {"print_time": False}, quiet)
+    quiet = {"print_level": 0, "max_iter": 200, "tol": 1e-8, "sb": "yes"}
+    opti.solver("ipopt", {"print_time": False, "expand": True}, quiet)
     return opti, x, u, outside
 
 

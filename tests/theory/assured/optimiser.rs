@@ -31,7 +31,7 @@ fn draw(seed: u64, bicycle: bool) -> Case {
         false => (Plant::Unicycle, numbers.scale(0.3, 4.0)),
     };
     let deadline =
-        turn_and_drive(&start, [a, if bicycle { 1.0 } else { turning }]) * numbers.within(0.4, 1.3);
+        turn_and_drive(&start, [a, if bicycle { 1.0 } else { turning }]) * numbers.within(0.3, 1.1);
     let period = deadline / (HOLDS * (1 + numbers.below(5))) as f64;
     let goal = Shape::Disc {
         start: [0.0; 2],

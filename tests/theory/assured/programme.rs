@@ -25,10 +25,11 @@ use crate::judge::on_every_core;
 /// Radius of the goal, around the origin, in m.
 const RADIUS: f64 = 2.0;
 /// Instants of a hold at which the programme asks for the disc. The chord between two of them leaves it by
-/// a (δ/4)²/8 at most: some 0.1 mm.
+/// a (δ/4)²/8 at most: some 0.1 mm. To draw a case one is enough.
 const INSTANTS: usize = 4;
-/// Halvings of the logarithm of 256 to the least ease: to 3 in a thousand.
-const HALVINGS: u32 = 11;
+/// Least and largest ease at first, and halvings of their ratio: to 1 %.
+const EASE: [f64; 2] = [0.2, 3.0];
+const HALVINGS: u32 = 8;
 /// What the solver leaves open, in m: a hundred times its tolerance of 1e-8, for ways of some
 /// 100 m.
 const SOLVED: f64 = 1e-6;
@@ -59,13 +60,13 @@ impl Case {
         let speed = if inside { 1.0 } else { numbers.within(0.0, 1.2) } * (bound * far.max(RADIUS)).sqrt();
         let start = [far * angle.cos(), far * angle.sin(), speed * heading.cos(), speed * heading.sin()];
         let least = f64::max(to_rest(start[0], start[2], bound), to_rest(start[1], start[3], bound));
-        let period = least / numbers.scale(30.0, 150.0);
+        let period = least / numbers.scale(30.0, 100.0);
         let case = Self { start, deadline: least, period, bound };
         // The least ease that is possible.
-        let (mut low, mut high) = (1.0 / 16.0, 16.0);
+        let [mut low, mut high] = EASE;
         for _ in 0..HALVINGS {
             let middle = f64::sqrt(low * high);
-            if case.eased(middle).least_outside() < 0.0 { high = middle } else { low = middle }
+            if case.eased(middle).least_outside(1) < 0.0 { high = middle } else { low = middle }
         }
         let aside = numbers.scale(1e-3, 0.2);
         case.eased(high * if numbers.chance(0.75) { 1.0 + aside } else { 1.0 / (1.0 + aside) })
@@ -100,8 +101,8 @@ impl Case {
         assurance.failure
     }
 
-    /// How far outside the disc the point mass has to be at worst, in m; −[`RADIUS`] where it can rest at the centre.
-    fn least_outside(&self) -> f64 {
+    /// How far outside the disc the point mass has to be at worst of so many instants of a hold, in m; −[`RADIUS`] where it can rest at the centre.
+    fn least_outside(&self, instants: usize) -> f64 {
         let Self { start, deadline, period, bound } = *self;
         // From the edge to rest takes √(4R/a) along an axis. Elsewhere the speed of the start has to be lost.
         let after = f64::max(3.0 * (4.0 * RADIUS / bound).sqrt(), start[2].hypot(start[3]) / bound);
@@ -133,12 +134,12 @@ impl Case {
         }
         programme.close(NonnegativeConeT);
         let from = self.from();
-        let mut instants: Vec<f64> = (0..=holds * INSTANTS)
-            .map(|j| j as f64 * period / INSTANTS as f64)
+        let mut looked: Vec<f64> = (0..=holds * instants)
+            .map(|j| j as f64 * period / instants as f64)
             .filter(|t| *t > from)
             .collect();
-        instants.push(from);
-        for t in instants {
+        looked.push(from);
+        for t in looked {
             let k = ((t / period) as usize).min(holds - 1);
             let dt = t - k as f64 * period;
             programme.row(&[(outside, -1.0)], RADIUS);
@@ -209,7 +210,7 @@ fn the_programme_knows_what_is_possible() {
     let (bound, distance) = (2.0, 20.0);
     let at = |deadline: f64| {
         let start = [-distance, 0.0, 0.0, 0.0];
-        Case { start, deadline, period: deadline / 100.0, bound }.least_outside()
+        Case { start, deadline, period: deadline / 100.0, bound }.least_outside(INSTANTS)
     };
     // The edge at 18 m with the speed from which 4 m are enough to stop: that is at rest at 22 m at best.
     let speed = (bound * (distance + RADIUS)).sqrt();
@@ -232,7 +233,7 @@ fn table_of_what_is_possible() {
     let first = 0x5ec0_0000;
     let found = on_every_core(count, |i| {
         let case = Case::draw(first + i);
-        (case, case.least_outside(), case.refused())
+        (case, case.least_outside(INSTANTS), case.refused())
     });
     // How far inside the best way stays, as a part of the radius.
     let bands = [(0.1, f64::INFINITY), (0.01, 0.1), (0.001, 0.01), (0.0, 0.001)];
