@@ -65,9 +65,9 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
                 plan = Some(laws);
             }
             if k == 0 {
-                first.push(taken)
+                first.push(taken);
             } else {
-                all.push(taken)
+                all.push(taken);
             }
             samples += 1;
             x = advance(&case.plant, &x, &u, STEP);
