@@ -30,8 +30,8 @@ fn draw(seed: u64, bicycle: bool) -> Case {
         true => (Plant::Bicycle { l_r: far * numbers.scale(0.05, 0.5) }, numbers.within(0.3, 1.2)),
         false => (Plant::Unicycle, numbers.scale(0.3, 4.0)),
     };
-    let deadline =
-        turn_and_drive(&start, [a, if bicycle { 1.0 } else { turning }]) * numbers.within(0.3, 1.1);
+    let (turns, longest) = if bicycle { (1.0, 1.1) } else { (turning, 1.5) };
+    let deadline = turn_and_drive(&start, [a, turns]) * numbers.within(0.3, longest);
     let period = deadline / (HOLDS * (1 + numbers.below(5))) as f64;
     let goal = Shape::Disc {
         start: [0.0; 2],

@@ -101,7 +101,8 @@ impl Case {
         assurance.failure
     }
 
-    /// How far outside the disc the point mass has to be at worst of so many instants of a hold, in m; −[`RADIUS`] where it can rest at the centre.
+    /// How far outside the disc the point mass has to be at worst, in m, at so many instants of a hold; −[`RADIUS`] where
+    /// it can rest at the centre.
     fn least_outside(&self, instants: usize) -> f64 {
         let Self { start, deadline, period, bound } = *self;
         // From the edge to rest takes √(4R/a) along an axis. Elsewhere the speed of the start has to be lost.
