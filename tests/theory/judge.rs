@@ -12,7 +12,7 @@
 pub(crate) mod case;
 pub(crate) mod families;
 pub(crate) mod model;
-mod motion;
+pub(crate) mod motion;
 pub(crate) mod run;
 
 use families::Family;

@@ -4,6 +4,7 @@
 //! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`. The bands are those
 //! of the figures, far above the changes by another platform's round-off.
 
+mod assured;
 mod bicycles;
 mod chains;
 mod disturbances;

@@ -11,12 +11,12 @@ use punctual_reference::plants::{Bicycle, Unicycle};
 
 use super::starts::drawn;
 
-const GOAL: ([f64; 2], f64) = ([45.0, 45.0], 2.0);
-const DEADLINE: f64 = 20.0;
-const STEP: f64 = 0.01;
+pub(crate) const GOAL: ([f64; 2], f64) = ([45.0, 45.0], 2.0);
+pub(crate) const DEADLINE: f64 = 20.0;
+pub(crate) const STEP: f64 = 0.01;
 
 /// Centres and radii in m, between the starts (20 m by 20 m at the origin) and the goal.
-const OBSTACLES: [([f64; 2], f64); 10] = [
+pub(crate) const OBSTACLES: [([f64; 2], f64); 10] = [
     ([24.0, 22.0], 2.0),
     ([30.0, 16.0], 2.5),
     ([17.0, 28.0], 2.5),
@@ -46,9 +46,10 @@ struct Run {
     deadlocked: bool,
 }
 
-type Nominal = fn(Heading, &[f64; 4]) -> [f64; 2];
+pub(crate) type Nominal = fn(Heading, &[f64; 4]) -> [f64; 2];
 
-fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4]) -> Run
+/// A filter for goal and obstacles.
+pub(crate) fn filter<P>(plant: &P, bounds: [f64; 2]) -> SafetyFilter
 where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
 {
@@ -69,7 +70,18 @@ where
         let disc = DistanceDisc::new(centre, radius, radius).expect("valid disc");
         builder = builder.barrier("obstacle", plant.clone(), Outside(disc), avoid).expect("valid obstacle");
     }
-    let mut filter = FilterBuilder::build(builder).expect("valid filter");
+    FilterBuilder::build(builder).expect("valid filter")
+}
+
+pub(crate) fn bicycle(l_r: f64) -> Bicycle {
+    Bicycle::new(l_r).expect("valid bicycle")
+}
+
+fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4]) -> Run
+where
+    P: ControlAffine<4, 2> + Clone + Send + 'static,
+{
+    let mut filter = filter(plant, bounds);
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };
     let mut x = SVector::from(start);
     let mut run = Run {
@@ -108,7 +120,7 @@ where
 }
 
 /// Starts with room to keep clear of the obstacles: none is within reach of their speed.
-fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
+pub(crate) fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
     let mut starts: Vec<[f64; 4]> = drawn(4 * count)
         .into_iter()
         // Headings over the full turn, speeds up to 3 m/s.
@@ -142,7 +154,6 @@ where
 /// whose turning circle is five times as wide as an obstacle, gets stuck in front of one; that is reported.
 fn table(count: usize) {
     let starts = feasible_starts(count);
-    let bicycle = |l_r| Bicycle::new(l_r).expect("valid bicycle");
     let rows = [
         ("unicycle", runs(&Unicycle, [8.0, 3.0], |h, x| h.unicycle(x), &starts)),
         ("bicycle, l_r = 2.5 m", runs(&bicycle(2.5), [8.0, 1.2], |h, x| h.bicycle(x, 2.5), &starts)),

@@ -1,7 +1,7 @@
 //! One closed loop: plant, sets, bounds, reference input, samples; all that is needed to run it again.
 
 use punctual::reproduce::starts;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
 
 use super::model::{Input, Plant, Shape, State};
 
@@ -88,8 +88,15 @@ pub(crate) enum Reference {
     Damping(f64),
     /// Out of the first set, this strong.
     Outwards(f64),
+    /// Out of the set whose edge is nearest, this strong.
+    Hostile(f64),
     /// Anew at random times, on average so long held.
     Random {
+        size: Input,
+        held: f64,
+    },
+    /// The same, at one end or the other.
+    BangBang {
         size: Input,
         held: f64,
     },
@@ -176,6 +183,11 @@ impl Case {
         builder.build().expect("a valid filter")
     }
 
+    /// The same with a witness.
+    pub(crate) fn assured(&self) -> AssuredFilter {
+        AssuredFilter::new(self.filter(), self.step).expect("a filter that can be assured")
+    }
+
     /// The longest hold of the case.
     pub(crate) fn longest(&self) -> f64 {
         if self.steps == Steps::Missed { 3.0 * self.step } else { self.step }
@@ -210,23 +222,37 @@ impl Case {
             Reference::Damping(gain) => match self.plant {
                 Plant::PointMass => [-gain * x[2], -gain * x[3]],
                 Plant::Unicycle | Plant::Bicycle { .. } => [-gain * x[3], 0.0],
+                Plant::SmallSlip { .. } | Plant::Kinematic { .. } => [-gain * x[3], -2.0 * x[4]],
                 Plant::Chain(1) | Plant::Written(1) => [-gain * x[0], 0.0],
                 Plant::Chain(n) => [-gain * x[n - 1], 0.0],
                 _ => [-gain * x[1], 0.0],
             },
-            Reference::Outwards(size) => self.outwards(t, x, size),
+            Reference::Outwards(size) => self.outwards(0, t, x, size),
+            Reference::Hostile(size) => {
+                let edge = |set: &Set| set.shape.value(t, x).abs();
+                let nearest =
+                    (0..self.sets.len()).min_by(|a, b| edge(&self.sets[*a]).total_cmp(&edge(&self.sets[*b])));
+                self.outwards(nearest.unwrap_or(0), t, x, size)
+            }
             Reference::Random { size, held } => {
                 if t >= last.0 {
                     *last = (t + numbers.within(0.0, 2.0 * held), size.map(|s| numbers.within(-s, s)));
                 }
                 last.1
             }
+            Reference::BangBang { size, held } => {
+                if t >= last.0 {
+                    let wanted = size.map(|s| if numbers.chance(0.5) { s } else { -s });
+                    *last = (t + numbers.within(0.0, 2.0 * held), wanted);
+                }
+                last.1
+            }
         }
     }
 
-    /// Out of the first set: the way down h.
-    fn outwards(&self, t: f64, x: &State, size: f64) -> Input {
-        let shape = &self.sets[0].shape;
+    /// Out of set `set`: the way down h.
+    fn outwards(&self, set: usize, t: f64, x: &State, size: f64) -> Input {
+        let shape = &self.sets[set].shape;
         let &Shape::Disc { start, velocity, outside, .. } = shape else {
             let falls = match *shape {
                 Shape::Line { sign, .. } => -sign,

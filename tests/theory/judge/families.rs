@@ -72,6 +72,47 @@ impl Family {
     }
 }
 
+/// The most samples until a deadline of [`assured`]: a step with a witness takes a thousand times as long.
+const MOST_SAMPLES: f64 = 200.0;
+
+/// The case that belongs to a seed, for a filter with a witness: a plant with a goal and obstacles, inputs bounded,
+/// nothing moving, any of five ways to choose u_ref.
+pub(crate) fn assured(seed: u64) -> Case {
+    let mut numbers = Numbers::new(seed);
+    let numbers = &mut numbers;
+    let mut case = loop {
+        let case = match numbers.below(10) {
+            0..3 => vehicle(Plant::PointMass, numbers.below(5), numbers),
+            3..6 => vehicle(Plant::Unicycle, numbers.below(5), numbers),
+            6..9 => {
+                let l_r = numbers.scale(0.5, 20.0);
+                vehicle(Plant::Bicycle { l_r }, numbers.below(5), numbers)
+            }
+            _ => match numbers.below(3) {
+                0 => chain(1 + numbers.below(4), numbers),
+                1 => cart(numbers),
+                _ => pendulum(numbers),
+            },
+        };
+        let moves = |set: &Set| matches!(set.shape, Shape::Disc { velocity, .. } if velocity != [0.0; 2]);
+        let samples = case.sets[0].deadline / case.step;
+        if case.bounds[0].is_finite() && samples <= MOST_SAMPLES && !case.sets.iter().any(moves) {
+            break case;
+        }
+    };
+    let deadline = case.sets[0].deadline;
+    let size = case.bounds.map(|bound| bound * numbers.scale(0.1, 3.0));
+    let held = deadline / numbers.scale(3.0, 100.0);
+    case.reference = match numbers.below(5) {
+        0 => Reference::Zero,
+        1 => Reference::Damping(numbers.scale(0.1, 10.0) / deadline),
+        2 => Reference::Hostile(size[0]),
+        3 => Reference::Random { size, held },
+        _ => Reference::BangBang { size, held },
+    };
+    Case { horizon: 1.5 * deadline, seed: seed ^ 0x5eed, ..case }
+}
+
 /// Completes a case with the parts that all families have: rates, margin, sampling, bounds and reference. They
 /// suit a deadline, a size of h and the inputs that a run of that size takes.
 fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], numbers: &mut Numbers) -> Case {

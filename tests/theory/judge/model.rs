@@ -7,7 +7,7 @@ use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 use crate::chains::Chain;
 
@@ -25,6 +25,14 @@ pub(crate) enum Plant {
     Unicycle,
     Bicycle {
         l_r: f64,
+    },
+    /// The bicycle for small slip angles, the slip angle as a state, its rate as the input.
+    SmallSlip {
+        l_r: f64,
+    },
+    /// The bicycle without approximation, both axles as far away, the steering angle as a state.
+    Kinematic {
+        length: f64,
     },
     /// p' = v, v' = u − a v − b v √(v² + 1); from expressions, as all that follow.
     Cart {
@@ -55,6 +63,8 @@ pub(crate) enum Shape {
     Within { limit: f64 },
     /// limit − x₂.
     Slow { limit: f64 },
+    /// limit − sign x₅.
+    Angle { sign: f64, limit: f64 },
     /// x₁ − time x₂.
     Headway { time: f64 },
     /// x₁ − size sin(rate t).
@@ -66,6 +76,7 @@ impl Plant {
         match self {
             Self::Chain(n) | Self::Written(n) => *n,
             Self::PointMass | Self::Unicycle | Self::Bicycle { .. } => 4,
+            Self::SmallSlip { .. } | Self::Kinematic { .. } => 5,
             Self::Cart { .. } | Self::Pendulum { .. } | Self::Cruise { .. } => 2,
         }
     }
@@ -73,6 +84,7 @@ impl Plant {
     pub(crate) fn inputs(&self) -> usize {
         match self {
             Self::PointMass | Self::Unicycle | Self::Bicycle { .. } => 2,
+            Self::SmallSlip { .. } | Self::Kinematic { .. } => 2,
             _ => 1,
         }
     }
@@ -89,6 +101,16 @@ impl Plant {
             Self::Unicycle | Self::Bicycle { .. } => {
                 let turning = if let Self::Bicycle { l_r } = self { x[3] * u[1] / l_r } else { u[1] };
                 dx[..4].copy_from_slice(&[x[3] * x[2].cos(), x[3] * x[2].sin(), turning, u[0]]);
+            }
+            Self::SmallSlip { l_r } => {
+                let ([sin, cos], v, slip) = ([x[2].sin(), x[2].cos()], x[3], x[4]);
+                let ahead = [v * (cos - slip * sin), v * (sin + slip * cos)];
+                dx[..5].copy_from_slice(&[ahead[0], ahead[1], v * slip / l_r, u[0], u[1]]);
+            }
+            Self::Kinematic { length } => {
+                let (v, slip) = (x[3], (0.5 * x[4].tan()).atan());
+                let ahead = [v * (x[2] + slip).cos(), v * (x[2] + slip).sin()];
+                dx[..5].copy_from_slice(&[ahead[0], ahead[1], v * slip.sin() / length, u[0], u[1]]);
             }
             Self::Cart { drag: [a, b] } => {
                 dx[..2].copy_from_slice(&[x[1], u[0] - a * x[1] - b * x[1] * (x[1] * x[1] + 1.0).sqrt()]);
@@ -108,6 +130,10 @@ impl Plant {
         match self {
             Self::Unicycle => u[1].abs(),
             Self::Bicycle { l_r } => (x[3].abs() + u[0].abs() * dt) * u[1].abs() / l_r,
+            // An angle is below π/2, its tangent of that order.
+            Self::SmallSlip { l_r: length } | Self::Kinematic { length } => {
+                (x[3].abs() + u[0].abs() * dt) * (x[4].abs() + u[1].abs() * dt) / length
+            }
             _ => 0.0,
         }
     }
@@ -118,6 +144,12 @@ impl Plant {
             Self::PointMass => disc(PointMass, shape),
             Self::Unicycle => disc(Unicycle, shape),
             Self::Bicycle { l_r } => disc(Bicycle::new(l_r).expect("valid bicycle"), shape),
+            Self::SmallSlip { l_r } => {
+                steered(SmallSlipBicycle::new(l_r).expect("valid bicycle").with_rate(), shape)
+            }
+            Self::Kinematic { length } => {
+                steered(KinematicBicycle::new(length, length).expect("valid bicycle"), shape)
+            }
             Self::Chain(n) => {
                 let &Shape::Line { sign, at } = shape else { panic!("no set of a chain: {shape:?}") };
                 chain(n, Line { sign, at })
@@ -147,7 +179,7 @@ impl Plant {
             Shape::Slow { limit } => ("d - z", 1, [("d", limit), ("s", 0.0)]),
             Shape::Headway { time } => ("y - d*z", 1, [("d", time), ("s", 0.0)]),
             Shape::Wave { size, rate } => ("y - s*sin(d*t)", self.states(), [("s", size), ("d", rate)]),
-            Shape::Disc { .. } => panic!("no set of an expression: {shape:?}"),
+            Shape::Disc { .. } | Shape::Angle { .. } => panic!("no set of an expression: {shape:?}"),
         };
         parameters.extend(more);
         let model = Model::new(&states[..derivatives.len()], &["u"], &parameters, &derivatives);
@@ -171,6 +203,7 @@ impl Shape {
             }
             Self::Within { limit } => limit * limit - x[0] * x[0],
             Self::Slow { limit } => limit - x[1],
+            Self::Angle { sign, limit } => limit - sign * x[4],
             Self::Headway { time } => x[0] - time * x[1],
             Self::Wave { size, rate } => x[0] - size * (rate * t).sin(),
         }
@@ -209,9 +242,30 @@ fn chain(n: usize, line: Line) -> Box<dyn DerivativeSource> {
     source.expect("a relative degree")
 }
 
-fn disc<P>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
+/// limit − sign x₅, for the filter.
+#[derive(Clone, Copy)]
+struct Angle {
+    sign: f64,
+    limit: f64,
+}
+
+impl Barrier<5> for Angle {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 5>) -> S {
+        x[4] * -self.sign + self.limit
+    }
+}
+
+fn steered<P>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
 where
-    P: ControlAffine<4, 2> + Send + 'static,
+    P: ControlAffine<5, 2> + Send + 'static,
+{
+    let &Shape::Angle { sign, limit } = shape else { return disc(plant, shape) };
+    lie::along(plant, Angle { sign, limit }, 1).expect("a relative degree")
+}
+
+fn disc<P, const N: usize>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
+where
+    P: ControlAffine<N, 2> + Send + 'static,
 {
     let &Shape::Disc { start, velocity, radius, smoothing, outside } = shape else {
         panic!("no set of a vehicle: {shape:?}")

@@ -1,6 +1,7 @@
 //! Runs a case and judges it.
 
-use punctual_core::filter::{Phase, Report};
+use punctual_core::filter::{Driver, Phase, Report, Standing, Status};
+use punctual_core::plan::Failure;
 
 use super::case::{Case, Numbers};
 use super::model::{Input, State};
@@ -101,6 +102,76 @@ pub(crate) fn run(case: &Case) -> Run {
     run_seen(case, |_, _, _, _| {})
 }
 
+/// Result of a run with a witness. A promise counts as flagged while it is assured.
+#[derive(Clone, Debug)]
+pub(crate) struct AssuredRun {
+    pub(crate) run: Run,
+    /// Why the start was refused, if it was. Then there is no run.
+    pub(crate) refused: Option<Failure>,
+    /// Where the promises stand at the end.
+    pub(crate) standing: Standing,
+    /// Samples at which the plan drove, and those that were infeasible while it was assured.
+    pub(crate) driven: usize,
+    pub(crate) infeasible: usize,
+}
+
+impl AssuredRun {
+    /// The first set whose promise was broken while it was assured.
+    pub(crate) fn broken(&self) -> Option<(usize, Break)> {
+        self.run
+            .promises
+            .iter()
+            .enumerate()
+            .find_map(|(i, p)| p.broken.or(p.broken_longer).map(|found| (i, found)))
+    }
+}
+
+/// Runs `case` with a witness, every hold told. What is refused at the start is not run.
+pub(crate) fn run_assured(case: &Case) -> AssuredRun {
+    let mut filter = case.assured();
+    let (states, inputs) = (case.plant.states(), case.plant.inputs());
+    let mut numbers = Numbers::new(case.seed);
+    let mut drawn = (f64::NEG_INFINITY, [0.0; 2]);
+    let (mut t, mut x) = (case.start_time, case.start);
+    let mut judge = Judge::new(case);
+    let promised: Vec<bool> = filter.promised(t, &x[..states]).collect();
+    let mut run = AssuredRun {
+        run: Run { promises: Vec::new(), samples: 0, ended: false },
+        refused: None,
+        standing: Standing::Undecided,
+        driven: 0,
+        infeasible: 0,
+    };
+    while t < case.start_time + case.horizon {
+        let mut u = [0.0; 2];
+        let wanted = case.wanted(t, &x, &mut drawn, &mut numbers);
+        let next = case.next_sample(run.run.samples, t, &mut numbers);
+        filter.expect_hold(Some(next - t)).expect("a hold");
+        let assurance =
+            *filter.step(t, &x[..states], &wanted[..inputs], &mut u[..inputs]).expect("right dimensions");
+        run.standing = assurance.standing;
+        if run.standing == Standing::Refused {
+            run.refused = assurance.failure;
+            break;
+        }
+        let is_bounded = u[..inputs].iter().zip(case.bounds).all(|(u, bound)| u.abs() <= bound);
+        assert!(is_bounded, "{u:?} at {t}, bounds {:?}", case.bounds);
+        run.driven += usize::from(assurance.driver == Driver::Plan);
+        let infeasible = filter.report().status == Status::Infeasible;
+        run.infeasible += usize::from(assurance.is_assured() && infeasible);
+        judge.sample_assured(t, next - t, filter.report(), |i| assurance.is_assured() && promised[i]);
+        x = judge.hold(t, &x, &u, next - t);
+        run.run.samples += 1;
+        t = next;
+        run.run.ended = judge.spins || !x.iter().all(|v| v.abs() < 1e12);
+        if run.run.ended {
+            break;
+        }
+    }
+    run.run.promises = judge.promises;
+    run
+}
+
 /// The last report on one set.
 #[derive(Clone, Copy)]
 struct Said {
@@ -165,6 +236,22 @@ impl<'a> Judge<'a> {
                 to_deadline.max(0.0)
             };
             self.said[i] = Said { on_course: b.on_course, phase: b.phase, from };
+        }
+    }
+
+    /// The same of promises that a witness keeps, where it does so by its number: nothing before the deadline.
+    fn sample_assured(&mut self, t: f64, hold: f64, report: &Report, assured: impl Fn(usize) -> bool) {
+        self.sample(t, hold, report);
+        for (i, set) in self.case.sets.iter().enumerate() {
+            let to_deadline = self.case.start_time + set.deadline - t;
+            let said = &mut self.said[i];
+            said.on_course = assured(i);
+            said.from = match (self.promises[i].inside, set.keeping) {
+                (true, _) => 0.0,
+                (false, true) => f64::INFINITY,
+                (false, false) if to_deadline > hold => f64::INFINITY,
+                (false, false) => to_deadline.max(0.0),
+            };
         }
     }
 
