@@ -42,7 +42,9 @@ impl Brake {
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
         // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
-        let most = gained.diagonal().max().max(f64::MIN_POSITIVE);
+        // Where every state is a rest, as of a point moved by its velocity, nothing is gained, and nothing is braked.
+        let moved = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
+        let most = gained.diagonal().max().max(1e-12 * moved / square(hold)).max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
         let mut p = q.clone();
         for _ in 0..RICCATI {
