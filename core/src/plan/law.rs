@@ -31,6 +31,8 @@ pub(super) struct Brake {
 
 /// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
 const STAYS: f64 = 1.0 + 1e-4;
+/// Largest part of a state by which another one moves over a hold that is round-off of a difference.
+const STILL: f64 = 1e-8;
 
 impl Brake {
     /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
@@ -38,13 +40,15 @@ impl Brake {
         let (state, input) = model.rest(x, hold)?;
         let Linear { a, b } = model.linear(&state, &input, hold);
         let nx = a.nrows();
-        let rate = (&a - DMatrix::identity(nx, nx)) / hold;
+        // What is round-off of a difference moves nothing.
+        let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > STILL { v } else { 0.0 });
+        let rate = moved / hold;
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
         // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
         // Where every state is a rest, as of a point moved by its velocity, nothing is gained, and nothing is braked.
-        let moved = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
-        let most = gained.diagonal().max().max(1e-12 * moved / square(hold)).max(f64::MIN_POSITIVE);
+        let reach = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
+        let most = gained.diagonal().max().max(1e-12 * reach / square(hold)).max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
         let mut p = q.clone();
         for _ in 0..RICCATI {
