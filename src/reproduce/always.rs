@@ -293,8 +293,8 @@ fn run(body: Body, asked: (Task, Method, Nominal), x0: [f64; 4]) -> Result<Run, 
     }
 }
 
-/// Random starts inside the disc from which a brake stays inside, uniform in the position, the angle and the speed up to
-/// 4 m/s.
+/// Random starts inside the disc from which a brake stays inside: position, angle and speed up to 4 m/s are uniform, those
+/// from which it does not are left out.
 fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
     let mut uniform = uniform(SEED);
     // The speed counts as a whole, whatever states it is made of.
@@ -318,8 +318,11 @@ fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
     Ok(starts)
 }
 
-/// What is run: task, body, methods and the u_ref of each.
-fn plan() -> Vec<(Task, Body, Vec<Method>, Vec<(&'static str, Nominal)>)> {
+/// Cells of the table: task, body, methods, and the choices of u_ref by name.
+type Cells = (Task, Body, Vec<Method>, Vec<(&'static str, Nominal)>);
+
+/// What is run.
+fn plan() -> Vec<Cells> {
     let all = vec![("0", Nominal::Coast), ("damping", Nominal::Damping), ("outwards", Nominal::Away(PUSH))];
     // A velocity that is the input has nothing to damp.
     let point = vec![all[0], all[2]];
