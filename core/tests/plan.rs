@@ -8,7 +8,7 @@ use punctual_core::filter::{
     IntegratedFilter, Integration, Phase, SafetyFilter, Sampling, Standing, Status,
 };
 use punctual_core::plan::Failure;
-use punctual_reference::plants::{PointMass, SmallSlipBicycle, Unicycle};
+use punctual_reference::plants::{MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
 
 const PERIOD: f64 = 0.02;
 const GOAL: ([f64; 2], f64) = ([20.0, 12.0], 2.0);
@@ -718,4 +718,33 @@ fn plans_stand_behind_an_integral_too() {
         }
     }
     assert!(accepted >= 7, "{accepted} of 8 accepted");
+}
+
+/// Every state of a plant without drift is a rest: there is nothing to brake.
+#[test]
+fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
+    let speed = 5.0;
+    let filter = |deadline: f64| {
+        let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+        let filter = SafetyFilter::builder(2, 2)
+            .barrier("goal", MovedPoint, disc, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[-speed; 2], &[speed; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured")
+    };
+    // Not the origin: there a difference has no round-off.
+    let (mut x, mut u) = ([1.0, -3.0], [0.0; 2]);
+    // The nearest point of the disc along x is more than 17.5 m away, 3.5 s.
+    assert!(!filter(3.4).step(0.0, &x, &[0.0; 2], &mut u).expect("right dimensions").is_assured());
+    let mut filter = filter(5.0);
+    let inside = |x: [f64; 2]| (x[0] - GOAL.0[0]).hypot(x[1] - GOAL.0[1]) <= GOAL.1;
+    for k in 0..500 {
+        let t = f64::from(k) * PERIOD;
+        assert!(t < 5.0 - PERIOD / 2.0 || inside(x), "{x:?} at {t}");
+        let assurance = filter.step(t, &x, &[-speed, -speed], &mut u).expect("right dimensions");
+        assert!(assurance.is_assured() && u.iter().all(|u| u.abs() <= speed), "{assurance:?} at {t}");
+        x = [0, 1].map(|i| x[i] + PERIOD * u[i]);
+    }
 }

@@ -25,6 +25,8 @@ const X_P: Signal = signal("x_p", "m", "position along x");
 const Y_P: Signal = signal("y_p", "m", "position along y");
 const THETA: Signal = signal("theta", "rad", "heading, counter-clockwise from the x axis");
 const V: Signal = signal("v", "m/s", "speed along the heading; negative when reversing");
+const V_X: Signal = signal("v_x", "m/s", "velocity along x");
+const V_Y: Signal = signal("v_y", "m/s", "velocity along y");
 const BETA: Signal = signal("beta", "rad", "slip angle at the centre of mass");
 const A: Signal = signal("a", "m/s2", "acceleration along the heading");
 const DELTA: Signal = signal("delta", "rad", "steering angle of the front wheel");
@@ -48,8 +50,7 @@ pub trait Signals {
 pub struct PointMass;
 
 impl Signals for PointMass {
-    const STATES: &'static [Signal] =
-        &[X_P, Y_P, signal("v_x", "m/s", "velocity along x"), signal("v_y", "m/s", "velocity along y")];
+    const STATES: &'static [Signal] = &[X_P, Y_P, V_X, V_Y];
     const INPUTS: &'static [Signal] =
         &[signal("u_x", "m/s2", "acceleration along x"), signal("u_y", "m/s2", "acceleration along y")];
 }
@@ -71,11 +72,36 @@ impl ControlAffine<4, 2> for PointMass {
     }
 
     fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
-        if !bounds.iter().all(|b| b[..2].iter().all(|v| v.is_finite())) {
-            return None;
-        }
-        let side = |i: usize| chain(&[x[i], x[i + 2]], [bounds[0][i], bounds[1][i]], time);
-        Some(Region { sides: [side(0), side(1)], radius: 0.0 })
+        bounded_box([&[x[0], x[2]], &[x[1], x[3]]], bounds, time)
+    }
+}
+
+/// A point in the plane that is moved by its velocity: x = (x_p, y_p), u = (v_x, v_y).
+///
+/// ẋ_p = v_x, ẏ_p = v_y: a barrier on the position has relative degree 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MovedPoint;
+
+impl Signals for MovedPoint {
+    const STATES: &'static [Signal] = &[X_P, Y_P];
+    const INPUTS: &'static [Signal] = &[V_X, V_Y];
+}
+
+impl ControlAffine<2, 2> for MovedPoint {
+    const LARGEST_DEGREE: usize = 1;
+
+    #[inline]
+    fn drift<S: Scalar>(&self, _x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::zeros()
+    }
+
+    #[inline]
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
+        SMatrix::identity()
+    }
+
+    fn region(&self, x: &SVector<f64, 2>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        bounded_box([&[x[0]], &[x[1]]], bounds, time)
     }
 }
 
@@ -368,6 +394,15 @@ impl DynPlant for SteeredBicycle {
         x.copy_from_slice(rk4(derivative, &SVector::from_column_slice(x), dt).as_slice());
         Ok(())
     }
+}
+
+/// Box of the positions that a chain of integrators along each axis, at `from`, can reach under its bounds; none without.
+fn bounded_box(from: [&[f64]; 2], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    if !bounds.iter().all(|b| b[..2].iter().all(|v| v.is_finite())) {
+        return None;
+    }
+    let side = |i: usize| chain(from[i], [bounds[0][i], bounds[1][i]], time);
+    Some(Region { sides: [side(0), side(1)], radius: 0.0 })
 }
 
 /// Disc of the positions that a vehicle at `from` with the speed `v` can reach until `time`: no further away than

@@ -20,7 +20,7 @@ pub const RADIUS: f64 = 2.0;
 /// ε of the distance-shaped disc in m.
 pub(super) const SMOOTHING: f64 = 2.0;
 /// l_r of the bicycle in m.
-const REAR: f64 = 10.0;
+pub(super) const REAR: f64 = 10.0;
 
 /// A plant of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use super::baseline::Baseline;
 use super::cases::{self, CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Vehicle};
 use super::table::{Cell, Table};
 use super::trial::{self, Outcome};
-use super::{Figure, Options};
+use super::{Figure, Options, always};
 use crate::error::Error;
 use crate::plot::{Chart, Curve, Disc, Mark, Scaling, Style};
 
@@ -112,6 +112,7 @@ pub fn all(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     let (steps, table) = steps(options)?;
     figures.extend(steps);
     figures.push(deadlines()?);
+    figures.extend(always::figures()?);
     Ok((figures, table))
 }
 

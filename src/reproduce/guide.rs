@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use super::{Options, figures, tables, write};
+use super::{Options, Watch, always, figures, tables, write};
 use crate::error::Error;
 use crate::plot;
 
-/// Options of the guide's runs: no random ones, and steps that a test has the time for.
-const OPTIONS: Options = Options { finest: 1e-3, ..Options::QUICK };
+/// Options of the guide's runs: steps that a test has the time for, and random starts for the one table that has some.
+const OPTIONS: Options = Options { runs: 20, finest: 1e-3, ..Options::QUICK };
 /// The tables of the guide.
-const TABLES: [&str; 2] = ["discretisation", "step_size"];
+const TABLES: [&str; 3] = ["discretisation", "step_size", "always"];
 /// The pictures of the guide.
-const PICTURES: [&str; 9] = [
+const PICTURES: [&str; 11] = [
     "trajectories-unicycle",
     "depth-point_mass",
     "profile-point_mass",
@@ -21,6 +21,8 @@ const PICTURES: [&str; 9] = [
     "lateness",
     "shortfall",
     "deadlines",
+    "always-reach",
+    "always-stay",
 ];
 
 /// Makes the pictures in `folder`/guide anew, and the tables of `folder`/guide.md. Each table stands between a
@@ -41,7 +43,8 @@ pub fn update(folder: &Path) -> Result<(), Error> {
         return Err(Error::configuration(key, message).in_file(&path));
     }
     let (figures, steps) = figures::all(&OPTIONS)?;
-    let tables = [tables::discretisation(&OPTIONS)?, steps];
+    let (always, _) = always::table(&OPTIONS, &Watch::new(always::loops(&OPTIONS), &|_| ()))?;
+    let tables = [tables::discretisation(&OPTIONS)?, steps, always::beside(&always)];
     let mut out = String::new();
     let mut inside = false;
     for line in text.lines() {

@@ -4,6 +4,7 @@
 //! inputs held between samples. Every number except the times is a pure function of the options. [`demo`] runs
 //! its cases through FMI.
 
+pub mod always;
 pub mod baseline;
 pub mod bicycles;
 pub mod cases;

@@ -7,7 +7,7 @@ use super::cases::{DEADLINE, Integrator, STEP, Setup, Vehicle};
 use super::starts::{drawn, hundred};
 use super::table::{Cell, Table};
 use super::trial::{self, Outcome};
-use super::{Options, Watch, search};
+use super::{Options, Watch, always, search};
 use crate::error::Error;
 
 /// Deadline of the random starts in s.
@@ -68,7 +68,7 @@ pub(super) fn loops(options: &Options) -> usize {
         let searched: usize = methods.iter().map(|method| search::loops(*method, options)).sum();
         loops += Vehicle::ALL.len() * (searched + (fixed(&setup).len() + 2 * methods.len()) * options.runs);
     }
-    loops + Vehicle::ALL.len() * options.seeds as usize * options.runs
+    loops + Vehicle::ALL.len() * options.seeds as usize * options.runs + always::loops(options)
 }
 
 /// All tables, and whether ours kept every deadline in them.
@@ -77,7 +77,8 @@ pub(super) fn all(options: &Options, watch: &Watch) -> Result<(Vec<Table>, bool)
     let ours = |row: &&Row| row.setup.is_advised() && row.baseline == Baseline::Profile;
     let kept = |row: &Row| row.outcomes.iter().all(|o| o.kept(RANDOM));
     let (seeds, seeds_kept) = seeds(options, watch)?;
-    let all_kept = seeds_kept && rows.iter().filter(ours).all(kept);
+    let (always, always_kept) = always::table(options, watch)?;
+    let all_kept = seeds_kept && always_kept && rows.iter().filter(ours).all(kept);
     let tables = vec![
         discretisation(options)?,
         random_starts(&rows, options),
@@ -85,6 +86,7 @@ pub(super) fn all(options: &Options, watch: &Watch) -> Result<(Vec<Table>, bool)
         every_method(&rows, options),
         seeds,
         cost(&rows, options),
+        always,
     ];
     Ok((tables, all_kept))
 }

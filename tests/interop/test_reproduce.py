@@ -38,6 +38,14 @@ def test_the_numbers_of_a_few_runs(study):
     # Without a deadline there is none to keep: a = 1 is not there by T.
     assert column(report, "methods", "on time", "exponential CBF", "default", advised) == [0] * 3
     assert column(report, "methods", "on time", "repeated root (the paper)", "quadratic, u_ref = 0") == [0] * 3
+    # With a plan every promise is kept, whatever u_ref is; a backup keeps what it is inside of, and is asked no more.
+    for method in ["plans (ours)", "gatekeeper", "backup CBF"]:
+        assert set(column(report, "always", "accepted, not kept", method)) == {0}
+    for vehicle in ["point mass", "unicycle", "bicycle"]:
+        for head in ["accepted", "on time", "kept"]:
+            assert column(report, "always", head, "reach and stay", vehicle, "plans (ours)") == [runs] * 3
+        assert column(report, "always", "kept", "stay", vehicle, "plans (ours)") == [runs] * 3
+    assert sum(column(report, "always", "accepted, not kept", "reach and stay", "rows alone (ours)")) > 0
     assert column(report, "seeds", "bicycle") == [runs] * report["options"]["seeds"]
     # Held inputs cost the repeated root a time of first order in the period; ours is early at every one.
     (order,) = column(report, "step_size", "fitted order in δ", "lateness (s)", "point mass", "repeated root")

@@ -35,6 +35,8 @@ const STAYS: f64 = 1.0 + 1e-4;
 const LOST: f64 = 1.35;
 /// How fast a rest that does not stay is come to, against how fast it is lost.
 const HASTE: f64 = 0.6;
+/// Largest part of a state by which another one moves over a hold that is round-off of a difference.
+const STILL: f64 = 1e-8;
 
 impl Brake {
     /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
@@ -68,11 +70,15 @@ impl Brake {
         let growth = a.complex_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(v.norm_sqr()));
         let growth = elementary::sqrt(growth);
         let nx = a.nrows();
-        let rate = (&a - DMatrix::identity(nx, nx)) / hold;
+        // What is round-off of a difference moves nothing.
+        let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > STILL { v } else { 0.0 });
+        let rate = moved / hold;
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
         // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
-        let most = gained.diagonal().max().max(f64::MIN_POSITIVE);
+        // Where every state is a rest, as of a point moved by its velocity, nothing is gained, and nothing is braked.
+        let reach = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
+        let most = gained.diagonal().max().max(1e-12 * reach / square(hold)).max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
         // What no input hastens is left as it is.
         let sooner = if growth <= STAYS { 1.0 } else { elementary::powf(growth.min(LOST), HASTE) };

@@ -154,7 +154,7 @@ impl<'a> Planner<'a> {
                     // What is broken between the nodes is asked for with more margin at them.
                     for _ in 0..TIGHTENED {
                         let gains = search.gains(descent);
-                        let found = match self.finish(&model, &times, &descent.best, gains, &brake) {
+                        let found = match self.finish(&times, &descent.best, gains, &brake) {
                             Ok(plan) => return Ok(plan),
                             Err(found) => found,
                         };
@@ -208,7 +208,6 @@ impl<'a> Planner<'a> {
     /// The plan along `found`, checked.
     fn finish(
         &self,
-        model: &Model<'a>,
         times: &[f64],
         found: &Trajectory,
         gains: Option<Vec<Gain>>,

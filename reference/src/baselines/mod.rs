@@ -12,15 +12,32 @@
 //!
 //! All but the tube are time-invariant. None accounts for the loss of a held input; the filter enforces them at
 //! the samples. With a margin μ in the settings all of them are conditions on h − μ.
+//!
+//! Two methods are filters of their own, with a model that they run ahead under a [`Backup`]:
+//!
+//! | filter | changes u_ref | source |
+//! |---|---|---|
+//! | [`Gatekeeper`] | where no longer nominal way has a backup behind it | Agrawal, Chen and Panagou, arXiv:2211.14361 |
+//! | [`BackupBarrier`] | as little as the rows along the backup ask | Gurriet et al. 2018; Chen et al. 2021 |
+//!
+//! They keep a set that the start is in, for ever and within the bounds. Neither has a deadline.
 
+mod backup;
+mod backup_barrier;
 mod chain;
+#[cfg(test)]
+mod double_integrator;
 mod exponential;
 mod first_order;
+mod gatekeeper;
 mod tube;
 
+pub use backup::{Backup, Brake, Law, Stoppable};
+pub use backup_barrier::{BackedUp, BackupBarrier};
 pub use chain::{Chain, ClassK};
 pub use exponential::Exponential;
 pub use first_order::FirstOrderFixedTime;
+pub use gatekeeper::Gatekeeper;
 pub use punctual_core::convergence::condition::{Bound, Condition, Sample};
 pub use tube::Tube;
 

@@ -15,6 +15,8 @@ use punctual_core::error::{Error, ErrorKind, positive};
 /// throughout, and h ≥ 0 from T on. Where (D + a)ⁱ(1 − τ/T)ᵏ ≤ 0 at the anchor (aT too small for k) no s₀ may do.
 /// That condition is then left out, and nothing follows.
 ///
+/// Whether bounded inputs can follow the tube is tested by [`Self::least_deadline`], for n = 1 only.
+///
 /// # References
 ///
 /// D. Gadginmath, A. Allibhoy and F. Pasqualetti, *Constricting tubes for prescribed-time safe control*,
@@ -67,6 +69,24 @@ impl Tube {
         });
         needed.fold(0.0, f64::max)
     }
+
+    /// The shortest deadline in s for which bounded inputs can follow the tube of a start with h₀ = `anchor`, from every
+    /// state in it. `authority` is the least, over these states, of the largest ḣ that the bounds allow, in `[h]`/s.
+    /// `None` for n > 1: there the rate of h is no question of the input.
+    ///
+    /// The constraint is hardest on the edge of the tube, where it reads ḣ ≥ −ṡ. The largest −ṡ is k s₀/T at the start.
+    /// So T = k s₀/`authority`, infinite where there is no authority. The source has one condition on the rate of the
+    /// schedule, and a least time in closed form that follows from it. We know both from its abstract only, and derive
+    /// them here from its constraint.
+    pub fn least_deadline(&self, anchor: f64, authority: f64) -> Option<f64> {
+        let width = (-anchor).max(0.0);
+        match self.n {
+            1 if width == 0.0 => Some(0.0),
+            1 if authority > 0.0 => Some(self.power as f64 * width / authority),
+            1 => Some(f64::INFINITY),
+            _ => None,
+        }
+    }
 }
 
 impl Condition for Tube {
@@ -94,6 +114,22 @@ mod tests {
         assert_eq!(at(1.0), Bound { floor: 2.0 - 2.0 * 0.5, lower: -2.0, applies: false });
         assert_eq!(at(2.5).floor, 3.0);
         assert_eq!(tube.width(&[1.0], 2.0), 0.0);
+    }
+
+    /// ẋ = u with |u| ≤ 2 from h₀ = −4: two seconds at full speed along a straight tube, four along the square of it.
+    #[test]
+    fn the_least_deadline_is_that_of_full_speed() {
+        let least = |n, power, anchor, authority| {
+            Tube::new(n, power, 2.0).expect("valid").least_deadline(anchor, authority)
+        };
+        assert_eq!(least(1, 1, -4.0, 2.0), Some(2.0));
+        assert_eq!(least(1, 2, -4.0, 2.0), Some(4.0));
+        assert_eq!(least(1, 1, 1.0, 2.0), Some(0.0));
+        assert_eq!(least(1, 1, -1.0, 0.0), Some(f64::INFINITY));
+        assert_eq!(least(2, 2, -4.0, 2.0), None);
+        // At that deadline the floor at the start is what the bounds allow.
+        let tube = Tube::new(1, 1, 2.0).expect("valid");
+        assert_eq!(tube.bound(&Sample::new(&[-4.0], 2.0, 0.0, &[-4.0])).floor, 2.0);
     }
 
     /// From rest the tube of order 2 is wider than |h₀|, by just what makes (D + a)(h + s) = 0 there.

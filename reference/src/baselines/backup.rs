@@ -1,0 +1,145 @@
+//! What [`Gatekeeper`](super::Gatekeeper) and [`BackupBarrier`](super::BackupBarrier) fall back on: a controller, and the
+//! set in which it keeps.
+
+use nalgebra::SVector;
+
+use punctual_core::barrier::Barrier;
+use punctual_core::dynamics::{ControlAffine, rk4};
+use punctual_core::error::{Error, positive};
+use punctual_core::qp::Bounds;
+use punctual_core::scalar::Scalar;
+
+/// A feedback law.
+pub trait Law<const NX: usize, const NU: usize> {
+    /// Its input at `x`, within the bounds of whoever uses it.
+    fn input<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NU>;
+}
+
+/// Brakes: −gain · v on the first `M` inputs, together no longer than `limit`, and 0 on the others.
+///
+/// Input i < `M` has to be the rate of the state `speeds[i]`. The path until rest is then no longer than
+/// |v|/gain + |v|²/(2 limit), with v the vector of these states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Brake<const M: usize> {
+    /// The states that are speeds, in m/s, counted from 0.
+    pub speeds: [usize; M],
+    /// In 1/s, finite, > 0, and below the inverse of the period for which an input is held.
+    pub gain: f64,
+    /// Length of the input in m/s², finite, > 0.
+    pub limit: f64,
+}
+
+impl<const M: usize> Brake<M> {
+    /// Speed in m/s that is added where the length of v has no derivative.
+    const SMALL: f64 = 1e-3;
+
+    /// The path in m until rest, from above, with a derivative everywhere.
+    pub fn path<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> S {
+        let square = self.square(x) + Self::SMALL * Self::SMALL;
+        square.sqrt() / self.gain + square / (2.0 * self.limit)
+    }
+
+    fn square<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> S {
+        self.speeds.iter().fold(S::zero(), |sum, k| sum + x[*k].squared())
+    }
+}
+
+impl<const M: usize, const NX: usize, const NU: usize> Law<NX, NU> for Brake<M> {
+    fn input<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NU> {
+        let square = self.square(x);
+        let is_short = square.value() * self.gain * self.gain <= self.limit * self.limit;
+        let factor = if is_short { S::from(self.gain) } else { S::from(self.limit) / square.sqrt() };
+        SVector::from_fn(|i, _| self.speeds.get(i).map_or(S::zero(), |k| -x[*k] * factor))
+    }
+}
+
+/// The part of `set` in which [`Brake`] comes to rest: h less the path until then. The gradient of h along the
+/// position must be no longer than 1, as that of a distance is.
+#[derive(Clone, Copy, Debug)]
+pub struct Stoppable<B, const M: usize> {
+    /// The set, h in m.
+    pub set: B,
+    /// What brakes.
+    pub brake: Brake<M>,
+}
+
+impl<B: Barrier<NX>, const M: usize, const NX: usize> Barrier<NX> for Stoppable<B, M> {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+        self.set.value(t, x) - self.brake.path(x)
+    }
+}
+
+/// A controller to fall back on, the set that it keeps, and the model that both are run in.
+///
+/// Safe is h ≥ 0 for one set at rest. In the terminal set the law keeps h ≥ 0 for ever, by the choice of whoever sets
+/// both up: see [`Stoppable`]. Neither method knows a deadline, or a set that is to be reached.
+#[derive(Clone, Copy, Debug)]
+pub struct Backup<P, L, B, C> {
+    /// The model.
+    pub plant: P,
+    /// What is done where the nominal controller cannot be followed.
+    pub law: L,
+    /// What is kept.
+    pub safe: B,
+    /// Where the law keeps it for ever.
+    pub terminal: C,
+    /// Bounds on the inputs. The law keeps them.
+    pub bounds: Bounds,
+    /// Time in s for which an input is held, and between two points of a path, finite, > 0.
+    pub period: f64,
+    /// Periods within which the law has to reach the terminal set, ≥ 1.
+    pub horizon: usize,
+}
+
+impl<P, L, B, C> Backup<P, L, B, C> {
+    /// The same, its numbers checked.
+    ///
+    /// # Errors
+    ///
+    /// A number outside the range its field states.
+    pub fn validated(self) -> Result<Self, Error> {
+        positive("period", self.period)?;
+        positive("horizon", self.horizon as f64)?;
+        Ok(self)
+    }
+
+    /// The state one period after `x` under the held input `u`.
+    pub(super) fn moved<S: Scalar, const NX: usize, const NU: usize>(
+        &self,
+        x: &SVector<S, NX>,
+        u: &SVector<S, NU>,
+    ) -> SVector<S, NX>
+    where
+        P: ControlAffine<NX, NU>,
+    {
+        rk4(|x| self.plant.derivative(x, u), x, self.period)
+    }
+
+    /// `u` within the bounds.
+    pub(super) fn bounded<const NU: usize>(&self, u: &SVector<f64, NU>) -> SVector<f64, NU> {
+        SVector::from_fn(|i, _| self.bounds.clamp(i, u[i]))
+    }
+
+    /// Whether the law leads from `x` at `t` into the terminal set within the horizon, and is safe at every sample on
+    /// the way. From there on it is safe by the choice of that set.
+    pub fn saves<const NX: usize, const NU: usize>(&self, t: f64, x: &SVector<f64, NX>) -> bool
+    where
+        P: ControlAffine<NX, NU>,
+        L: Law<NX, NU>,
+        B: Barrier<NX>,
+        C: Barrier<NX>,
+    {
+        let mut x = *x;
+        for k in 0..=self.horizon {
+            let at = t + k as f64 * self.period;
+            if self.safe.value(at, &x) < 0.0 {
+                return false;
+            }
+            if self.terminal.value(at, &x) >= 0.0 {
+                return true;
+            }
+            x = self.moved(&x, &self.law.input(&x));
+        }
+        false
+    }
+}

@@ -1,0 +1,65 @@
+//! A known case for the tests of what falls back on a brake: ẍ = u with |u| ≤ 2 m/s² before a wall.
+
+use nalgebra::{Matrix2x1, SVector, Vector2};
+
+use punctual_core::barrier::Barrier;
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::qp::Bounds;
+use punctual_core::scalar::Scalar;
+
+use super::backup::{Backup, Brake, Stoppable};
+
+/// Bound on the input in m/s².
+pub(super) const LIMIT: f64 = 2.0;
+/// Place of the wall in m.
+pub(super) const WALL: f64 = 10.0;
+/// Sampling period in s.
+pub(super) const PERIOD: f64 = 0.02;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line;
+
+impl ControlAffine<2, 1> for Line {
+    fn drift<S: Scalar>(&self, x: &Vector2<S>) -> Vector2<S> {
+        Vector2::new(x[1], S::zero())
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &Vector2<S>) -> Matrix2x1<S> {
+        Matrix2x1::new(S::zero(), S::one())
+    }
+}
+
+/// h = `WALL` − x.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Before;
+
+impl Barrier<2> for Before {
+    fn value<S: Scalar>(&self, _t: S, x: &Vector2<S>) -> S {
+        -x[0] + WALL
+    }
+}
+
+pub(super) fn backup() -> Backup<Line, Brake<1>, Before, Stoppable<Before, 1>> {
+    let brake = Brake { speeds: [1], gain: 20.0, limit: LIMIT };
+    let mut bounds = Bounds::NONE;
+    (bounds.min[0], bounds.max[0]) = (-LIMIT, LIMIT);
+    let terminal = Stoppable { set: Before, brake };
+    let backup =
+        Backup { plant: Line, law: brake, safe: Before, terminal, bounds, period: PERIOD, horizon: 60 };
+    backup.validated().expect("valid")
+}
+
+/// `steps` states from `x` on with the inputs of `step`.
+pub(super) fn driven(
+    mut x: Vector2<f64>,
+    steps: usize,
+    mut step: impl FnMut(f64, &Vector2<f64>) -> SVector<f64, 1>,
+) -> Vec<(Vector2<f64>, SVector<f64, 1>)> {
+    (0..steps)
+        .map(|k| {
+            let (at, u) = (x, step(k as f64 * PERIOD, &x));
+            x = rk4_step(&Line, &x, &u, PERIOD);
+            (at, u)
+        })
+        .collect()
+}
