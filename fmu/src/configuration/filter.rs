@@ -174,7 +174,7 @@ pub(super) static SECTION: Section = Section {
                 Some("`off`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
-                 promise. Needs a model to run ahead, sets that stay where they are, no integrator, no delay, no errors",
+                 promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors",
             ),
             Key::new(
                 "actuation_delay",
