@@ -39,7 +39,8 @@ pub fn update(folder: &Path) -> Result<(), Error> {
         Some(rest.to_owned())
     };
     if let Some(key) = text.lines().filter_map(key).find(|key| !TABLES.contains(&key.as_str())) {
-        let message = format!("is no table of the guide, must be {}", TABLES.join(" or "));
+        let [others @ .., last] = TABLES;
+        let message = format!("is no table of the guide, must be {} or {last}", others.join(", "));
         return Err(Error::configuration(key, message).in_file(&path));
     }
     let (figures, steps) = figures::all(&OPTIONS)?;

@@ -10,5 +10,5 @@ fn a_guide_that_is_not_there_is_named() {
     workshop.write("guide.md", "<!-- table lunch -->\n<!-- end -->\n");
     workshop
         .punctual(["reproduce", "--guide", "."])
-        .fails(2, "./guide.md: lunch: is no table of the guide, must be discretisation or step_size");
+        .fails(2, "./guide.md: lunch: is no table of the guide, must be discretisation, step_size or always");
 }
