@@ -31,7 +31,10 @@ const HOSTILE: [f64; 2] = [4.0, -1.0];
 
 /// The plant over one step, with an integrator of its own.
 fn moved(x: [f64; 4], u: [f64; 2]) -> [f64; 4] {
-    let rate = |x: [f64; 4]| [x[3] * x[2].cos(), x[3] * x[2].sin(), u[1], u[0]];
+    moved_at(x, |x| [x[3] * x[2].cos(), x[3] * x[2].sin(), u[1], u[0]])
+}
+
+fn moved_at(x: [f64; 4], rate: impl Fn([f64; 4]) -> [f64; 4]) -> [f64; 4] {
     let beside = |k: [f64; 4], dt: f64| std::array::from_fn(|i| x[i] + dt * k[i]);
     let a = rate(x);
     let b = rate(beside(a, STEP / 2.0));
@@ -102,6 +105,56 @@ fn a_plan_is_saved_with_the_state() {
     other.restore(other.read(&bytes));
     assert_eq!(other.now(), bytes);
     assert_eq!(drive(&other, x, 40, 90).0, on);
+    assert_eq!(other.integer("assurance"), Standing::Assured as i32);
+}
+
+/// The slip angle of a bicycle, integrated inside: plan and integral are saved together, and the promise is kept with the mean
+/// that the plant is given.
+#[test]
+fn a_plan_is_saved_with_the_integral() {
+    const LENGTH: f64 = 3.0;
+    let fmu = Fmu::new(
+        r#"
+kind = "filter"
+assurance = "on"
+plant = { model = "bicycle_small_slip_rate", l_r = 3.0 }
+integrator = { state = "beta", gain = 4.0, min = -0.5, max = 0.5 }
+bounds = { a = [-6.0, 6.0], beta_rate = [-3.0, 3.0] }
+experiment.step_size = 0.05
+[[barrier]]
+name = "goal"
+centre = [20.0, 10.0]
+radius = 2.0
+deadline = 7.0
+"#,
+    );
+    let drive = |slave: &Slave, mut x: [f64; 4], from: u32, to: u32| {
+        let mut given = Vec::new();
+        for k in from..to {
+            slave.set_inputs(&[x[0], x[1], x[2], x[3], 6.0, 0.4]);
+            slave.step(f64::from(k) * STEP, STEP);
+            let u = [slave.real("u.a"), slave.real("u.beta")];
+            given.push([u[0], u[1], slave.real("integrator.beta")].map(f64::to_bits));
+            let rate = |x: [f64; 4]| {
+                let (sin, cos) = x[2].sin_cos();
+                [x[3] * (cos - sin * u[1]), x[3] * (sin + cos * u[1]), x[3] * u[1] / LENGTH, u[0]]
+            };
+            x = moved_at(x, rate);
+            let away = (x[0] - 20.0).hypot(x[1] - 10.0);
+            assert!(f64::from(k + 1) * STEP < 7.0 - 1e-9 || away <= 2.0, "{k}: {x:?}");
+        }
+        (given, x)
+    };
+    let (slave, other) = (Slave::ready(&fmu), Slave::new(&fmu));
+    let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 40);
+    assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+    let state = slave.state();
+    let bytes = slave.bytes(state);
+    let (on, _) = drive(&slave, x, 40, 200);
+    slave.restore(state);
+    assert_eq!(drive(&slave, x, 40, 200).0, on);
+    other.restore(other.read(&bytes));
+    assert_eq!(drive(&other, x, 40, 200).0, on);
     assert_eq!(other.integer("assurance"), Standing::Assured as i32);
 }
 

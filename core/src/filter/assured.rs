@@ -279,7 +279,7 @@ impl AssuredFilter {
     /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
     /// than the first one; one that begins later; a bound on disturbance or measurement errors; a delay.
     pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
-        let bounds = filter.bounds.clone();
+        let bounds = filter.bounds;
         Self::around(Rows::Plain(filter), bounds, period)
     }
 
@@ -291,7 +291,7 @@ impl AssuredFilter {
     ///
     /// As for [`Self::new`].
     pub fn integrated(filter: IntegratedFilter, period: f64) -> Result<Self, Error> {
-        let mut bounds = filter.filter.bounds.clone();
+        let mut bounds = filter.filter.bounds;
         let input = filter.of.input;
         [bounds.min[input], bounds.max[input]] = filter.rates;
         Self::around(Rows::Integrated(filter), bounds, period)

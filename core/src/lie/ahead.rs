@@ -123,7 +123,7 @@ where
                     for m in 0..NU {
                         rate += g[(i, m)].coefficients[$j - 1] * u[m];
                     }
-                    path[i].coefficients[$j] = rate * (1.0 / $j as f64);
+                    path[i].coefficients[$j] = rate * (1.0 / f64::from($j));
                 }
             })*
         }};
