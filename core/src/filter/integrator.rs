@@ -250,6 +250,7 @@ impl IntegratedFilter {
     }
 
     /// The rate for `hold` s if nothing but the bounds were in the way of the `wish` for the value.
+    #[cfg(feature = "plan")]
     pub(super) fn wanted(&self, hold: f64, wish: f64) -> f64 {
         let ends = self.of.limits.map(|limit| (limit - self.value) / hold);
         let rate = rate_to(wish - self.value, self.of.gain, hold);
