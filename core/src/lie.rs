@@ -194,9 +194,7 @@ where
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
         let x = SVector::<f64, NX>::from_column_slice(x);
-        for (out, state) in out.iter_mut().zip(&ahead::path::<P, NX, NU>(&self.plant, &x, u)) {
-            *out = state.coefficients;
-        }
+        ahead::path::<P, NX, NU>(&self.plant, &x, u, out);
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
@@ -204,8 +202,7 @@ where
     }
 
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
-        let states = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
-        *out = self.barrier.value(Taylor::time(t), &states).coefficients;
+        *out = ahead::value_along::<B, NX>(&self.barrier, t, path);
     }
 }
 

@@ -14,7 +14,7 @@
 
 use nalgebra::SVector;
 
-use super::{COURSE, Direction};
+use super::{COURSE, Course, Direction};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, rk4};
 use crate::jet::{Dual, Tangent, Taylor};
@@ -102,13 +102,15 @@ where
     barrier.value(Taylor::time(t + duration), &series)
 }
 
-/// The courses of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`.
+/// Writes the courses of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Once
+/// for a plant, whatever the barriers: it is much code.
+#[inline(never)]
 pub(super) fn path<P, const NX: usize, const NU: usize>(
     plant: &P,
     x: &SVector<f64, NX>,
     u: &[f64],
-) -> SVector<Taylor<f64, COURSE>, NX>
-where
+    out: &mut [Course],
+) where
     P: ControlAffine<NX, NU>,
 {
     let mut path = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
@@ -129,7 +131,19 @@ where
         }};
     }
     extend_to!(1, 2, 3, 4, 5, 6, 7, 8, 9);
-    path
+    for (out, state) in out.iter_mut().zip(&path) {
+        *out = state.coefficients;
+    }
+}
+
+/// The course of `barrier` along `path`, from `t` on. Once for a barrier, whatever the plants and degrees.
+#[inline(never)]
+pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Course]) -> Course
+where
+    B: Barrier<NX>,
+{
+    let states = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
+    barrier.value(Taylor::time(t), &states).coefficients
 }
 
 /// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead;
