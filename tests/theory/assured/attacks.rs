@@ -11,7 +11,7 @@ use crate::judge::run::run_assured;
 /// ways to choose u_ref.
 #[test]
 fn table_of_assured_promises() {
-    let count = cases(60, 10_000);
+    let count = cases(12, 10_000);
     let first = 0xa55e_0000_0000;
     let runs = on_every_core(count, |i| run_assured(&assured(first + i)));
     let accepted = runs.iter().filter(|run| run.refused.is_none());

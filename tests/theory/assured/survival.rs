@@ -127,7 +127,7 @@ fn outside(case: &Case, t: f64, x: &State) -> f64 {
 /// As documented in docs/guarantees.md.
 #[test]
 fn table_of_what_a_witness_survives() {
-    let count = cases(2, 200);
+    let count = cases(1, 200);
     // Speeds up to 5 m/s, headings over the full turn.
     let starts: Vec<[f64; 4]> = drawn(count as usize);
     let vehicles = [
