@@ -107,7 +107,7 @@ impl Filter {
         Ok(Step::new(py, &self.u, report, standing.map(|(standing, _)| standing), &self.names))
     }
 
-    /// The plan that keeps every promise from the last step on; `None` without one, or without `assurance = "on"`.
+    /// The plan that keeps every promise from the last step on; `None` without one.
     #[getter]
     fn plan(&mut self, py: Python<'_>) -> PyResult<Option<Plan>> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);

@@ -41,7 +41,7 @@ pub(crate) struct BarrierReport {
     /// Whether h >= 0 has been reached since the deadline began to count.
     #[pyo3(get)]
     arrived: bool,
-    /// Whether a plan in hand keeps the promise whatever u_ref is; needs `assurance = "on"`.
+    /// Whether a plan in hand keeps the promise whatever u_ref is; needs bounds on every input.
     #[pyo3(get)]
     guaranteed: bool,
     /// Whether the theorem behind the present phase applies so far.
@@ -140,7 +140,7 @@ impl Step {
         member(py, &STATUS, "Status", self.status as i32)
     }
 
-    /// Where the promise stands; `None` without `assurance = "on"`.
+    /// Where the promise stands; `None` where no plans are followed.
     #[getter]
     fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()

@@ -10,15 +10,19 @@ use crate::loading::refused;
 /// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {
     filter: FilterLoop,
-    /// For how long an integrated input is going to be held, in s.
-    hold: f64,
+    /// Time between steps in s, and the longest, as configured.
+    period: f64,
+    longest: f64,
 }
+
+/// The largest difference between two times in s that are the same, as a part of them.
+const ROUND_OFF: f64 = 1e-9;
 
 impl Loop {
     /// The loop before its first sample.
     pub(crate) fn new(configuration: &FilterConfiguration) -> PyResult<Self> {
         let filter = configuration.build_loop().map_err(|e| refused(&e))?;
-        Ok(Self { filter, hold: configuration.experiment.step_size })
+        Ok(Self { filter, period: configuration.experiment.step_size, longest: configuration.period_max })
     }
 
     /// The filter: to look at.
@@ -38,7 +42,19 @@ impl Loop {
         u_ref: &[f64],
         u: &mut [f64],
     ) -> Result<&Report, punctual_core::Error> {
-        self.filter.step(t, self.hold, x, u_ref, u)
+        let hold = self.hold(t);
+        self.filter.step(t, hold, x, u_ref, u)
+    }
+
+    /// For how long in s the input at `t` is going to be held where nobody says so: as long as the one before was, but no
+    /// shorter than the longest that is configured.
+    fn hold(&self, t: f64) -> f64 {
+        let FilterLoop::Assured(assured) = &self.filter else { return self.period };
+        let before = assured.last_hold().unwrap_or(self.period.max(self.longest));
+        let passed = assured.filter().state().time.map_or(before, |last| t - last).max(self.longest);
+        // Not-a-number is no time.
+        let is_other = (passed - before).abs() > ROUND_OFF * t.abs().max(before);
+        if passed > 0.0 && passed.is_finite() && is_other { passed } else { before }
     }
 
     /// Starts every deadline anew; the integrated input stays.

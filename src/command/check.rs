@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal};
+use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
     VariableSection,
@@ -65,6 +66,8 @@ struct FilterReport {
     model: &'static str,
     /// Communication step in s.
     step: f64,
+    /// Why the filter follows no plans; `null` where it does.
+    no_plans: Option<String>,
     barriers: Vec<BarrierReport>,
     /// The start given, by state.
     start: Option<Vec<(String, f64)>>,
@@ -330,13 +333,10 @@ fn filter(
     wanted: &Wanted,
     out: Option<&Path>,
 ) -> Result<FilterReport, Error> {
-    let mut filter = c.build()?;
-    let inputs = c.plant.inputs().len();
+    let mut filter = closed_loop::filter(c)?;
     // The first step from the start, then the closed loops.
-    let status = match start.as_deref() {
-        Some(x0) => Some(first_sample(&mut filter, inputs, c.experiment.start_time, x0)?),
-        None => None,
-    };
+    let status = start.as_deref().map(|x0| first_sample(&mut filter, c, x0)).transpose()?;
+    let filter = filter.filter();
     // A filter without a model is not simulated.
     let simulated = start.as_deref().filter(|_| c.external().is_none());
     let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
@@ -453,6 +453,7 @@ fn filter(
         name: c.name.clone(),
         model: c.plant.name(),
         step,
+        no_plans: (!c.is_assured()).then(|| c.unassured().to_owned()),
         barriers,
         start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
@@ -482,10 +483,10 @@ fn loop_warnings(run: &LoopReport) -> Vec<String> {
 }
 
 /// Anchors the filter at `x0` with u_ref = 0, and returns the status in words.
-fn first_sample(filter: &mut SafetyFilter, inputs: usize, t: f64, x0: &[f64]) -> Result<&'static str, Error> {
-    let u_ref = vec![0.0; inputs];
+fn first_sample(filter: &mut FilterLoop, c: &FilterConfiguration, x0: &[f64]) -> Result<&'static str, Error> {
+    let u_ref = vec![0.0; c.plant.inputs().len()];
     let mut u = u_ref.clone();
-    let report = filter.step(t, x0, &u_ref, &mut u);
+    let report = filter.step(c.experiment.start_time, c.experiment.step_size, x0, &u_ref, &mut u);
     let status = report.map_err(|e| Error::configuration(e.field(), e.message()))?.status;
     Ok(status.name())
 }
@@ -537,6 +538,10 @@ fn controller(c: &ControllerConfiguration) -> ControllerReport {
 fn filter_text(report: &FilterReport) -> String {
     let mut lines =
         vec![format!("{}: filter for {}, steps of {} s", report.name, report.model, number(report.step))];
+    lines.push(match &report.no_plans {
+        None => "plans: followed, so that what is promised is kept whatever u_ref is".to_owned(),
+        Some(reason) => format!("plans: none, since {reason}"),
+    });
     if let Some(start) = &report.start {
         let state: Vec<_> =
             start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();

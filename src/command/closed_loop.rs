@@ -220,12 +220,15 @@ fn watched(c: &FilterConfiguration) -> f64 {
     (WATCHED * longest).max(c.experiment.stop_time - c.experiment.start_time)
 }
 
+/// The filter of the closed loop. An integrator is part of the plant here, so its filter is that of the rows.
+pub(super) fn filter(c: &FilterConfiguration) -> Result<FilterLoop, Error> {
+    let follows = c.is_assured() && c.integrator.is_none();
+    Ok(if follows { c.build_loop()? } else { FilterLoop::Plain(c.build()?) })
+}
+
 /// The closed loop of the configuration from `x0`, well past every deadline.
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
-    // An integrator is part of the plant here, so its filter is that of the rows.
-    let follows = c.is_assured() && c.integrator.is_none();
-    let mut filter = if follows { c.build_loop()? } else { FilterLoop::Plain(c.build()?) };
-    let plant = c.plant.build()?;
+    let (mut filter, plant) = (filter(c)?, c.plant.build()?);
     let (length, deadlines) = (watched(c), deadlines(c));
     // The closed loop, finely enough.
     let step = c.experiment.step_size.max(length / MOST_SAMPLES);

@@ -6,9 +6,10 @@ use punctual_fmu::configuration::{Configuration, FilterConfiguration, RESOURCE};
 use punctual_fmu::product::Product;
 use tempfile::TempDir;
 
-/// A filter for the point mass with input bounds.
+/// A filter for the point mass with input bounds: its rows alone.
 pub(crate) const FILTER: &str = r#"
 kind = "filter"
+assurance = "off"
 plant.model = "point_mass"
 bounds = { u_x = [-50.0, 50.0], u_y = [-40.0, 40.0] }
 [[barrier]]

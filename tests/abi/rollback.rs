@@ -20,9 +20,10 @@ const MODELS: [&str; 8] = [
     "bicycle_kinematic_slip",
 ];
 
-/// A filter with two barriers that conflict at times, recoveries and anchors; measured periods.
+/// A filter with two barriers that conflict at times, recoveries and anchors; measured periods. Its rows alone.
 const CONFLICTS: &str = r#"
 kind = "filter"
+assurance = "off"
 plant.model = "unicycle"
 bounds = { a = [-3.0, 3.0], omega = [-1.0, 1.0] }
 [[barrier]]

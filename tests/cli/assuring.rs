@@ -106,6 +106,35 @@ fn what_no_plan_accounts_for_is_an_error() {
     );
 }
 
+/// Left to itself, a filter follows plans where every input has bounds and plans account for everything.
+#[test]
+fn plans_are_followed_where_that_is_possible() {
+    let workshop = Workshop::new();
+    let line = |text: &str| {
+        workshop.write("filter.toml", text);
+        let text = workshop.punctual(["check", "filter.toml"]).success();
+        text.lines().nth(1).unwrap_or_default().to_owned()
+    };
+    let left = |more: &str| filter("auto", 8.0, more).replace("assurance = \"auto\"\n", "");
+    let followed = "plans: followed, so that what is promised is kept whatever u_ref is";
+    assert_eq!(line(&left("")), followed);
+    assert_eq!(line(&filter("auto", 8.0, "")), followed);
+    assert_eq!(line(&filter("off", 8.0, "")), "plans: none, since assurance is \"off\"");
+    let unbounded = left("").replace(", omega = [-2.0, 2.0]", "");
+    assert_eq!(line(&unbounded), "plans: none, since omega has no bounds");
+    let delayed = left("actuation_delay = 0.01");
+    assert_eq!(
+        line(&delayed),
+        "plans: none, since actuation_delay: is not 0, which no plan accounts for yet"
+    );
+    let moving = left("").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
+    assert!(
+        line(&moving).starts_with("plans: none, since a barrier follows tree.centre[1]"),
+        "{}",
+        line(&moving)
+    );
+}
+
 /// A campaign tells how the promise stood, and each of its rows is `punctual run`'s.
 #[test]
 fn a_campaign_counts_where_promises_stood() {

@@ -118,8 +118,8 @@ fn an_obstacle_is_kept_without_a_deadline() {
         );
         let (code, report) = check(&workshop, &[]);
         assert_eq!(
-            (code, &report["barriers"][0]["deadline"]),
-            (i32::from(report["barriers"][0]["start"]["on_course"] == false), &Value::Null),
+            (code, &report["barriers"][0]["deadline"], &report["barriers"][0]["start"]["guaranteed"]),
+            (0, &Value::Null, &true.into()),
             "{report}"
         );
         let text = workshop.punctual(["check", "filter.toml"]).success();
@@ -181,7 +181,7 @@ fn what_began_inside_and_is_left_is_not_kept() {
 #[test]
 fn promise_and_constraint_are_told_apart() {
     // From rest 20 m in 5 s: at least 0.8 d·4/T², and the profile asks for a peak of 6d/T².
-    let filter = "bounds = { a = [-4.0, 4.0] }";
+    let filter = "assurance = \"off\"\nbounds = { a = [-4.0, 4.0] }";
     let barriers = "[[barrier]]\nname = \"goal\"\nexpression = \"p - 20\"\n\
                     unit = \"m\"\ndeadline = 5.0";
     let case = Case { filter, plant: CART, x0: "", barriers, experiment: [0.01, 10.0] };
@@ -267,7 +267,7 @@ fn check_says_what_a_run_does() {
     }
 }
 
-/// A pole on a cart: the cart has to be somewhere, the pole upright, and one force does not do both for long.
+/// A pole on a cart: the cart has to be somewhere, the pole upright, and one force does not do both for long by the rows.
 #[test]
 fn what_runs_away_is_not_promised() {
     let plant = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }, \
@@ -279,7 +279,7 @@ fn what_runs_away_is_not_promised() {
     let barriers = "[[barrier]]\nname = \"place\"\nexpression = \"0.04 - (p - 2)^2\"\nunit = \"m2\"\ndeadline = 3.0\n\
                     [[barrier]]\nname = \"left\"\nexpression = \"0.5 + theta\"\nunit = \"rad\"\n\
                     [[barrier]]\nname = \"right\"\nexpression = \"0.5 - theta\"\nunit = \"rad\"";
-    let case = Case { filter: "", plant, x0: "", barriers, experiment: [0.01, 10.0] };
+    let case = Case { filter: "assurance = \"off\"", plant, x0: "", barriers, experiment: [0.01, 10.0] };
     let workshop = case.built();
     let (code, checked) = check(&workshop, &[]);
     let (_, ran) = run(&workshop, "kept");
@@ -291,6 +291,10 @@ fn what_runs_away_is_not_promised() {
     assert_eq!(code, 1, "{checked}");
     let text = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]).stdout;
     assert!(text.contains("NOT every promise is kept"), "{text}");
+    // By plans.
+    let workshop = Case { filter: "", ..case }.built();
+    let ((code, checked), (ended, ran)) = (check(&workshop, &[]), run(&workshop, "kept"));
+    assert_eq!((code, ended), (0, 0), "{checked} and {ran}");
 }
 
 /// Without bounds `check` tells the input needed. Constants are a u_ref too; other texts are refused.

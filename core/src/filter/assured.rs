@@ -64,8 +64,8 @@ pub enum Standing {
     Refused = 2,
     /// Was assured, and is no more: the plant is not where the model led.
     Withdrawn = 3,
-    /// Was assured, and is no more: a sample came later than the hold of the one before, or earlier and no plan was found
-    /// from there.
+    /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
+    /// from there. After a late one the promise is taken up again at the next sample in time, if a plan keeps it from there.
     Irregular = 4,
 }
 
@@ -145,13 +145,14 @@ struct Promise {
     margin: f64,
 }
 
-/// A sample that was looked at, and its input.
+/// A sample that was looked at, its input, and that of the filter inside.
 struct Looked {
     t: f64,
     hold: f64,
     x: Vec<f64>,
     u_ref: Vec<f64>,
     u: [f64; MAX_INPUTS],
+    inside: [f64; MAX_INPUTS],
 }
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
@@ -163,7 +164,7 @@ struct Looked {
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
 /// again at the same time. Where the time to the next sample changes and is [told](Self::expect_hold), a plan is sought for
-/// the new one; none found ends the promise. Where x is not finite, the plan goes on as it is. A filter with bounds on
+/// the new one; none found ends the promise. A sample that comes late ends it until the next one. Where x is not finite, the plan goes on as it is. A filter with bounds on
 /// disturbance or measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by
 /// [`Self::new`]. Sets must not move: at a rest each is looked at at eight later times, up to a day, and no plan is found
 /// where it has. States must be those of the plant, not of something that others move.
@@ -199,7 +200,23 @@ pub struct AssuredFilter {
     next: Commitment,
     /// The integral after that sample; 0 where there is none.
     next_value: f64,
+    /// How the input of that sample moves with it.
+    piece: Piece,
     assurance: Assurance,
+}
+
+/// How an input moves with its sample, as long as the piece of the filter is the same.
+#[derive(Clone, Copy)]
+enum Piece {
+    /// With `rows` times the answer of the rows and `wish` times u_ref. The rest stays: it is of a plan that was there
+    /// before the sample.
+    Mixed { rows: f64, wish: f64 },
+    /// In a way that is not known: a search found it.
+    Searched,
+}
+
+impl Piece {
+    const ROWS: Self = Self::Mixed { rows: 1.0, wish: 0.0 };
 }
 
 /// The filter inside, whose rows are asked first.
@@ -257,6 +274,26 @@ impl Rows {
         let bounds = &self.filter().bounds;
         let within = |i: usize| if i < u_ref.len() { bounds.clamp(i, wish[i]) } else { 0.0 };
         (wish, core::array::from_fn(within))
+    }
+
+    /// The direction of that state where the one measured moves along `dx`.
+    fn direction(&self, dx: &[f64]) -> Vec<f64> {
+        let mut inside = dx.to_vec();
+        if let Self::Integrated(own) = self {
+            inside.push(0.0);
+            insert(&mut inside, dx, own.of.state, 0.0);
+        }
+        inside
+    }
+
+    /// The direction of the wish of the filter inside where `u_ref` moves along `du_ref`.
+    fn moves(&self, hold: f64, du_ref: &[f64]) -> [f64; MAX_INPUTS] {
+        let mut moves = [0.0; MAX_INPUTS];
+        moves[..du_ref.len()].copy_from_slice(du_ref);
+        if let Self::Integrated(own) = self {
+            moves[own.of.input] *= own.follows(hold);
+        }
+        moves
     }
 
     /// Makes `u` of the filter inside one of the plant, for `hold` s; returns the integral after it.
@@ -337,6 +374,7 @@ impl AssuredFilter {
             looked: None,
             next: Commitment::default(),
             next_value: 0.0,
+            piece: Piece::ROWS,
             assurance: Assurance::default(),
         })
     }
@@ -380,8 +418,8 @@ impl AssuredFilter {
         (self.commitment.standing == Standing::Assured).then_some(&self.commitment.plan.witness)
     }
 
-    /// The states of the filter inside on the way of `witness` from `x` at `t`, in steps of at most `step` s, finite, > 0: each with the input
-    /// that is held from there until the next. The last is the rest, with the input that holds it.
+    /// The states of the filter inside on the way of `witness` from `x` at `t`, in steps of at most `step` s, finite, > 0:
+    /// each with the input that is held from there until the next. The last is the rest, with the input that holds it.
     pub fn way(
         &self,
         witness: &Witness,
@@ -436,7 +474,7 @@ impl AssuredFilter {
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
         }
-        if *standing == Standing::Assured {
+        if matches!(standing, Standing::Assured | Standing::Irregular) {
             if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
                 return refuse("plan", flaw);
             }
@@ -513,14 +551,17 @@ impl AssuredFilter {
         self.rows.filter_mut().is_backed = self.commitment.standing == Standing::Assured;
         self.rows.peek(t, hold, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
+        let mut inside = [0.0; MAX_INPUTS];
+        inside[..inputs].copy_from_slice(u);
         self.next_value = self.rows.finish(hold, u);
-        let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: [0.0; MAX_INPUTS] };
-        looked.u[..u.len()].copy_from_slice(u);
+        let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: inside, inside };
+        looked.u[..inputs].copy_from_slice(u);
         self.looked = Some(looked);
         Ok(&self.assurance)
     }
 
-    /// As [`SafetyFilter::differentiate`]. There is a derivative where the input is the answer of the rows.
+    /// As [`SafetyFilter::differentiate`], for the piece in force: u_ref, the rows' answer, a plan's own input or a
+    /// compromise of these. There is none where the plan is new at this sample.
     ///
     /// # Errors
     ///
@@ -533,21 +574,29 @@ impl AssuredFilter {
         direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
-        let (mut u, mut rows) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
+        let mut given = [0.0; MAX_INPUTS];
         let inputs = self.rows.dims()[1];
-        let (u, rows) = (&mut u[..inputs], &mut rows[..inputs]);
-        self.peek(t, x, u_ref, u)?;
-        self.looked = None;
+        self.peek(t, x, u_ref, &mut given[..inputs])?;
         let hold = self.expected.unwrap_or(self.period);
-        self.rows.peek(t, hold, x, u_ref, rows)?;
-        self.rows.finish(hold, rows);
-        if u != rows {
-            return Ok(Some(NoDerivative::Plan));
-        }
-        match &mut self.rows {
+        let u = self.looked.take().map_or(given, |looked| looked.inside);
+        let unknown = match &mut self.rows {
             Rows::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
-            Rows::Integrated(integrated) => integrated.differentiate(t, hold, x, u_ref, direction, out),
+            Rows::Integrated(own) => own.differentiate_rate(t, hold, x, u_ref, direction, out),
+        }?;
+        let Piece::Mixed { rows, wish } = self.piece else { return Ok(Some(NoDerivative::Plan)) };
+        if unknown.is_none() && rows != 1.0 {
+            let wished = self.rows.moves(hold, direction.u);
+            let du = core::array::from_fn(|i| rows * out.u[i] + wish * wished[i]);
+            let x = &self.rows.state(x)[..];
+            let dx = &self.rows.direction(direction.x)[..];
+            if let Err(unknown) = self.rows.filter().carry(t, (x, dx), (&u[..inputs], du), out) {
+                return Ok(Some(unknown));
+            }
         }
+        if let Rows::Integrated(own) = &self.rows {
+            out.u[own.of.input] *= hold / 2.0;
+        }
+        Ok(unknown)
     }
 
     /// Goes on from the answer `u` of the rows at `t` and `x`, whose report and state are in the workspace, to that of the
@@ -564,9 +613,13 @@ impl AssuredFilter {
         match self.next.standing {
             Standing::Undecided if is_valid => self.decide(t, hold, x, u),
             Standing::Assured if !self.in_time(t, hold) => self.end(Standing::Irregular, None),
+            // Came late once, and is in time again: the same promise, if a plan keeps it from here.
+            Standing::Irregular if is_valid && self.next.failure.is_none() && self.in_time(t, hold) => {
+                self.end(Standing::Assured, None);
+            }
             _ => {}
         }
-        self.assurance.driver = Driver::Rows;
+        (self.assurance.driver, self.piece) = (Driver::Rows, Piece::ROWS);
         // What is let go on arrival is promised no longer.
         let SafetyFilter { slots, workspace, .. } = self.rows.filter();
         let reports = &workspace.report.barriers;
@@ -603,13 +656,15 @@ impl AssuredFilter {
 
     /// Whether the sample at `t` is one for which the plan was made.
     fn is_regular(&self, t: f64, hold: f64) -> bool {
-        let Commitment { plan, sample, .. } = &self.commitment;
-        sample.is_some_and(|[last, held]| {
-            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-            plan.witness.is_even
-                && (t == last || t >= last + held - tolerance)
-                && (hold - held).abs() <= ON_TIME * held
-        })
+        let Commitment { standing, plan, sample, .. } = &self.commitment;
+        // The plan of the first sample is made at it.
+        *standing == Standing::Undecided
+            || sample.is_some_and(|[last, held]| {
+                let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+                plan.witness.is_even
+                    && (t == last || t >= last + held - tolerance)
+                    && (hold - held).abs() <= ON_TIME * held
+            })
     }
 
     /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it.
@@ -808,6 +863,7 @@ impl AssuredFilter {
         let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
         let plan = &self.next.plan;
+        let was_committed = self.commitment.standing == Standing::Assured;
         // Gentle, and with the margin that is aimed at.
         let comfortable = |witness: &Witness| {
             let margin = |at: &Tightest| self.filter().slots[at.barrier].promise.settings().margin;
@@ -819,26 +875,34 @@ impl AssuredFilter {
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
             {
-                return Ok((Driver::Reference, witness));
+                return Ok((Driver::Reference, Piece::Mixed { rows: 0.0, wish: 1.0 }, witness));
             }
             wanted.copy_from_slice(u);
             if let Ok(witness) = planner.behind(plan, t, x, wanted) {
                 if !passes || !comfortable(&witness) || u == wish {
-                    return Ok((Driver::Rows, witness));
+                    return Ok((Driver::Rows, Piece::ROWS, witness));
                 }
                 // As near to u_ref as is comfortable, so that the input does not jump between the two.
-                let eased =
+                let (wish, witness) =
                     towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
-                return Ok((if eased.0 { Driver::Eased } else { Driver::Rows }, eased.1));
+                let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
+                return Ok((driver, Piece::Mixed { rows: 1.0 - wish, wish }, witness));
             }
             // Towards the answer of the rows, from the plan's own input.
             let kept = planner.tail(plan, t, x)?;
             let own = kept.inputs[0].1;
-            let between = towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
-            Ok((if between.0 { Driver::Between } else { Driver::Plan }, between.1))
+            let (rows, witness) = towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
+            let driver = if rows > 0.0 { Driver::Between } else { Driver::Plan };
+            // The first one, or one by feedback, moves with the state.
+            let piece = match was_committed && plan.witness.holds(t, hold, &own) {
+                true => Piece::Mixed { rows, wish: 0.0 },
+                false => Piece::Searched,
+            };
+            Ok((driver, piece, witness))
         });
         let failure = match found {
-            Ok((driver, witness)) => {
+            Ok((driver, piece, witness)) => {
+                self.piece = piece;
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
                 self.next.plan.witness = witness;
                 return driver;
@@ -849,6 +913,7 @@ impl AssuredFilter {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.plan = plan;
+                self.piece = Piece::Searched;
                 Driver::Plan
             }
             Err(_) => {
@@ -863,14 +928,14 @@ impl AssuredFilter {
     }
 }
 
-/// The witness behind the last input on the way `from` one `to` another that has one, of those tried, and whether that is
-/// another than `from`, whose witness is `kept`.
+/// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
+/// witness, and that; 0 for `from`, whose witness is `kept`.
 fn towards(
     from: &[f64],
     to: &[f64],
     mut kept: Witness,
     behind: impl Fn(&[f64]) -> Option<Witness>,
-) -> (bool, Witness) {
+) -> (f64, Witness) {
     let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
     for _ in 0..=BISECTIONS {
         for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
@@ -883,7 +948,7 @@ fn towards(
         }
         part = 0.5 * (low + high);
     }
-    (low > 0.0, kept)
+    (low, kept)
 }
 
 impl Looked {

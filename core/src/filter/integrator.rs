@@ -206,17 +206,34 @@ impl IntegratedFilter {
         direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<Option<NoDerivative>, Error> {
+        let unknown = self.differentiate_rate(t, hold, x, u_ref, direction, out)?;
+        out.u[self.of.input] *= hold / 2.0;
+        Ok(unknown)
+    }
+
+    /// The derivative of the filter's own answer, with the rate.
+    pub(super) fn differentiate_rate(
+        &mut self,
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<Option<NoDerivative>, Error> {
         self.begin(hold, x, u_ref)?;
         length("dx", direction.x.len(), x.len())?;
         length("du_ref", direction.u.len(), u_ref.len())?;
-        let Integration { state, input, gain, .. } = self.of;
-        insert(&mut self.x[1], direction.x, state, 0.0);
+        insert(&mut self.x[1], direction.x, self.of.state, 0.0);
         self.u_ref[1].copy_from_slice(direction.u);
-        self.u_ref[1][input] *= gain.min(1.0 / hold);
+        self.u_ref[1][self.of.input] *= self.follows(hold);
         let ([x, dx], [u_ref, du_ref]) = (&self.x, &self.u_ref);
-        let unknown = self.filter.differentiate(t, x, u_ref, Direction { x: dx, u: du_ref }, out)?;
-        out.u[input] *= hold / 2.0;
-        Ok(unknown)
+        self.filter.differentiate(t, x, u_ref, Direction { x: dx, u: du_ref }, out)
+    }
+
+    /// The rate for `hold` s of each unit between the value and the wish for it, in 1/s.
+    pub(super) fn follows(&self, hold: f64) -> f64 {
+        self.of.gain.min(1.0 / hold)
     }
 
     /// The filter's own answer, with the rate.
@@ -234,14 +251,15 @@ impl IntegratedFilter {
 
     /// Completes state, wish and bounds of the filter for a sample.
     fn begin(&mut self, hold: f64, x: &[f64], u_ref: &[f64]) -> Result<(), Error> {
-        let Self { filter, of: Integration { state, input, limits, gain }, value, .. } = self;
+        let hold = positive("hold", hold)?;
+        let follows = self.follows(hold);
+        let Self { filter, of: Integration { state, input, limits, .. }, value, .. } = self;
         let (state, input, value) = (*state, *input, *value);
         length("x", x.len(), filter.state_dim - 1)?;
         length("u_ref", u_ref.len(), filter.input_dim)?;
-        let hold = positive("hold", hold)?;
         insert(&mut self.x[0], x, state, value);
         self.u_ref[0].copy_from_slice(u_ref);
-        self.u_ref[0][input] = rate_to(u_ref[input] - value, *gain, hold);
+        self.u_ref[0][input] = (u_ref[input] - value) * follows;
         // 0 is within these too, since the value is within its limits.
         filter.bounds.min[input] = self.rates[0].max((limits[0] - value) / hold);
         filter.bounds.max[input] = self.rates[1].min((limits[1] - value) / hold);
@@ -253,7 +271,7 @@ impl IntegratedFilter {
     #[cfg(feature = "plan")]
     pub(super) fn wanted(&self, hold: f64, wish: f64) -> f64 {
         let ends = self.of.limits.map(|limit| (limit - self.value) / hold);
-        let rate = rate_to(wish - self.value, self.of.gain, hold);
+        let rate = (wish - self.value) * self.follows(hold);
         rate.max(self.rates[0].max(ends[0])).min(self.rates[1].min(ends[1]))
     }
 
@@ -263,11 +281,6 @@ impl IntegratedFilter {
         u[self.of.input] = self.limited(self.value + rate * hold / 2.0);
         self.limited(self.value + rate * hold)
     }
-}
-
-/// The rate of a value that is `way` from what is wished for, for `hold` s.
-fn rate_to(way: f64, gain: f64, hold: f64) -> f64 {
-    way * gain.min(1.0 / hold)
 }
 
 /// `to` = `from` with `value` put in at `place`.

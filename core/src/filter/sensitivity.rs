@@ -225,6 +225,36 @@ impl SafetyFilter {
         Ok(self.directional(t, x, u_ref, u, direction, out).err())
     }
 
+    /// Makes the derivative `out` of the answer of the rows, just computed, that of the input `u` in its place, which moves
+    /// by `du`: of the numbers of the report it is the slack that follows.
+    #[cfg(feature = "plan")]
+    pub(super) fn carry(
+        &self,
+        t: f64,
+        (x, dx): (&[f64], &[f64]),
+        (u, du): (&[f64], [f64; MAX_INPUTS]),
+        out: &mut SampleDerivative,
+    ) -> Result<(), NoDerivative> {
+        let SampleDerivative { u: moved, barriers, scratch } = out;
+        let workspace = &self.workspace;
+        let answer = &workspace.next.input[..u.len()];
+        for (i, b) in barriers.iter_mut().enumerate() {
+            let normal = &workspace.report.barriers[i].row.normal;
+            if *normal == [0.0; MAX_INPUTS] {
+                continue;
+            }
+            let (change, _) = self.row_derivative(i, t, x, dx, answer, scratch)?;
+            let curvature = self.curvature(i, t, x, answer, scratch)?;
+            for (k, u) in u.iter().enumerate() {
+                // The row is that at the answer of the rows, and turns as this moves.
+                let turn = change.normal[k] + dot(&curvature[k], moved);
+                b.slack += turn * (u - answer[k]) + normal[k] * (du[k] - moved[k]);
+            }
+        }
+        *moved = du;
+        Ok(())
+    }
+
     fn directional(
         &self,
         t: f64,
@@ -263,7 +293,8 @@ impl SafetyFilter {
             qp.solve(&problem, again);
         }
         let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
-        let same = if report.status.is_satisfied() { SAME_INPUT } else { SAME_INPUT_UNMET };
+        let is_rough = self.is_backed || !report.status.is_satisfied();
+        let same = if is_rough { SAME_INPUT_UNMET } else { SAME_INPUT };
         if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
             return Err(NoDerivative::NotConverged);
         }

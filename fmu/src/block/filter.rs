@@ -2,6 +2,7 @@
 
 use punctual_core::filter::{NoDerivative, SampleDerivative, Standing, Status};
 use punctual_core::lie::Direction;
+use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
@@ -88,6 +89,13 @@ impl FilterBlock {
         written
     }
 
+    /// Where the promise stands, where plans are followed. They are not where a parameter that was set since asks for what
+    /// none accounts for.
+    fn standing(&self) -> Option<(Standing, Option<Failure>)> {
+        let refused = (Standing::Refused, None);
+        self.configuration.is_assured().then(|| self.filter.standing().unwrap_or(refused))
+    }
+
     /// The reason why there is no derivative, with the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
@@ -122,7 +130,7 @@ impl FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if let Some((standing, _)) = self.filter.standing() {
+        if let Some((standing, _)) = self.standing() {
             values.integers[at] = standing as i32;
             at += 1;
         }
@@ -191,14 +199,18 @@ impl Block for FilterBlock {
     }
 
     fn notice(&mut self) -> Option<String> {
-        let (standing, failure) = self.filter.standing()?;
+        let (standing, failure) = self.standing()?;
         if self.noticed.replace(standing) == Some(standing) {
             return None;
         }
         let lost = matches!(standing, Standing::Refused | Standing::Withdrawn | Standing::Irregular);
         lost.then(|| {
-            let why = failure.map(|failure| format!(": {}", self.configuration.failure(failure)));
-            format!("the promise is {} ({}){}", standing.name(), standing.meaning(), why.unwrap_or_default())
+            let why = match failure {
+                Some(failure) => Some(self.configuration.failure(failure)),
+                None => self.configuration.unaccounted(),
+            };
+            let why = why.map(|why| format!(": {why}")).unwrap_or_default();
+            format!("the promise is {} ({}){why}", standing.name(), standing.meaning())
         })
     }
 
@@ -264,7 +276,7 @@ impl Block for FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if self.filter.standing().is_some() {
+        if self.standing().is_some() {
             values.integers[at] = Standing::Undecided as i32;
         }
     }

@@ -41,6 +41,8 @@ words! {
 words! {
     /// Whether the filter promises only what a plan keeps.
     pub enum AssuranceName {
+        /// A plan behind every input, where all inputs have bounds and plans account for everything; else the rows alone.
+        Auto = "auto",
         /// The rows alone ([`SafetyFilter`]).
         Off = "off",
         /// A plan behind every input ([`AssuredFilter`](punctual_core::filter::AssuredFilter)).
@@ -64,7 +66,7 @@ pub(super) struct RawFilter {
     #[serde(default = "yes")]
     direct_feedthrough: bool,
     sampling: Option<SamplingName>,
-    #[serde(default = "off")]
+    #[serde(default = "auto")]
     assurance: AssuranceName,
     #[serde(default)]
     actuation_delay: f64,
@@ -95,8 +97,11 @@ pub struct FilterConfiguration {
     /// The treatment of inputs that are held between samples.
     pub sampling: SamplingName,
     /// Whether the filter promises only what a plan keeps.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
+    /// Why no plan is followed, in words, as the file stands; empty where plans are.
+    #[serde(skip)]
+    unassured: String,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
     /// Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
@@ -128,12 +133,12 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-fn off() -> AssuranceName {
-    AssuranceName::Off
+fn auto() -> AssuranceName {
+    AssuranceName::Auto
 }
 
-fn is_off(assurance: &AssuranceName) -> bool {
-    *assurance == AssuranceName::Off
+fn is_auto(assurance: &AssuranceName) -> bool {
+    *assurance == AssuranceName::Auto
 }
 
 fn yes() -> bool {
@@ -171,10 +176,11 @@ pub(super) static SECTION: Section = Section {
             Key::new(
                 "assurance",
                 Word(AssuranceName::WORDS),
-                Some("`off`"),
+                Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
-                 promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors",
+                 promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
+                 alone. `auto`: `on` where that is possible and every input has bounds, else `off`; `check` says which",
             ),
             Key::new(
                 "actuation_delay",
@@ -270,6 +276,7 @@ impl FilterConfiguration {
                 false => SamplingName::Measured,
             }),
             assurance: raw.assurance,
+            unassured: String::new(),
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
             correction_limit: raw.correction_limit,
@@ -294,6 +301,7 @@ impl FilterConfiguration {
             parameter.check(&mut configuration)?;
         }
         // The filter itself refuses what the ranges of single numbers cannot.
+        configuration.unassured = configuration.why_unassured();
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
         Ok(configuration)
@@ -456,19 +464,44 @@ impl FilterConfiguration {
 
     /// Whether the filter follows plans.
     pub fn is_assured(&self) -> bool {
-        self.assurance == AssuranceName::On
+        self.unassured.is_empty()
+    }
+
+    /// Why the filter follows no plans, in words; empty where it does.
+    pub fn unassured(&self) -> &str {
+        &self.unassured
+    }
+
+    fn why_unassured(&self) -> String {
+        let free = self.commanded().into_iter().find(|signal| self.limits(&signal.name).is_none());
+        match (self.assurance, free) {
+            (AssuranceName::Off, _) => "assurance is \"off\"".to_owned(),
+            (AssuranceName::On, _) => String::new(),
+            (AssuranceName::Auto, Some(signal)) => format!("{} has no bounds", signal.name),
+            (AssuranceName::Auto, None) => self.unaccounted().unwrap_or_default(),
+        }
+    }
+
+    /// What no plan accounts for, in words.
+    pub fn unaccounted(&self) -> Option<String> {
+        self.build().map_err(|e| e.to_string()).and_then(|filter| self.assured(filter)).err()
     }
 
     /// What keeps a plan from being one, in words.
     pub fn failure(&self, failure: Failure) -> String {
         match failure {
             Failure::Broken { barrier, time, slack } => {
-                // One of a state from elsewhere may have any number.
-                let Some(section) = self.barrier.get(barrier) else {
-                    return "a barrier is not met".to_owned();
+                // After the barriers come the limits of the integrator; one of a state from elsewhere may have any number.
+                let (name, unit) = match (self.barrier.get(barrier), &self.integrator) {
+                    (Some(section), _) => (section.name.clone(), section.unit(&self.plant)),
+                    (None, Some(integrator)) => {
+                        let name = format!("the limit of {}", integrator.state);
+                        let state = self.plant.states().into_iter().find(|s| s.name == integrator.state);
+                        (name, state.map(|s| s.unit).unwrap_or_default())
+                    }
+                    (None, None) => ("a barrier".to_owned(), String::new()),
                 };
-                let (unit, lack) = (section.unit(&self.plant), -slack);
-                format!("{} is not met at {time:.6} s, by {lack:.6} {unit}", section.name)
+                format!("{name} is not met at {time:.6} s, by {:.6} {unit}", -slack)
             }
             Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),

@@ -4,6 +4,7 @@ use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, Safety
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
+use super::filter::AssuranceName;
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
@@ -153,12 +154,18 @@ impl FilterConfiguration {
     ///
     /// A number out of range, or numbers that contradict each other.
     pub fn build_loop(&self) -> Result<FilterLoop, ConfigurationError> {
-        let filter = self.build()?;
         if self.is_assured() {
-            let refused = |reason| format!("is \"on\", must be \"off\": {reason}");
-            let assured = self.assured(filter).map_err(|e| ConfigurationError::new("assurance", refused(e)));
-            return assured.map(|filter| FilterLoop::Assured(Box::new(filter)));
+            match self.assured(self.build()?) {
+                Ok(filter) => return Ok(FilterLoop::Assured(Box::new(filter))),
+                Err(reason) if self.assurance == AssuranceName::On => {
+                    let message = format!("is \"on\", must be \"off\": {reason}");
+                    return Err(ConfigurationError::new("assurance", message));
+                }
+                // A number that was set since asks for what no plan accounts for.
+                Err(_) => {}
+            }
         }
+        let filter = self.build()?;
         match &self.integrator {
             None => Ok(FilterLoop::Plain(filter)),
             Some(section) => self.integrated(filter, section).map(FilterLoop::Integrated),
