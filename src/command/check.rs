@@ -410,7 +410,8 @@ fn filter(
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
-                Some(closed_loop::reach(c, (i, deadline), (x0, wanted))?)
+                let plan = witness.as_ref().filter(|_| c.is_assured()).and_then(|w| w.soonest(name));
+                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plan)?)
             }
             _ => None,
         };

@@ -296,13 +296,16 @@ pub(super) struct ReachReport {
     pub(super) deadline: Verdict,
     /// Least time in s that any input within the bounds needs.
     soonest_at_least: Option<f64>,
-    /// The soonest deadline that this filter meets in simulation, in s.
+    /// The soonest deadline that this filter meets in simulation, or a plan in the model, in s.
     soonest_at_most: Option<f64>,
+    /// Whether it is a plan that meets the deadline.
+    by_plan: bool,
 }
 
 impl ReachReport {
     pub(super) fn rows(&self) -> Vec<(&'static str, String)> {
         let verdict = match self.deadline {
+            Verdict::CanBeMet if self.by_plan => "can be met (a plan does it)",
             Verdict::CanBeMet => "can be met (this filter does it with that u_ref, simulated)",
             Verdict::CannotBeMet => "cannot be met (no input within the bounds is inside then)",
             Verdict::NotKnown => "not known whether it can be met",
@@ -311,8 +314,9 @@ impl ReachReport {
             Some(time) => format!("at least {} s (no input within the bounds is faster)", number(time)),
             None => "no lower bound is known".to_owned(),
         };
+        let who = if self.by_plan { "a plan does it" } else { "this filter does it, simulated" };
         let most = match self.soonest_at_most {
-            Some(time) => format!("at most {} s (this filter does it, simulated)", number(time)),
+            Some(time) => format!("at most {} s ({who})", number(time)),
             None => "no upper bound was found".to_owned(),
         };
         vec![("bounds", verdict.to_owned()), ("soonest", least), ("", most)]
@@ -360,16 +364,22 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`.
+/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plan`: the soonest deadline for which there is
+/// a plan, where there is one for this.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),
     (x0, wanted): (&[f64], &Wanted),
+    plan: Option<f64>,
 ) -> Result<ReachReport, Error> {
     let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
     let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
+    if plan.is_some() {
+        let deadline = Verdict::CanBeMet;
+        return Ok(ReachReport { deadline, soonest_at_least: soonest, soonest_at_most: plan, by_plan: true });
+    }
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
         tried.barrier[index].deadline = Some(deadline);
@@ -394,7 +404,7 @@ pub(super) fn reach(
         () if keeps(deadline)? => Verdict::CanBeMet,
         () => Verdict::NotKnown,
     };
-    Ok(ReachReport { deadline: verdict, soonest_at_least: soonest, soonest_at_most: most })
+    Ok(ReachReport { deadline: verdict, soonest_at_least: soonest, soonest_at_most: most, by_plan: false })
 }
 
 fn named(profile: ProfileKind) -> ProfileName {

@@ -43,7 +43,8 @@ struct PlanReport {
     tightest: Option<(String, f64, f64, String)>,
 }
 
-/// The finding for the start `x0`, whose plan is drawn into the folder `out` if there is one; `None` where an input has no bounds, so that nothing is ruled out.
+/// The finding for the start `x0`, whose plan is drawn into the folder `out` if there is one; `None` where an input has no
+/// bounds, so that nothing is ruled out.
 pub(super) fn find(
     c: &FilterConfiguration,
     x0: &[f64],
@@ -114,6 +115,12 @@ impl WitnessReport {
     /// Whether the plan keeps the promise of `barrier`.
     pub(super) fn keeps(&self, barrier: &str) -> bool {
         self.found && self.left_out.iter().all(|name| name != barrier)
+    }
+
+    /// The soonest deadline of `barrier` in s with a plan, where the plan keeps its promise.
+    pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
+        let (_, deadline) = self.soonest.iter().find(|(name, _)| name == barrier && self.keeps(barrier))?;
+        Some(*deadline)
     }
 
     pub(super) fn text(&self) -> String {

@@ -197,6 +197,9 @@ impl FilterConfiguration {
     ///
     /// What no plan accounts for yet, in words.
     pub fn assured(&self, filter: SafetyFilter) -> Result<AssuredFilter, String> {
+        if let Some(barrier) = self.external() {
+            return Err(format!("barrier {} has no model to run ahead", barrier.name));
+        }
         if let Some(input) = self.barrier_inputs().first() {
             return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
         }
