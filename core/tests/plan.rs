@@ -632,7 +632,84 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     assert_eq!(erring, "measurement_errors: are not 0, which no plan accounts for yet");
     let disturbed = refused(BarrierSettings { disturbance: 0.1, ..within }, |b| b);
     assert_eq!(disturbed, "goal.disturbance: is not 0, which no plan accounts for yet");
+    let later = refused(within, |b| b.window(Begin::At(1.0), End::Never).expect("a window"));
+    assert_eq!(
+        later,
+        "goal.begin: is later than the first sample, with a deadline, which no plan accounts for yet"
+    );
+    assert_eq!(
+        refused(BarrierSettings::keeping(), |b| b.window(Begin::At(1.0), End::Never).expect("a window")),
+        ""
+    );
     assert_eq!(refused(within, |b| b), "");
+}
+
+/// A place that is forbidden from some time on: it is left before, and not entered after, from inside, and past it.
+#[test]
+fn what_begins_later_is_kept_from_then_on() {
+    let mut random = Random(23);
+    let (mut accepted, mut began_in) = (0, 0);
+    for run in 0..30 {
+        let vehicle = [Vehicle::PointMass, Vehicle::Unicycle][run % 2];
+        let bounds = [random.between(2.0, 5.0), random.between(1.0, 3.0)];
+        let (begin, deadline) = (random.between(1.5, 6.0), random.between(6.0, 9.0));
+        // Every third time the start is in it.
+        let reach = if run % 3 == 0 { [0.3, 0.3] } else { [14.0, 9.0] };
+        let place = reach.map(|most| random.between(-0.3, most));
+        let radius = random.between(0.5, 2.5);
+        let disc = |centre, radius| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
+        let (goal, clear) = (disc(GOAL.0, GOAL.1), Outside(disc(place, radius)));
+        let within = BarrierSettings::within(deadline);
+        let builder = SafetyFilter::builder(4, 2);
+        let filter = match vehicle {
+            Vehicle::PointMass => builder
+                .barrier("goal", PointMass, goal, within)
+                .and_then(|b| b.barrier("clear", PointMass, clear, BarrierSettings::keeping())),
+            Vehicle::Unicycle => builder
+                .barrier("goal", Unicycle, goal, within)
+                .and_then(|b| b.barrier("clear", Unicycle, clear, BarrierSettings::keeping())),
+        };
+        let filter = filter
+            .and_then(|b| b.window(Begin::At(begin), End::Never))
+            .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (mut x, mut u) = ([0.0, 0.0, random.between(-0.5, 0.5), random.between(0.0, 1.0)], [0.0; 2]);
+        let away = |x: [f64; 4], c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+        let is_in = away(x, place) < radius;
+        for k in 0..600 {
+            let t = f64::from(k) * PERIOD;
+            let to = [place[0] - x[0], place[1] - x[1]];
+            let u_ref = match (k % 100 < 50, vehicle) {
+                (true, Vehicle::PointMass) => to,
+                (true, Vehicle::Unicycle) => [bounds[0], 4.0 * (to[1].atan2(to[0]) - x[2]).sin()],
+                (false, _) => wanted(vehicle, run as u64 % 5, x, bounds, &mut random),
+            };
+            let assurance = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            if k == 0 && assurance.standing == Standing::Refused {
+                break;
+            }
+            accepted += i32::from(k == 0);
+            began_in += i32::from(k == 0 && is_in);
+            assert!(assurance.is_assured(), "{run} {t}: {assurance:?}");
+            assert!(filter.report().barriers.iter().all(|b| b.guaranteed), "{run} {t}");
+            for part in 1..=20 {
+                let (after, x) = (
+                    t + PERIOD * f64::from(part) / 20.0,
+                    vehicle.move_by(x, u, PERIOD * f64::from(part) / 20.0),
+                );
+                assert!(after < begin || away(x, place) >= radius - 1e-9, "{run} {after}: {x:?}");
+                assert!(after < deadline || away(x, GOAL.0) <= GOAL.1 + 1e-9, "{run} {after}: {x:?}");
+            }
+            x = vehicle.move_by(x, u, PERIOD);
+        }
+    }
+    println!(
+        "begins later: {accepted} of 30 accepted, {began_in} of them from inside what is forbidden then"
+    );
+    assert!(accepted >= 20 && began_in >= 2, "{accepted} {began_in}");
 }
 
 #[test]

@@ -164,9 +164,10 @@ struct Looked {
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
 /// again at the same time. Where the time to the next sample changes and is [told](Self::expect_hold), a plan is sought for
-/// the new one; none found ends the promise. A sample that comes late ends it until the next one. Where x is not finite, the plan goes on as it is. A filter with bounds on
-/// disturbance or measurement errors, a delay or windows that begin later cannot be assured yet, and is refused by
-/// [`Self::new`]. Sets must not move: at a rest each is looked at at eight later times, up to a day, and no plan is found
+/// the new one; none found ends the promise. A sample that comes late ends it until the next one. Where x is not finite, the
+/// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
+/// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
+/// is refused by [`Self::new`]. Sets must not move: at a rest each is looked at at eight later times, up to a day, and no plan is found
 /// where it has. States must be those of the plant, not of something that others move.
 ///
 /// The search allocates, as do the plans.
@@ -314,7 +315,7 @@ impl AssuredFilter {
     /// # Errors
     ///
     /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
-    /// than the first one; one that begins later; a bound on disturbance or measurement errors; a delay.
+    /// than the first one; one with a deadline that begins later, or that begins on another's arrival; a bound on disturbance or measurement errors; a delay.
     pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
         let bounds = filter.bounds;
         Self::around(Rows::Plain(filter), bounds, period)
@@ -356,8 +357,14 @@ impl AssuredFilter {
             if settings.disturbance > 0.0 {
                 return refuse("disturbance", "is not 0").map_err(named);
             }
-            if slot.begin != Begin::AtOnce {
-                return refuse("begin", "is later than the first sample").map_err(named);
+            match (slot.begin, settings.deadline) {
+                (Begin::AtOnce, _) | (Begin::At(_), None) => {}
+                (Begin::At(_), Some(_)) => {
+                    return refuse("begin", "is later than the first sample, with a deadline").map_err(named);
+                }
+                (Begin::AfterArrival(_), _) => {
+                    return refuse("begin", "is the arrival of another barrier").map_err(named);
+                }
             }
             if slot.source.predict().is_none() {
                 let message = "has no model to run ahead";
@@ -713,7 +720,7 @@ impl AssuredFilter {
     }
 
     /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
-    /// deadline, or one without a deadline whose set `x` is outside of.
+    /// deadline, or one without a deadline that begins at once and whose set `x` is outside of.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> {
         self.promises(t, &self.rows.state(x), |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
@@ -723,12 +730,14 @@ impl AssuredFilter {
         let promise = |(slot, model): (&BarrierSlot, &dyn Predict)| {
             // Not that of the report, which has none where u_ref is no number.
             let h = model.value(t, x);
-            let from = match slot.promise.settings().deadline {
+            // A little earlier, so that round-off of a time is no gap.
+            let after = |seconds: f64| t + seconds - ON_TIME * self.period;
+            let from = match (slot.begin, slot.promise.settings().deadline) {
+                (Begin::At(begin), _) if begin > 0.0 => after(begin),
                 // Not-a-number is asked for at once, and found by the check.
                 _ if h.is_nan() || h >= 0.0 => t,
-                // A little earlier, so that round-off of a time is no gap.
-                Some(deadline) => t + factor(slot) * deadline - ON_TIME * self.period,
-                None => return None,
+                (_, Some(deadline)) => after(factor(slot) * deadline),
+                (_, None) => return None,
             };
             let until = match slot.end {
                 End::Never => f64::INFINITY,
