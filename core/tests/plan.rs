@@ -515,6 +515,34 @@ fn a_sample_at_another_time_ends_the_promise() {
     }
 }
 
+/// What was broken while no plan was followed is not promised again.
+#[test]
+fn what_was_missed_is_not_taken_up_again() {
+    let step = |filter: &mut AssuredFilter, t: f64, x: [f64; 4]| {
+        filter.step(t, &x, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").standing
+    };
+    let begun = || {
+        let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);
+        assert_eq!(step(&mut filter, 0.0, [0.0; 4]), Standing::Assured);
+        filter
+    };
+    let inside = [GOAL.0[0], GOAL.0[1], 0.0, 0.0];
+    // The obstacle is touched at the late sample.
+    let mut filter = begun();
+    assert_eq!(step(&mut filter, 1.0, [OBSTACLE.0[0], OBSTACLE.0[1], 0.0, 0.0]), Standing::Withdrawn);
+    assert_eq!(step(&mut filter, 1.0 + PERIOD, inside), Standing::Withdrawn);
+    // The deadline passes before the late sample, or after it: nobody saw.
+    let mut filter = begun();
+    assert_eq!(step(&mut filter, 9.0, inside), Standing::Withdrawn);
+    let mut filter = begun();
+    assert_eq!(step(&mut filter, 7.99, inside), Standing::Irregular);
+    assert_eq!(step(&mut filter, 7.99 + PERIOD, inside), Standing::Withdrawn);
+    // Nothing was missed.
+    let mut filter = begun();
+    assert_eq!(step(&mut filter, 7.9, inside), Standing::Irregular);
+    assert_eq!(step(&mut filter, 7.9 + PERIOD, inside), Standing::Assured);
+}
+
 /// The derivative of each piece, beside central differences of it.
 #[test]
 fn derivatives_are_those_of_the_piece_in_force() {
@@ -642,6 +670,14 @@ fn filters_that_plans_do_not_account_for_are_refused() {
         ""
     );
     assert_eq!(refused(within, |b| b), "");
+    let moving =
+        QuadraticDisc::new(GOAL.0, GOAL.1).expect("valid disc").moving([1.0, 0.0]).expect("a velocity");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, moving, within)
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let moves = AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string());
+    assert_eq!(moves.as_deref(), Some("goal.source: moves with time, which no plan accounts for yet"));
 }
 
 /// A place that is forbidden from some time on: it is left before, and not entered after, from inside, and past it.
@@ -841,7 +877,7 @@ fn plans_stand_behind_an_integral_too() {
         let (sin, cos) = x[2].sin_cos();
         [x[3] * (cos - sin * u[1]), x[3] * (sin + cos * u[1]), x[3] * u[1] / LENGTH, u[0]]
     };
-    let (mut accepted, deadline, period) = (0, 5.0, 0.05);
+    let (mut accepted, mut compared, deadline, period) = (0, [0; 2], 5.0, 0.05);
     for seed in 1..=8_u64 {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
@@ -872,6 +908,28 @@ fn plans_stand_behind_an_integral_too() {
                 _ => [random.between(-40.0, 40.0), random.between(-0.5, 0.5)],
             };
             let mut u = [0.0; 2];
+            // How the mean follows what is wanted of it, not at all beyond its limits.
+            let mut look = |by: f64| {
+                let u_ref = [u_ref[0], u_ref[1] + by];
+                let driver = filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions").driver;
+                (driver, u[1])
+            };
+            let [(before_it, low), (driver, here), (after_it, high)] = [-1e-6, 0.0, 1e-6].map(&mut look);
+            let direction = Direction { x: &[0.0; 4], u: &[0.0, 1.0] };
+            let mut derivative = SampleDerivative::default();
+            let given = filter.differentiate(t, &x, &u_ref, direction, &mut derivative);
+            if given.expect("right dimensions").is_none()
+                && [before_it, after_it] == [driver; 2]
+                && (low - 2.0 * here + high).abs() < 1e-9
+            {
+                let by = (high - low) / 2e-6;
+                assert!(
+                    (derivative.u[1] - by).abs() < 1e-3,
+                    "{seed} {t} {driver:?}: {} {by}",
+                    derivative.u[1]
+                );
+                compared[usize::from(by == 0.0)] += 1;
+            }
             let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
             if k == 0 && !assurance.is_assured() {
                 break;
@@ -896,6 +954,7 @@ fn plans_stand_behind_an_integral_too() {
             }
         }
     }
+    assert!(compared.iter().all(|n| *n >= 5), "{compared:?}");
     assert!(accepted >= 7, "{accepted} of 8 accepted");
 }
 

@@ -41,7 +41,7 @@ pub(crate) struct BarrierReport {
     /// Whether h >= 0 has been reached since the deadline began to count.
     #[pyo3(get)]
     arrived: bool,
-    /// Whether a plan in hand keeps the promise whatever u_ref is; needs bounds on every input.
+    /// Whether a plan in hand keeps the promise whatever u_ref is; where the filter follows plans.
     #[pyo3(get)]
     guaranteed: bool,
     /// Whether the theorem behind the present phase applies so far.

@@ -15,9 +15,6 @@ pub(crate) struct Loop {
     longest: f64,
 }
 
-/// The largest difference between two times in s that are the same, as a part of them.
-const ROUND_OFF: f64 = 1e-9;
-
 impl Loop {
     /// The loop before its first sample.
     pub(crate) fn new(configuration: &FilterConfiguration) -> PyResult<Self> {
@@ -49,12 +46,10 @@ impl Loop {
     /// For how long in s the input at `t` is going to be held where nobody says so: as long as the one before was, but no
     /// shorter than the longest that is configured.
     fn hold(&self, t: f64) -> f64 {
-        let FilterLoop::Assured(assured) = &self.filter else { return self.period };
-        let before = assured.last_hold().unwrap_or(self.period.max(self.longest));
-        let passed = assured.filter().state().time.map_or(before, |last| t - last).max(self.longest);
-        // Not-a-number is no time.
-        let is_other = (passed - before).abs() > ROUND_OFF * t.abs().max(before);
-        if passed > 0.0 && passed.is_finite() && is_other { passed } else { before }
+        match &self.filter {
+            FilterLoop::Assured(assured) => assured.usual_hold(t).max(self.longest),
+            _ => self.period,
+        }
     }
 
     /// Starts every deadline anew; the integrated input stays.

@@ -241,7 +241,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             }
             let mut starts = report.barriers.iter().filter_map(|b| b.start.as_ref());
             let lost = |s: &StartReport| s.reach.as_ref().is_some_and(|r| r.deadline == Verdict::CannotBeMet);
-            let kept = report.closed_loop.as_ref().is_none_or(|run| run.kept);
+            let kept = report.closed_loop.as_ref().is_none_or(|run| run.kept || run.by_rows);
             let promised = kept && starts.all(|start| start.promised && !lost(start));
             Ok(if promised { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
@@ -410,8 +410,9 @@ fn filter(
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
-                let plan = witness.as_ref().filter(|_| c.is_assured()).and_then(|w| w.soonest(name));
-                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plan)?)
+                let plans = witness.as_ref().filter(|_| c.is_assured());
+                let plans = plans.map(|w| (w.keeps(name), w.soonest(name)));
+                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plans)?)
             }
             _ => None,
         };
@@ -426,7 +427,7 @@ fn filter(
             simulated,
             reach,
         });
-        if start.as_ref().is_some_and(|s| !s.inside && deadline.is_infinite()) {
+        if start.as_ref().is_some_and(|s| !s.inside && deadline.is_infinite() && !s.guaranteed) {
             warn(
                 "outside at the start and without a deadline: nothing is promised; give it a deadline"
                     .to_owned(),

@@ -118,6 +118,9 @@ pub(super) struct LoopReport {
     pub(super) u_ref: String,
     /// Whether every promise was kept.
     pub(super) kept: bool,
+    /// Whether it is one of the rows, though the filter follows plans.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(super) by_rows: bool,
     /// End of the run in s.
     end: f64,
     /// Time between samples in s.
@@ -192,7 +195,8 @@ impl LoopReport {
     pub(super) fn head(&self) -> String {
         let verdict = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
         let (step, end) = (number(self.step), number(self.end));
-        format!("closed loop with {}, steps of {step} s to t = {end} s: {verdict}", self.u_ref)
+        let who = if self.by_rows { " of the rows alone" } else { "" };
+        format!("closed loop{who} with {}, steps of {step} s to t = {end} s: {verdict}", self.u_ref)
     }
 
     pub(super) fn text(&self) -> String {
@@ -271,6 +275,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
     Ok(LoopReport {
         u_ref: wanted.words(c),
         kept: run.kept,
+        by_rows: c.is_assured() && c.integrator.is_some(),
         end: run.end,
         step,
         barriers: barriers.collect(),
@@ -364,21 +369,26 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plan`: the soonest deadline for which there is
-/// a plan, where there is one for this.
+/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plans`: where they are followed, whether there
+/// is one for this deadline, and the soonest for which there is.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),
     (x0, wanted): (&[f64], &Wanted),
-    plan: Option<f64>,
+    plans: Option<(bool, Option<f64>)>,
 ) -> Result<ReachReport, Error> {
     let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
     let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
-    if plan.is_some() {
-        let deadline = Verdict::CanBeMet;
-        return Ok(ReachReport { deadline, soonest_at_least: soonest, soonest_at_most: plan, by_plan: true });
+    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
+    if let Some((found, soonest_at_most)) = plans {
+        let deadline = match () {
+            () if found => Verdict::CanBeMet,
+            () if lost => Verdict::CannotBeMet,
+            () => Verdict::NotKnown,
+        };
+        return Ok(ReachReport { deadline, soonest_at_least: soonest, soonest_at_most, by_plan: true });
     }
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
@@ -387,7 +397,6 @@ pub(super) fn reach(
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, (x0, wanted), &deadlines(&tried))?.kept)
     };
-    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     // The search grows from a deadline that is not ruled out, since the longest deadlines are the longest runs.
     let mut low = soonest.unwrap_or(0.0).max(1e-3 * deadline);
     let mut most = None;

@@ -117,10 +117,9 @@ impl WitnessReport {
         self.found && self.left_out.iter().all(|name| name != barrier)
     }
 
-    /// The soonest deadline of `barrier` in s with a plan, where the plan keeps its promise.
+    /// The soonest deadline of `barrier` in s with a plan.
     pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
-        let (_, deadline) = self.soonest.iter().find(|(name, _)| name == barrier && self.keeps(barrier))?;
-        Some(*deadline)
+        self.soonest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
     }
 
     pub(super) fn text(&self) -> String {

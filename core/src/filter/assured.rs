@@ -288,11 +288,11 @@ impl Rows {
     }
 
     /// The direction of the wish of the filter inside where `u_ref` moves along `du_ref`.
-    fn moves(&self, hold: f64, du_ref: &[f64]) -> [f64; MAX_INPUTS] {
+    fn moves(&self, hold: f64, u_ref: &[f64], du_ref: &[f64]) -> [f64; MAX_INPUTS] {
         let mut moves = [0.0; MAX_INPUTS];
         moves[..du_ref.len()].copy_from_slice(du_ref);
         if let Self::Integrated(own) = self {
-            moves[own.of.input] *= own.follows(hold);
+            moves[own.of.input] *= own.moves(hold, u_ref[own.of.input]);
         }
         moves
     }
@@ -315,7 +315,8 @@ impl AssuredFilter {
     /// # Errors
     ///
     /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
-    /// than the first one; one with a deadline that begins later, or that begins on another's arrival; a bound on disturbance or measurement errors; a delay.
+    /// than the first one; one with a deadline that begins later, one that begins on another's arrival, or one that moves for
+    /// ever; a bound on disturbance or measurement errors; a delay.
     pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
         let bounds = filter.bounds;
         Self::around(Rows::Plain(filter), bounds, period)
@@ -372,6 +373,11 @@ impl AssuredFilter {
             }
         }
         one_plant(filter, period)?;
+        for slot in &filter.slots {
+            if slot.end == End::Never && moves(slot, filter.state_dim) {
+                return refuse("source", "moves with time").map_err(|e| e.within(&slot.name));
+            }
+        }
         Ok(Self {
             rows,
             bounds,
@@ -464,6 +470,15 @@ impl AssuredFilter {
         &self.commitment
     }
 
+    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first for
+    /// the period.
+    pub fn usual_hold(&self, t: f64) -> f64 {
+        let Some([last, held]) = self.commitment.sample else { return self.period };
+        let passed = t - last;
+        let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+        if passed > 0.0 && passed.is_finite() && !is_same { passed } else { held }
+    }
+
     /// How long in s the input of the last sample was to be held, if there was one.
     pub fn last_hold(&self) -> Option<f64> {
         self.commitment.sample.map(|[_, hold]| hold)
@@ -480,6 +495,9 @@ impl AssuredFilter {
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
+        }
+        if *standing == Standing::Undecided && state.time.is_some() {
+            return refuse("standing", "is undecided, beside samples that were decided on");
         }
         if matches!(standing, Standing::Assured | Standing::Irregular) {
             if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
@@ -555,7 +573,7 @@ impl AssuredFilter {
             return Ok(&self.assurance);
         }
         self.looked = None;
-        self.rows.filter_mut().is_backed = self.commitment.standing == Standing::Assured;
+        self.rows.filter_mut().is_backed = self.is_followed() && self.in_time(t, hold);
         self.rows.peek(t, hold, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
         let mut inside = [0.0; MAX_INPUTS];
@@ -592,7 +610,11 @@ impl AssuredFilter {
         }?;
         let Piece::Mixed { rows, wish } = self.piece else { return Ok(Some(NoDerivative::Plan)) };
         if unknown.is_none() && rows != 1.0 {
-            let wished = self.rows.moves(hold, direction.u);
+            let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
+            if constant.contains(&self.report().status) {
+                return Ok(Some(NoDerivative::Dependent));
+            }
+            let wished = self.rows.moves(hold, u_ref, direction.u);
             let du = core::array::from_fn(|i| rows * out.u[i] + wish * wished[i]);
             let x = &self.rows.state(x)[..];
             let dx = &self.rows.direction(direction.x)[..];
@@ -614,17 +636,18 @@ impl AssuredFilter {
         rows[..u.len()].copy_from_slice(u);
         let x = &self.rows.state(x)[..];
         let is_valid = t.is_finite() && all_finite(x);
-        if is_valid || self.next.sample.is_some() {
+        if t.is_finite() && (is_valid || self.next.sample.is_some()) {
             self.next.sample = Some([t, hold]);
         }
-        match self.next.standing {
-            Standing::Undecided if is_valid => self.decide(t, hold, x, u),
-            Standing::Assured if !self.in_time(t, hold) => self.end(Standing::Irregular, None),
-            // Came late once, and is in time again: the same promise, if a plan keeps it from here.
-            Standing::Irregular if is_valid && self.next.failure.is_none() && self.in_time(t, hold) => {
-                self.end(Standing::Assured, None);
+        if self.next.standing == Standing::Undecided && is_valid {
+            self.decide(t, hold, x, u);
+        } else if self.is_followed() {
+            match (self.in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
+                (true, None) if is_valid => self.end(Standing::Assured, None),
+                (true, None) => {}
+                (false, None) => self.end(Standing::Irregular, None),
+                (_, failure) => self.end(Standing::Withdrawn, failure),
             }
-            _ => {}
         }
         (self.assurance.driver, self.piece) = (Driver::Rows, Piece::ROWS);
         // What is let go on arrival is promised no longer.
@@ -646,6 +669,36 @@ impl AssuredFilter {
         if self.next.standing == Standing::Assured {
             self.report_on(&rows[..u.len()], u);
         }
+    }
+
+    /// Whether the promise stands, or came late at the last sample only and may be taken up again.
+    fn is_followed(&self) -> bool {
+        let Commitment { standing, failure, .. } = &self.commitment;
+        *standing == Standing::Assured || *standing == Standing::Irregular && failure.is_none()
+    }
+
+    /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
+    /// left, or a promise that began meanwhile.
+    fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
+        let Commitment { standing, sample, .. } = &self.commitment;
+        let seen = sample.map_or(t, |[last, held]| match standing {
+            Standing::Assured => last + held * (1.0 + ON_TIME),
+            _ => last,
+        });
+        // A promise is about all times: what is measured again is not what was promised.
+        if t <= seen + 2.0 * f64::EPSILON * t.abs() {
+            return None;
+        }
+        self.next.promises.iter().zip(self.models()).enumerate().find_map(|(barrier, (promise, model))| {
+            let Promise { from, until, .. } = (*promise)?;
+            let h = model.value(t, x);
+            match from <= t && t < until {
+                // Not-a-number is outside too.
+                true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),
+                true if from > seen => Some(Failure::Nothing),
+                _ => None,
+            }
+        })
     }
 
     fn end(&mut self, standing: Standing, failure: Option<Failure>) {
@@ -898,12 +951,12 @@ impl AssuredFilter {
                 return Ok((driver, Piece::Mixed { rows: 1.0 - wish, wish }, witness));
             }
             // Towards the answer of the rows, from the plan's own input.
-            let kept = planner.tail(plan, t, x)?;
+            let (kept, is_replayed) = planner.tail(plan, t, x)?;
             let own = kept.inputs[0].1;
             let (rows, witness) = towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
             let driver = if rows > 0.0 { Driver::Between } else { Driver::Plan };
             // The first one, or one by feedback, moves with the state.
-            let piece = match was_committed && plan.witness.holds(t, hold, &own) {
+            let piece = match was_committed && is_replayed {
                 true => Piece::Mixed { rows, wish: 0.0 },
                 false => Piece::Searched,
             };
@@ -1040,15 +1093,29 @@ fn least_factor<T>(longest: f64, mut found: Option<T>, find: impl Fn(f64) -> Opt
     Some((high, found))
 }
 
+/// A number that no model treats apart, for state `i` of a trial.
+fn trial_state(i: usize, trial: usize) -> f64 {
+    ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
+}
+
+/// Whether h changes with time alone, at some states and times in s.
+fn moves(slot: &BarrierSlot, states: usize) -> bool {
+    const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
+    let Some(model) = slot.source.predict() else { return false };
+    (0..4).any(|trial| {
+        let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
+        let values = TIMES.map(|t| model.value(t, &x));
+        values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()))
+    })
+}
+
 /// Checks that every barrier runs the same plant ahead, at some states: a plan is one of all of them.
 fn one_plant(filter: &SafetyFilter, period: f64) -> Result<(), Error> {
     const TRIALS: usize = 4;
     let (nx, nu) = (filter.state_dim, filter.input_dim);
     let moved = |slot: &BarrierSlot, trial: usize| {
-        // Numbers that no model treats apart.
-        let number = |i: usize| ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2;
-        let mut x: Vec<f64> = (0..nx).map(number).collect();
-        let u: Vec<f64> = (0..nu).map(|i| filter.bounds.clamp(i, number(i + nx))).collect();
+        let mut x: Vec<f64> = (0..nx).map(|i| trial_state(i, trial)).collect();
+        let u: Vec<f64> = (0..nu).map(|i| filter.bounds.clamp(i, trial_state(i + nx, trial))).collect();
         if let Some(plant) = slot.source.predict() {
             plant.flow(&mut x, &u, period);
         }

@@ -275,6 +275,13 @@ impl IntegratedFilter {
         rate.max(self.rates[0].max(ends[0])).min(self.rates[1].min(ends[1]))
     }
 
+    /// How that rate moves with the `wish`, in 1/s: not at all beyond the bounds.
+    #[cfg(feature = "plan")]
+    pub(super) fn moves(&self, hold: f64, wish: f64) -> f64 {
+        let follows = self.follows(hold);
+        if self.wanted(hold, wish) == (wish - self.value) * follows { follows } else { 0.0 }
+    }
+
     /// Puts the mean over `hold` s in the place of the rate; returns the value then.
     pub(super) fn finish(&self, hold: f64, u: &mut [f64]) -> f64 {
         let rate = u[self.of.input];

@@ -63,12 +63,6 @@ pub struct Witness {
 }
 
 impl Witness {
-    /// Whether `u` is its input at `t`, for samples that are `period` s apart, or the mean over the period.
-    pub(crate) fn holds(&self, t: f64, period: f64, u: &[f64; MAX_INPUTS]) -> bool {
-        let now = self.inputs.iter().find(|(end, _)| *end > t + ON_TIME * period).or(self.inputs.last());
-        now.is_some_and(|(_, now)| now == u) || self.mean(t, t + period) == *u
-    }
-
     /// The mean input from `t` until `end` > `t`.
     pub(super) fn mean(&self, t: f64, end: f64) -> [f64; MAX_INPUTS] {
         let (mut mean, mut at) = ([0.0; MAX_INPUTS], t);

@@ -248,12 +248,12 @@ impl<'a> Planner<'a> {
     }
 
     /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
-    /// the model, or forgets no round-off, the feedback that they came from.
+    /// the model, or forgets no round-off, the feedback that they came from. And whether the first one is as it was.
     ///
     /// # Errors
     ///
     /// What it fails at.
-    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
+    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(Witness, bool), Failure> {
         let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
         // As many of its holds as `held`, then the law behind it.
@@ -282,7 +282,7 @@ impl<'a> Planner<'a> {
             if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
                 walk.follow(reference)?;
             }
-            walk.stop(brake)
+            Ok((walk.stop(brake)?, at > t))
         };
         self.on_a_grid(|grid| {
             let kept = match plan.stays() {
@@ -292,14 +292,15 @@ impl<'a> Planner<'a> {
             };
             kept.or_else(|failure| {
                 let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
-                follow(true).or_else(|_| follow(false)).map_err(|_| failure)
+                let followed = follow(true).or_else(|_| follow(false)).map_err(|_| failure)?;
+                Ok((followed, false))
             })
         })
     }
 
     /// What `find` finds for samples in the present period; else, where the plan was made for another, for those that it
     /// was made for from the next one on.
-    fn on_a_grid(&self, find: impl Fn(Grid) -> Result<Witness, Failure>) -> Result<Witness, Failure> {
+    fn on_a_grid<R>(&self, find: impl Fn(Grid) -> Result<R, Failure>) -> Result<R, Failure> {
         let grid = Grid { period: self.period, even: true };
         // Of periods that are not known there are no means.
         find(grid).or_else(|failure| match self.regular || self.integral.is_some() {

@@ -276,8 +276,9 @@ impl Block for FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if self.standing().is_some() {
-            values.integers[at] = Standing::Undecided as i32;
+        if let Some((standing, _)) = self.standing() {
+            let shown = if self.filter.standing().is_some() { Standing::Undecided } else { standing };
+            values.integers[at] = shown as i32;
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{Call, Failure, Instance, Mode};
 impl Instance {
     /// Writes the derivatives of the outputs `unknowns` along `seed`, one number for each of the inputs `knowns`.
     /// They are those of the outputs that would be read now had these inputs just been set, with the units of the
-    /// output over those of the input. Does not allocate once configured, and changes no value.
+    /// output over those of the input. Changes no value, and does not allocate once configured but for plans.
     ///
     /// # Errors
     ///

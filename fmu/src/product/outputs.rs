@@ -74,7 +74,7 @@ pub static BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     BarrierOutput { name: "arrived", description: "h >= 0 has been reached", reading: Flag(|b| b.arrived) },
     BarrierOutput {
         name: "guaranteed",
-        description: "a plan in hand keeps the promise whatever u_ref is; needs bounds on every input",
+        description: "a plan in hand keeps the promise whatever u_ref is; where the filter follows plans",
         reading: Flag(|b| b.guaranteed),
     },
     BarrierOutput {
