@@ -37,4 +37,10 @@ pub trait Barrier<const NX: usize> {
     fn highest(&self, _time: [f64; 2], _region: &Region) -> Option<f64> {
         None
     }
+
+    /// The least and the largest value of h from `t` (s) on while the state stays `x`, infinite where there is none. `None`,
+    /// the default, where they are not known: then a set that moves is not [assured](crate::filter::AssuredFilter).
+    fn range_from(&self, _t: f64, _x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+        None
+    }
 }

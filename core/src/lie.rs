@@ -204,6 +204,10 @@ where
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
         *out = ahead::value_along::<B, NX>(&self.barrier, t, path);
     }
+
+    fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
+        self.barrier.range_from(t, &SVector::from_column_slice(x)).map(|[least, _]| least)
+    }
 }
 
 impl<P, B, const NX: usize, const NU: usize, const K: usize> Directional for Along<P, B, NX, NU, K>

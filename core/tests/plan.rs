@@ -680,6 +680,74 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     assert_eq!(moves.as_deref(), Some("goal.source: moves with time, which no plan accounts for yet"));
 }
 
+/// Obstacles that cross the way at constant velocity, and one that comes by where the vehicle has come to rest.
+#[test]
+fn obstacles_that_move_are_kept_away_from() {
+    let mut random = Random(31);
+    let mut accepted = 0;
+    for run in 0..30 {
+        let vehicle = [Vehicle::PointMass, Vehicle::Unicycle][run % 2];
+        let bounds = [random.between(2.0, 5.0), random.between(1.0, 3.0)];
+        let deadline = random.between(6.0, 9.0);
+        let radius = random.between(0.5, 2.0);
+        // Where it is, and when: on the way, or beside the goal long after.
+        let (part, when) = if run % 3 == 0 {
+            (random.between(0.9, 1.2), random.between(deadline + 1.0, deadline + 6.0))
+        } else {
+            (random.between(0.3, 0.8), random.between(1.0, deadline - 1.0))
+        };
+        let velocity: [f64; 2] = core::array::from_fn(|_| random.between(-2.0, 2.0));
+        let start: [f64; 2] = core::array::from_fn(|i| part * GOAL.0[i] - when * velocity[i]);
+        let disc = DistanceDisc::new(start, radius, 1.0).and_then(|disc| disc.moving(velocity));
+        let clear = Outside(disc.expect("valid disc"));
+        let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+        let (within, keeping) = (BarrierSettings::within(deadline), BarrierSettings::keeping());
+        let builder = SafetyFilter::builder(4, 2);
+        let filter = match vehicle {
+            Vehicle::PointMass => builder
+                .barrier("goal", PointMass, goal, within)
+                .and_then(|b| b.barrier("clear", PointMass, clear, keeping)),
+            Vehicle::Unicycle => builder
+                .barrier("goal", Unicycle, goal, within)
+                .and_then(|b| b.barrier("clear", Unicycle, clear, keeping)),
+        };
+        let filter = filter
+            .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (mut x, mut u) = ([0.0, 0.0, random.between(-0.5, 0.5), random.between(0.0, 1.0)], [0.0; 2]);
+        for k in 0..900 {
+            let t = f64::from(k) * PERIOD;
+            let to = [0, 1].map(|i| start[i] + t * velocity[i] - x[i]);
+            let u_ref = match (k % 100 < 50, vehicle) {
+                (true, Vehicle::PointMass) => to,
+                (true, Vehicle::Unicycle) => [bounds[0], 4.0 * (to[1].atan2(to[0]) - x[2]).sin()],
+                (false, _) => wanted(vehicle, run as u64 % 5, x, bounds, &mut random),
+            };
+            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            if k == 0 && assurance.standing == Standing::Refused {
+                println!("refused: {run} {:?}", assurance.failure);
+                break;
+            }
+            accepted += i32::from(k == 0);
+            assert!(assurance.is_assured(), "{run} {t}: {assurance:?}");
+            for part in 1..=20 {
+                let dt = PERIOD * f64::from(part) / 20.0;
+                let (after, x) = (t + dt, vehicle.move_by(x, u, dt));
+                let away = |i: usize| x[i] - start[i] - after * velocity[i];
+                assert!(away(0).hypot(away(1)) >= radius - 1e-9, "{run} {after}: {x:?}");
+                let from = (x[0] - GOAL.0[0]).hypot(x[1] - GOAL.0[1]);
+                assert!(after < deadline || from <= GOAL.1 + 1e-9, "{run} {after}: {x:?}");
+            }
+            x = vehicle.move_by(x, u, PERIOD);
+        }
+    }
+    println!("obstacles that move: {accepted} of 30 accepted");
+    assert!(accepted >= 20, "{accepted}");
+}
+
 /// A place that is forbidden from some time on: it is left before, and not entered after, from inside, and past it.
 #[test]
 fn what_begins_later_is_kept_from_then_on() {

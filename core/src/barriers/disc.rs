@@ -45,6 +45,19 @@ impl Centre {
         away[0].squared() + away[1].squared()
     }
 
+    /// The time in s from `t` on at which the point is nearest to the position of `x`, which does not move; and whether it
+    /// goes away from there for ever.
+    fn passes<const NX: usize>(&self, t: f64, x: &SVector<f64, NX>) -> (f64, bool) {
+        match self {
+            Self::Given { start, velocity } if *velocity != [0.0; 2] => {
+                let way: f64 = (0..2).map(|i| (x[i] - start[i]) * velocity[i]).sum();
+                let square: f64 = velocity.iter().map(|v| v * v).sum();
+                (t.max(way / square), true)
+            }
+            _ => (t, false),
+        }
+    }
+
     /// The least distance in m of the point from a position in `region` between the two times.
     fn nearest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let Self::Given { start, velocity } = self else { return None };
@@ -106,6 +119,11 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
         let nearest = self.centre.nearest(time, region)?;
         Some((self.radius - nearest) * (self.radius + nearest))
     }
+
+    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+        let (nearest, leaves) = self.centre.passes(t, x);
+        Some([if leaves { f64::NEG_INFINITY } else { self.value(t, x) }, self.value(nearest, x)])
+    }
 }
 
 /// Interior of a disc, distance-shaped and smooth: h = √(R² + b²) − √(d² + b²), in m.
@@ -160,5 +178,10 @@ impl<const NX: usize> Barrier<NX> for DistanceDisc {
     fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {
         let nearest = self.centre.nearest(time, region)?;
         Some(self.level - elementary::sqrt(nearest * nearest + self.smoothing * self.smoothing))
+    }
+
+    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+        let (nearest, leaves) = self.centre.passes(t, x);
+        Some([if leaves { f64::NEG_INFINITY } else { self.value(t, x) }, self.value(nearest, x)])
     }
 }

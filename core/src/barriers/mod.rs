@@ -37,4 +37,8 @@ impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.0.value(t, x)
     }
+
+    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+        self.0.range_from(t, x).map(|[least, largest]| [-largest, -least])
+    }
 }

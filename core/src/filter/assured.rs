@@ -167,8 +167,9 @@ struct Looked {
 /// the new one; none found ends the promise. A sample that comes late ends it until the next one. Where x is not finite, the
 /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
 /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
-/// is refused by [`Self::new`]. Sets must not move: at a rest each is looked at at eight later times, up to a day, and no plan is found
-/// where it has. States must be those of the plant, not of something that others move.
+/// is refused by [`Self::new`]. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
+/// gets: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. States must be
+/// those of the plant, not of something that others move.
 ///
 /// The search allocates, as do the plans.
 ///
@@ -374,7 +375,7 @@ impl AssuredFilter {
         }
         one_plant(filter, period)?;
         for slot in &filter.slots {
-            if slot.end == End::Never && moves(slot, filter.state_dim) {
+            if slot.end == End::Never && leaves(slot, filter.state_dim) {
                 return refuse("source", "moves with time").map_err(|e| e.within(&slot.name));
             }
         }
@@ -1098,14 +1099,15 @@ fn trial_state(i: usize, trial: usize) -> f64 {
     ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
 }
 
-/// Whether h changes with time alone, at some states and times in s.
-fn moves(slot: &BarrierSlot, states: usize) -> bool {
+/// Whether h changes with time alone, at some states and times in s, and it is not known that it does so within limits.
+fn leaves(slot: &BarrierSlot, states: usize) -> bool {
     const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
     let Some(model) = slot.source.predict() else { return false };
     (0..4).any(|trial| {
         let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
         let values = TIMES.map(|t| model.value(t, &x));
-        values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()))
+        let moves = values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()));
+        moves && model.lowest_from(0.0, &x).is_none_or(|least| least == f64::NEG_INFINITY)
     })
 }
 

@@ -103,6 +103,10 @@ impl Predict for Embedded {
         }
     }
 
+    fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
+        self.source.predict()?.lowest_from(t, &self.picked(x)[..self.picks.len()])
+    }
+
     fn value(&self, t: f64, x: &[f64]) -> f64 {
         let Some(source) = self.source.predict() else { return f64::NAN };
         source.value(t, &self.picked(x)[..self.picks.len()])

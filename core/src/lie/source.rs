@@ -68,6 +68,11 @@ pub trait Predict {
 
     /// Writes the course of h along `path`, the courses of all states from `t` on.
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
+
+    /// The least value of h from `t` on while the state stays `x`; for sets that move. The default knows none.
+    fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
+        None
+    }
 }
 
 /// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …

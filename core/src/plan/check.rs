@@ -423,7 +423,8 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Whether every set is still, so that a plant at rest here stays in all that are or will be asked for.
+    /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
+    /// they come.
     fn rests(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
         let length = (self.t - self.started).max(self.grid.period);
         self.model.plant.path(&self.x, u, &mut self.path);
@@ -433,12 +434,22 @@ impl<'a> Walk<'a> {
                 continue;
             }
             let h = requirement.model.value(self.t, &self.x);
-            let spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
-            for span in spans {
+            let mut spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
+            let moves = spans.any(|span| {
                 let later = requirement.model.value(self.t + span, &self.x);
-                if (later - h).abs() > 1e-12 * (1.0 + h.abs()) {
-                    return Ok(false);
+                (later - h).abs() > 1e-12 * (1.0 + h.abs())
+            });
+            if moves {
+                let begin = self.t.max(requirement.from);
+                for (x, c) in self.point.iter_mut().zip(&self.path) {
+                    *x = c[0] + c[1] * DRIFT * hold;
                 }
+                let lowest = |x: &[f64]| requirement.model.lowest_from(begin, x);
+                let (Some(here), Some(there)) = (lowest(&self.x), lowest(&self.point)) else {
+                    return Ok(false);
+                };
+                self.note(i, begin, here.min(there))?;
+                continue;
             }
             if requirement.until == f64::INFINITY || requirement.from > self.t {
                 let mut course = [0.0; COURSE];
