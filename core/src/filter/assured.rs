@@ -258,10 +258,15 @@ impl Rows {
 
     /// The state of the filter inside.
     fn state(&self, x: &[f64]) -> Vec<f64> {
+        self.with(x, IntegratedFilter::value)
+    }
+
+    /// `x` with what `part` says of the integral in its place.
+    fn with(&self, x: &[f64], part: impl Fn(&IntegratedFilter) -> f64) -> Vec<f64> {
         let mut inside = x.to_vec();
         if let Self::Integrated(own) = self {
             inside.push(0.0);
-            insert(&mut inside, x, own.of.state, own.value());
+            insert(&mut inside, x, own.of.state, part(own));
         }
         inside
     }
@@ -280,12 +285,7 @@ impl Rows {
 
     /// The direction of that state where the one measured moves along `dx`.
     fn direction(&self, dx: &[f64]) -> Vec<f64> {
-        let mut inside = dx.to_vec();
-        if let Self::Integrated(own) = self {
-            inside.push(0.0);
-            insert(&mut inside, dx, own.of.state, 0.0);
-        }
-        inside
+        self.with(dx, |_| 0.0)
     }
 
     /// The direction of the wish of the filter inside where `u_ref` moves along `du_ref`.
@@ -696,7 +696,7 @@ impl AssuredFilter {
             match from <= t && t < until {
                 // Not-a-number is outside too.
                 true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),
-                true if from > seen => Some(Failure::Nothing),
+                true if from > seen => Some(Failure::Missed { barrier }),
                 _ => None,
             }
         })

@@ -118,6 +118,11 @@ pub enum Failure {
     Singular,
     /// There are too many samples, or steps of the model, to look at.
     TooLong,
+    /// A requirement began while no plan was followed, so nobody saw whether it was met.
+    Missed {
+        /// The number of its barrier.
+        barrier: usize,
+    },
 }
 
 /// The samples of a roll-out.

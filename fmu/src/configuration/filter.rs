@@ -503,6 +503,10 @@ impl FilterConfiguration {
                 };
                 format!("{name} is not met at {time:.6} s, by {:.6} {unit}", -slack)
             }
+            Failure::Missed { barrier } => {
+                let name = self.barrier.get(barrier).map_or("a barrier", |section| &section.name);
+                format!("{name} came due while no plan was followed")
+            }
             Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
             Failure::TooLong => {
