@@ -1054,3 +1054,59 @@ fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
         x = [0, 1].map(|i| x[i] + PERIOD * u[i]);
     }
 }
+
+#[test]
+fn a_policy_shows_the_way_through_a_gap() {
+    const BOUND: f64 = 4.0;
+    const WALL: [f64; 2] = [8.0, 1.5];
+    let goal = ([14.0, 0.0], 1.0);
+    // A wall with its only near gap at y = 12.
+    let obstacles: Vec<f64> =
+        (-12..=12).map(|k| f64::from(k) * 2.4).filter(|y| (y - 12.0).abs() > 1.3).collect();
+    let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
+    let made = || {
+        let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(14.0) };
+        let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
+        let mut builder =
+            SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(goal), within).expect("a goal");
+        for (i, y) in obstacles.iter().enumerate() {
+            let clear = Outside(disc(([WALL[0], *y], WALL[1])));
+            builder = builder.barrier(&format!("wall_{i}"), PointMass, clear, keeping).expect("an obstacle");
+        }
+        let builder =
+            builder.bounds(&[-BOUND; 2], &[BOUND; 2]).and_then(|b| b.sampling(Sampling::Period(PERIOD)));
+        AssuredFilter::new(builder.and_then(FilterBuilder::build).expect("valid"), PERIOD).expect("plans")
+    };
+    let start = [0.0; 4];
+    assert!(
+        made().foresee(0.0, &start, 1.0).is_err(),
+        "the search finds the gap by itself, so this shows nothing"
+    );
+    // To a point before the gap, to one behind it, to the goal: at a moderate speed, damped.
+    let through = move |_: f64, x: &[f64], u: &mut [f64]| {
+        let target = match (x[0], x[1]) {
+            (px, py) if px < 5.5 && py < 10.0 => [2.0, 12.0],
+            (px, _) if px < 10.0 => [11.5, 12.0],
+            _ => goal.0,
+        };
+        for i in 0..2 {
+            u[i] = 1.5 * (target[i] - x[i]).clamp(-2.5, 2.5) - 1.5 * x[2 + i];
+        }
+    };
+    let mut filter = made().policy(through);
+    let mut x = start;
+    for k in 0..(18.0 / PERIOD) as usize {
+        let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
+        let assurance = *filter.step(t, &x, &[1.0, -1.0], &mut u).expect("right dimensions");
+        assert!(assurance.is_assured(), "at {t}: {assurance:?}");
+        x = Vehicle::PointMass.move_by(x, u, PERIOD);
+        let away = obstacles
+            .iter()
+            .map(|y| (x[0] - WALL[0]).hypot(x[1] - y) - WALL[1])
+            .fold(f64::INFINITY, f64::min);
+        assert!(away > 0.0, "at {t}: {x:?}");
+        if t > 14.0 {
+            assert!((x[0] - goal.0[0]).hypot(x[1] - goal.0[1]) < goal.1, "at {t}: {x:?}");
+        }
+    }
+}

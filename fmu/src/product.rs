@@ -89,7 +89,7 @@ impl Product {
                 }
             },
             Configuration::Controller(c) => {
-                format!("Nominal controller ({}) for a {}", c.controller.name(), c.plant.model.title())
+                format!("Nominal controller ({}) for a {}", c.controller.name(), c.plant.title())
             }
         };
         ModelDescription {
@@ -367,10 +367,10 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
 }
 
 fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
-    let (states, inputs) = (c.plant.model.states(), c.plant.model.inputs());
+    let (states, inputs) = (c.plant.states(), c.plant.inputs());
     let mut table = Table::default();
-    for state in states {
-        table.signal("x", &state.into(), "measured ", Causality::Input);
+    for state in &states {
+        table.signal("x", state, "measured ", Causality::Input);
     }
     for (name, unit, start, description) in c.goal_inputs() {
         table.add(name.to_owned(), description, Causality::Input, real(Some(start), unit));
@@ -385,7 +385,7 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
             }
             _ => (0..outputs as u32).collect(),
         };
-        table.signal("u_ref", &input.into(), "wanted ", Causality::Output).dependencies = Some(dependencies);
+        table.signal("u_ref", input, "wanted ", Causality::Output).dependencies = Some(dependencies);
     }
     if let Controller::Waypoints { points, .. } = &c.controller {
         let max = i32::try_from(points.len()).ok();

@@ -46,12 +46,14 @@
 //! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
 //! | `evaluated` | plants and barriers that somebody else's code computes |
+//! | `functions` | values of expressions of state and time |
 //! | `model` | plants and barriers of expressions |
 #![forbid(unsafe_code)]
 
 mod affine;
 mod error;
 pub mod evaluated;
+mod functions;
 mod model;
 mod motion;
 mod series;
@@ -59,6 +61,7 @@ mod syntax;
 mod tape;
 
 pub use error::Error;
+pub use functions::Functions;
 pub use model::{Barrier, Model};
 pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved};
 

@@ -7,6 +7,7 @@ use punctual_core::dynamics::DynPlant;
 use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 
+use crate::functions::Functions;
 use crate::motion::{self, Equations};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
@@ -90,6 +91,28 @@ impl Model {
         Ok(register)
     }
 
+    /// The values of expressions of states, parameters and the time `t`; each has a name for messages.
+    ///
+    /// # Errors
+    ///
+    /// By that name: text that cannot be read, an unknown name or an input, a wrong number of arguments.
+    pub fn functions<C: Scalar>(&self, expressions: &[(&str, &str)]) -> Result<Functions<C>, Error> {
+        let mut model = self.clone();
+        let mut results = Vec::with_capacity(expressions.len());
+        for (name, text) in expressions {
+            let result = syntax::parse(text).and_then(|tree| model.compile(&tree, false, true));
+            results.push(result.map_err(|e| Error::new(*name, e))?);
+        }
+        let Tape { steps, registers, .. } = &model.tape;
+        Ok(Functions {
+            steps: needed(steps, &results, *registers),
+            results,
+            states: self.states.len(),
+            time: self.states.len() + self.inputs.len(),
+            series: Series::new(*registers, 1),
+        })
+    }
+
     fn compile(&mut self, tree: &Tree, inputs: bool, time: bool) -> Result<Register, String> {
         let (states, first_input) = (&self.states, self.states.len());
         let resolve = |name: &str| {
@@ -98,7 +121,7 @@ impl Model {
             match (position(states), position(&self.inputs)) {
                 (Some(i), _) => Ok(Value::Register(i)),
                 (_, Some(i)) if inputs => Ok(Value::Register(first_input + i)),
-                (_, Some(_)) => Err(format!("names {name}, an input, which a barrier does not depend on")),
+                (_, Some(_)) => Err(format!("names {name}, an input, which it does not depend on")),
                 _ if parameter.is_some() => Ok(Value::Number(parameter.map_or(0.0, |p| p.1))),
                 _ if time && name == TIME => Ok(Value::Register(first_input + self.inputs.len())),
                 _ => {

@@ -530,7 +530,7 @@ fn controller(c: &ControllerConfiguration) -> ControllerReport {
     ControllerReport {
         kind: "controller",
         name: c.name.clone(),
-        model: c.plant.model.name(),
+        model: c.plant.name(),
         controller: c.controller.name(),
         parameters: c.parameters().into_iter().map(parameter).collect(),
         step: c.experiment.step_size,

@@ -1,6 +1,7 @@
 //! A filter whose promise has a witness: decided at the first sample, kept within the bounds whatever u_ref is
 //! (`docs/theory.md#witness`).
 
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::vec::Vec;
 
@@ -14,7 +15,7 @@ use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Requirement, Tightest, Witness};
+use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Tightest, Witness};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -194,6 +195,7 @@ pub struct AssuredFilter {
     /// The bounds of the inputs of the filter inside; for an integral those of a sample are tighter.
     bounds: Bounds,
     period: f64,
+    policies: Vec<Policy>,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
     commitment: Commitment,
@@ -383,6 +385,7 @@ impl AssuredFilter {
             rows,
             bounds,
             period,
+            policies: Vec::new(),
             expected: None,
             commitment: Commitment::default(),
             looked: None,
@@ -391,6 +394,14 @@ impl AssuredFilter {
             piece: Piece::ROWS,
             assurance: Assurance::default(),
         })
+    }
+
+    /// Adds a policy with which a search for a plan begins: for promises that no search keeps by itself, such as a way
+    /// through a gap. It writes the input at a time in s and a state, both those of the filter inside.
+    #[must_use]
+    pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
+        self.policies.push(Box::new(policy));
+        self
     }
 
     /// The filter inside: to look at.
@@ -908,7 +919,7 @@ impl AssuredFilter {
         if let Rows::Integrated(own) = &self.rows {
             planner = planner.integrated(Integral { state: own.of.state, input: own.of.input });
         }
-        f(&planner.irregular(!self.is_regular(t, period)))
+        f(&planner.led(&self.policies).irregular(!self.is_regular(t, period)))
     }
 
     /// The limits of the integral as barriers along `plant`.

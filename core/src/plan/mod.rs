@@ -31,6 +31,7 @@ pub use integral::Integral;
 pub(crate) use integral::Limit;
 pub use planner::Planner;
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 
 use crate::lie::Predict;
@@ -53,6 +54,10 @@ pub struct Requirement<'a> {
     /// Least value in the unit of h, ≥ 0.
     pub margin: f64,
 }
+
+/// A law that may keep what is asked for, such as a controller of one's own: it writes the input at a time in s and a state.
+/// A search for a plan begins with where it leads too. Nothing rests on it, since every plan is checked.
+pub type Policy = Box<dyn Fn(f64, &[f64], &mut [f64]) + Send>;
 
 impl Requirement<'_> {
     fn is_in_force(&self, t: f64) -> bool {

@@ -8,7 +8,7 @@ use super::check::{Failure, Grid, Walk, Witness};
 use super::law::{Brake, Gain, Reference};
 use super::model::Model;
 use super::search::{Descent, Search, Trajectory};
-use super::{Integral, Plan, Requirement};
+use super::{Integral, Plan, Policy, Requirement};
 use crate::MAX_INPUTS;
 use crate::lie::Predict;
 use crate::qp::Bounds;
@@ -44,6 +44,8 @@ const LED: f64 = 1.8;
 const FINEST: usize = 3;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
+/// The most inputs of a policy over a hold of the search, which has the mean of them.
+const ASKED: f64 = 16.0;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
 const GUESSES: [[f64; 2]; 3] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0]];
 
@@ -61,6 +63,7 @@ pub struct Planner<'a> {
     /// Whether samples come as those before did.
     regular: bool,
     integral: Option<Integral>,
+    policies: &'a [Policy],
 }
 
 impl<'a> Planner<'a> {
@@ -74,7 +77,8 @@ impl<'a> Planner<'a> {
         period: f64,
         size: f64,
     ) -> Self {
-        Self { plant, dims, bounds, requirements, period, size, regular: true, integral: None }
+        let policies = &[];
+        Self { plant, dims, bounds, requirements, period, size, regular: true, integral: None, policies }
     }
 
     /// The same planner at a sample that did not come as those before did, or is held for another time.
@@ -87,6 +91,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn integrated(self, integral: Integral) -> Self {
         Self { integral: Some(integral), ..self }
+    }
+
+    /// The same planner with these policies to begin a search with.
+    #[must_use]
+    pub fn led(self, policies: &'a [Policy]) -> Self {
+        Self { policies, ..self }
     }
 
     fn model(&self, step: f64) -> Model<'a> {
@@ -136,13 +146,20 @@ impl<'a> Planner<'a> {
                 x,
                 size: self.size,
             };
-            let guesses = self.guesses(&sketch, &guide, x, &times);
-            let mut descents: Vec<Descent> =
-                guesses.into_iter().map(|inputs| Descent::from(search.run(inputs))).collect();
+            let policies = self.policies.iter().map(|policy| self.follow(&sketch, policy, &guide, x, &times));
+            let mut descents: Vec<Descent> = policies
+                .chain(self.guesses(&sketch, &guide, x, &times))
+                .map(|inputs| Descent::from(search.run(inputs)))
+                .collect();
+            descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
             // A few steps show which guesses lead somewhere.
             for (most, iterations) in ROUNDS {
-                let merit = |d: &Descent| d.best.merit;
-                descents.sort_by(|a, b| merit(a).total_cmp(&merit(b)));
+                // What the user thinks of is never dropped.
+                let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
+                descents.sort_by(|a, b| {
+                    let (a, b) = (merit(a), merit(b));
+                    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+                });
                 descents.truncate(most);
                 let mut nearest = f64::INFINITY;
                 for descent in &mut descents {
@@ -164,7 +181,9 @@ impl<'a> Planner<'a> {
                         match found {
                             Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
                                 search.tighten(barrier, slack);
+                                let wanted = descent.is_wanted;
                                 *descent = Descent::from(search.run(descent.best.inputs.clone()));
+                                descent.is_wanted = wanted;
                                 search.improve(descent, TIGHTENING);
                             }
                             _ => break,
@@ -368,6 +387,44 @@ impl<'a> Planner<'a> {
         None
     }
 
+    /// The latest deadline in s, or the time of a search from `t` that has none.
+    fn last(&self, t: f64) -> f64 {
+        self.requirements.iter().map(|r| r.from).filter(|t| t.is_finite()).fold(t, f64::max)
+    }
+
+    /// The mean inputs of `policy` over each hold until the last deadline, then of the plant stopped.
+    fn follow(
+        &self,
+        model: &Model<'_>,
+        policy: &Policy,
+        brake: &Brake,
+        x: &[f64],
+        times: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let last = self.last(times[0]);
+        let (mut x, mut u) = (x.to_vec(), vec![0.0; model.inputs()]);
+        let mean = |hold: &[f64]| {
+            let length = hold[1] - hold[0];
+            let parts = (length / self.period).min(ASKED).max(1.0) as u32;
+            let part = length / f64::from(parts);
+            let mut mean = vec![0.0; u.len()];
+            for k in 0..parts {
+                let t = hold[0] + f64::from(k) * part;
+                match t < last {
+                    true => policy(t, &x, &mut u),
+                    false => brake.input(model, &x, &mut u),
+                }
+                model.clamp(&mut u);
+                model.flow(&mut x, &u, part);
+                mean.iter_mut().zip(&u).for_each(|(mean, u)| *mean += u / f64::from(parts));
+            }
+            mean
+        };
+        let mut inputs: Vec<Vec<f64>> = times.windows(2).map(mean).collect();
+        inputs.push(brake.input.clone());
+        inputs
+    }
+
     /// First guesses: the plant stopped at once, and after inputs to either side.
     fn guesses(&self, model: &Model<'_>, brake: &Brake, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
         let nu = model.inputs();
@@ -392,9 +449,7 @@ impl<'a> Planner<'a> {
                 }
             }
         }
-        let holds = times.len() - 1;
-        let last =
-            self.requirements.iter().map(|r| r.from).filter(|t| t.is_finite()).fold(times[0], f64::max);
+        let (holds, last) = (times.len() - 1, self.last(times[0]));
         let run = |side: &[f64], [size, part]: [f64; 2]| {
             let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
             let mut inputs = Vec::with_capacity(holds + 1);

@@ -77,6 +77,8 @@ pub(super) struct Descent {
     prices: Vec<f64>,
     /// The plant beside the best, once it is asked for: one linear model for every hold.
     linear: Option<Vec<Linear>>,
+    /// Whether it goes on however far it has come.
+    pub(super) is_wanted: bool,
 }
 
 impl Descent {
@@ -84,7 +86,7 @@ impl Descent {
         let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { PENALTY } else { 0.0 };
         let prices = guess.values.iter().map(price).collect();
         let trust = vec![TRUST; guess.inputs[0].len()];
-        Self { best: guess, trust, prices, linear: None }
+        Self { best: guess, trust, prices, linear: None, is_wanted: false }
     }
 }
 
@@ -194,7 +196,7 @@ impl Search<'_> {
     /// Improves the best of `descent`; at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
         for _ in 0..iterations {
-            let Descent { best, trust, prices, linear } = descent;
+            let Descent { best, trust, prices, linear, .. } = descent;
             if !best.merit.is_finite() || trust.iter().all(|t| *t < LEAST_TRUST) {
                 break;
             }

@@ -151,6 +151,6 @@ pub fn build(product: &Product) -> Result<Box<dyn Block>, ConfigurationError> {
     Ok(match &product.configuration {
         Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product.layout)?),
         Configuration::Plant(c) => Box::new(PlantBlock::new(c.clone(), product.layout)?),
-        Configuration::Controller(c) => Box::new(ControllerBlock::new(c.clone(), product.layout)),
+        Configuration::Controller(c) => Box::new(ControllerBlock::new(c.clone(), product.layout)?),
     })
 }

@@ -1,5 +1,9 @@
 //! `kind = "controller"`: a nominal controller, which gives the wanted input of a plant without any promise.
 
+use std::collections::BTreeMap;
+
+use punctual_core::scalar::Scalar;
+use punctual_models::Functions;
 use punctual_reference::nominal::Heading;
 use serde::Deserialize;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -7,14 +11,13 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use super::key::{
     Key, Section,
     Unit::Is,
-    Value::{Flag, Name, Number, Pair, Pairs, Table, Word},
+    Value::{Flag, Name, Number, Pair, Pairs, Table, TextByName, Word},
 };
+use super::model::{self, RawModel};
 use super::names::check_identifier;
-use super::reference::{self, RawReference};
+use super::plugin::NoPlugins;
 use super::words::words;
-use super::{
-    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, Range, ReferenceSection,
-};
+use super::{ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, Range};
 
 words! {
     /// The nominal controllers by name.
@@ -25,6 +28,8 @@ words! {
         Heading = "heading",
         /// [`Heading`] to one point after the other; the last is held.
         Waypoints = "waypoints",
+        /// An expression for each input.
+        Expressions = "expressions",
     }
 }
 
@@ -157,15 +162,27 @@ static GAINS: [Gain; 9] = [
 pub(super) static SECTION: Section = Section {
     name: "controller",
     keys: || {
-        static KEYS: [Key; 7] = [
+        static KEYS: [Key; 8] = [
             Key::new("kind", Word(&["controller"]), None, ""),
             Key::new("name", Name, Some("`controller`"), "the FMU's name"),
-            Key::new("plant", Table(&reference::SECTION), None, "`model`, `l_r`, `l_f` of a vehicle"),
+            Key::new(
+                "plant",
+                Table(&model::PLANT),
+                None,
+                "[the model](#models); a vehicle by name for all but `expressions`",
+            ),
             Key::new(
                 "controller",
                 Word(ControllerName::WORDS),
                 None,
-                "`damping`, `heading` to a goal, `waypoints` one after the other, the last one held (output `waypoint`)",
+                "`damping`, `heading` to a goal, `waypoints` one after the other, the last one held (output `waypoint`), or your \
+                 own `expressions`",
+            ),
+            Key::new(
+                "u_ref",
+                TextByName,
+                Some(""),
+                "`expressions`: for each input the [expression](#expressions) of what is wanted, of states, parameters and `t`",
             ),
             Key::new("goal", Pair(Is("m"), Range::FINITE), Some(""), "`heading`: the goal"),
             Key::new(
@@ -191,7 +208,7 @@ pub(super) static SECTION: Section = Section {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-enum ControllerKind {
+pub(super) enum ControllerKind {
     Controller,
 }
 
@@ -219,7 +236,8 @@ pub(super) struct RawController {
     turn_gain: Option<f64>,
     turn_limit: Option<f64>,
     slip_limit: Option<f64>,
-    plant: RawReference,
+    u_ref: Option<BTreeMap<String, String>>,
+    plant: RawModel,
     #[serde(default)]
     experiment: ExperimentSection,
 }
@@ -253,6 +271,11 @@ pub enum Controller {
         /// The way to a point, which takes the place of the goal.
         drive: Heading,
     },
+    /// An expression of states, parameters and time for each input, by name.
+    Expressions {
+        /// The expressions.
+        u_ref: BTreeMap<String, String>,
+    },
 }
 
 impl Controller {
@@ -262,6 +285,7 @@ impl Controller {
             Self::Damping { .. } => ControllerName::Damping.name(),
             Self::Heading { .. } => ControllerName::Heading.name(),
             Self::Waypoints { .. } => ControllerName::Waypoints.name(),
+            Self::Expressions { .. } => ControllerName::Expressions.name(),
         }
     }
 }
@@ -269,7 +293,7 @@ impl Controller {
 /// A controller FMU: from the state of a plant to `u_ref`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControllerConfiguration {
-    kind: ControllerKind,
+    pub(super) kind: ControllerKind,
     /// The FMU's name, a C identifier.
     pub name: String,
     /// The controller.
@@ -277,7 +301,7 @@ pub struct ControllerConfiguration {
     /// Whether outputs follow inputs without a step between them; with false, outputs are computed in steps only.
     pub direct_feedthrough: bool,
     /// The plant that it controls.
-    pub plant: ReferenceSection,
+    pub plant: PlantSection,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,
 }
@@ -298,6 +322,7 @@ impl Serialize for ControllerConfiguration {
                 }
             }
             Controller::Waypoints { points, .. } => map.serialize_entry("points", points)?,
+            Controller::Expressions { u_ref } => map.serialize_entry("u_ref", u_ref)?,
         }
         let mut reached = self.clone();
         for gain in &GAINS {
@@ -313,23 +338,36 @@ impl Serialize for ControllerConfiguration {
 
 impl ControllerConfiguration {
     /// Completes and checks `raw`.
-    pub(super) fn parse(raw: &RawController) -> Result<Self, ConfigurationError> {
+    pub(super) fn parse(mut raw: RawController) -> Result<Self, ConfigurationError> {
         let name = if raw.name.is_empty() { "controller".to_owned() } else { raw.name.clone() };
         check_identifier("name", &name)?;
-        let plant = ReferenceSection::parse(&raw.plant)?;
-        let (word, model) = (raw.controller.name(), plant.model);
+        if raw.plant.plugin.is_some() {
+            let message = "is for filters and plants; give `model`, or `states`, `inputs` and `derivatives`";
+            return Err(ConfigurationError::new("plant.plugin", message));
+        }
+        let plant = PlantSection::parse(std::mem::take(&mut raw.plant), &NoPlugins)?;
+        let word = raw.controller.name();
         let refuse = |field: &str, message: String| Err(ConfigurationError::new(field, message));
         // The controller must suit the plant.
-        if raw.controller != ControllerName::Damping
-            && matches!(
-                model,
-                ModelName::BicycleSmallSlipRate
-                    | ModelName::BicycleKinematic
-                    | ModelName::BicycleKinematicAngle
-            )
-        {
-            let message = format!("is {word:?}, which {} has none of; must be \"damping\"", model.name());
-            return refuse("controller", message);
+        match plant.model() {
+            None if raw.controller != ControllerName::Expressions => {
+                return refuse(
+                    "controller",
+                    format!("is {word:?}, which is for vehicles by name; must be \"expressions\""),
+                );
+            }
+            Some(
+                model @ (ModelName::BicycleSmallSlipRate
+                | ModelName::BicycleKinematic
+                | ModelName::BicycleKinematicAngle),
+            ) if matches!(raw.controller, ControllerName::Heading | ControllerName::Waypoints) => {
+                let message = format!(
+                    "is {word:?}, which {} has none of; must be \"damping\" or \"expressions\"",
+                    model.name()
+                );
+                return refuse("controller", message);
+            }
+            _ => {}
         }
         // The target, a goal or points, must be that of the controller.
         let none = |field: &str, given: bool| match given {
@@ -338,7 +376,16 @@ impl ControllerConfiguration {
         };
         let missing = |field: &str| ConfigurationError::new(field, format!("missing, {word} needs it"));
         let points = Some(raw.points.clone()).filter(|points| !points.is_empty());
+        if raw.controller != ControllerName::Expressions {
+            none("u_ref", raw.u_ref.is_some())?;
+        }
         let controller = match raw.controller {
+            ControllerName::Expressions => {
+                none("goal", raw.goal.is_some())?;
+                none("points", points.is_some())?;
+                none("goal_input", raw.goal_input)?;
+                Controller::Expressions { u_ref: raw.u_ref.clone().ok_or_else(|| missing("u_ref"))? }
+            }
             ControllerName::Damping => {
                 none("goal", raw.goal.is_some())?;
                 none("points", points.is_some())?;
@@ -368,10 +415,11 @@ impl ControllerConfiguration {
             experiment: raw.experiment,
         };
         for gain in &GAINS {
-            match ((gain.given)(raw), (gain.access)(&mut configuration)) {
+            match ((gain.given)(&raw), (gain.access)(&mut configuration)) {
                 (Some(value), Some(number)) => *number = value,
                 (Some(_), None) => {
-                    return refuse(gain.key.name, format!("{word} of {} has none", model.name()));
+                    let plant = configuration.plant.name();
+                    return refuse(gain.key.name, format!("{word} of {plant} has none"));
                 }
                 (None, _) => {}
             }
@@ -386,26 +434,37 @@ impl ControllerConfiguration {
         for parameter in configuration.parameters() {
             parameter.check(&mut configuration)?;
         }
+        configuration.functions::<f64>()?;
         Ok(configuration)
+    }
+
+    /// The expressions of `u_ref`, in the order of the inputs; none of a controller without.
+    ///
+    /// # Errors
+    ///
+    /// An input without expression, an expression without input, one that cannot be used.
+    pub fn functions<C: Scalar>(&self) -> Result<Option<Functions<C>>, ConfigurationError> {
+        let Controller::Expressions { u_ref } = &self.controller else { return Ok(None) };
+        self.plant.functions("u_ref", u_ref).map(Some)
     }
 
     /// The drive of a controller that has one.
     fn drive(&mut self) -> Option<&mut Heading> {
         match &mut self.controller {
-            Controller::Damping { .. } => None,
+            Controller::Damping { .. } | Controller::Expressions { .. } => None,
             Controller::Heading { drive, .. } | Controller::Waypoints { drive, .. } => Some(drive),
         }
     }
 
     /// The drive of a vehicle that turns.
     fn turning(&mut self) -> Option<&mut Heading> {
-        if self.plant.model == ModelName::PointMass { None } else { self.drive() }
+        if self.plant.model() == Some(ModelName::PointMass) { None } else { self.drive() }
     }
 
     /// The drive of a vehicle that is steered by its slip angle.
     fn slipping(&mut self) -> Option<&mut Heading> {
-        match self.plant.model {
-            ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip => {
+        match self.plant.model() {
+            Some(ModelName::Bicycle | ModelName::BicycleSmallSlip | ModelName::BicycleKinematicSlip) => {
                 self.drive()
             }
             _ => None,
@@ -449,8 +508,8 @@ impl ControllerConfiguration {
             let unit = unit.of_barrier("1", 0);
             rows.push(Parameter::new(names, unit, range, gain.description, gain.access));
         }
-        if reached.slipping().is_some() {
-            rows.extend(self.plant.parameters(|c: &mut Self| Some(&mut c.plant)));
+        if reached.slipping().is_some() || matches!(self.controller, Controller::Expressions { .. }) {
+            rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         }
         rows
     }
@@ -474,7 +533,8 @@ impl ControllerConfiguration {
 
     /// The damped states, each with the input that acts against it, by their positions.
     pub fn damped(&self) -> &'static [(usize, usize)] {
-        match self.plant.model {
+        let Some(model) = self.plant.model() else { return &[] };
+        match model {
             ModelName::PointMass => &[(2, 0), (3, 1)],
             ModelName::Unicycle
             | ModelName::Bicycle

@@ -8,18 +8,20 @@ use punctual_core::plan::Failure;
 use serde::{Deserialize, Serialize};
 
 use super::adding::{Adding, not_affine};
+use super::alone::within;
 use super::barrier::RawBarrier;
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
-    Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, Word},
+    Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, TextByName, Word},
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, is_reserved, taken};
 use super::words::words;
 use super::{
-    BarrierInput, BarrierSection, ConfigurationError, EXPERIMENT, ExperimentSection, IntegratorSection,
-    Parameter, PlantSection, PluginLoader, Range, VariableSection, barrier, integrator, model,
+    BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
+    IntegrationSection, IntegratorSection, Parameter, PlantSection, PluginLoader, Range, RunSection,
+    VariableSection, barrier, integrator, model, plant,
 };
 
 /// Size from which an input bound means "no bound": a finite number that every importer can read.
@@ -76,6 +78,7 @@ pub(super) struct RawFilter {
     correction_limit: f64,
     plant: RawModel,
     integrator: Option<IntegratorSection>,
+    policy: Option<BTreeMap<String, String>>,
     barrier: Vec<RawBarrier>,
     #[serde(default)]
     bounds: BTreeMap<String, [f64; 2]>,
@@ -83,6 +86,13 @@ pub(super) struct RawFilter {
     measurement_errors: BTreeMap<String, f64>,
     #[serde(default)]
     experiment: ExperimentSection,
+    #[serde(default)]
+    x0: BTreeMap<String, f64>,
+    u_ref: Option<BTreeMap<String, String>>,
+    simulated: Option<RawModel>,
+    #[serde(default)]
+    integration: IntegrationSection,
+    disturbance: Option<DisturbanceSection>,
 }
 
 /// A filter FMU. docs/configuration.md has units, ranges and defaults.
@@ -117,6 +127,10 @@ pub struct FilterConfiguration {
     /// The state of the plant that the filter commands and integrates itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrator: Option<IntegratorSection>,
+    /// An expression of states, parameters and time for each input of the plant, by name: a way to keep what is promised,
+    /// with which a search for a plan begins.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub policy: Option<BTreeMap<String, String>>,
     /// The safe sets, at least one.
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input; none is ±1e30.
@@ -127,6 +141,9 @@ pub struct FilterConfiguration {
     pub measurement_errors: BTreeMap<String, f64>,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,
+    /// What a run of this file alone has besides. It is no part of the FMU.
+    #[serde(skip)]
+    pub run: RunSection,
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -153,7 +170,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 14] = [
+        static KEYS: [Key; 20] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -210,6 +227,13 @@ pub(super) static SECTION: Section = Section {
                 "[a state that the filter commands and does not measure](#integrators)",
             ),
             Key::new(
+                "policy",
+                TextByName,
+                Some("none"),
+                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, of \
+                 states, parameters and `t`: a search for a plan begins with it too. Nothing rests on it",
+            ),
+            Key::new(
                 "direct_feedthrough",
                 Flag,
                 Some("`true`"),
@@ -223,6 +247,37 @@ pub(super) static SECTION: Section = Section {
                 "> 0: a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
             ),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
+            Key::new(
+                "x0",
+                NumberByName(Of("unit of the state"), Range::FINITE),
+                Some("as of a plant"),
+                "[a run of this file](#one-file): the start",
+            ),
+            Key::new(
+                "u_ref",
+                TextByName,
+                Some("0"),
+                "a run of this file: for each input the [expression](#expressions) of what is wanted, of states, parameters \
+                 and `t`",
+            ),
+            Key::new(
+                "simulated",
+                Table(&model::PLANT),
+                Some("that of the filter"),
+                "a run of this file: the model of the plant, where it is another",
+            ),
+            Key::new(
+                "integration",
+                Table(&plant::INTEGRATION),
+                Some(""),
+                "a run of this file: as of a plant",
+            ),
+            Key::new(
+                "disturbance",
+                Table(&plant::DISTURBANCE),
+                Some("none"),
+                "a run of this file: as of a plant",
+            ),
         ];
         KEYS.iter().collect()
     },
@@ -282,9 +337,21 @@ impl FilterConfiguration {
             correction_limit: raw.correction_limit,
             plant,
             integrator: raw.integrator,
+            policy: raw.policy,
             bounds: raw.bounds,
             measurement_errors: raw.measurement_errors,
             experiment: raw.experiment,
+            run: RunSection {
+                x0: raw.x0,
+                u_ref: raw.u_ref,
+                simulated: raw
+                    .simulated
+                    .map(|model| PlantSection::parse(model, loader))
+                    .transpose()
+                    .map_err(|e| within("simulated", &e))?,
+                integration: raw.integration,
+                disturbance: raw.disturbance,
+            },
         };
         configuration.check_sampling()?;
         configuration.complete_bounds()?;
@@ -301,9 +368,19 @@ impl FilterConfiguration {
             parameter.check(&mut configuration)?;
         }
         // The filter itself refuses what the ranges of single numbers cannot.
+        if let Some(policy) = &configuration.policy {
+            configuration.plant.functions::<f64>("policy", policy)?;
+            if configuration.assurance == AssuranceName::Off {
+                let message = "is for plans, of which there are none: assurance is \"off\"";
+                return Err(ConfigurationError::new("policy", message));
+            }
+        }
         configuration.unassured = configuration.why_unassured();
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
+        if configuration.run != RunSection::default() {
+            configuration.alone()?;
+        }
         Ok(configuration)
     }
 

@@ -1,5 +1,7 @@
 //! `[integrator]` of a filter: a state of its model that is commanded and not measured.
 
+use std::cell::RefCell;
+
 use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, SafetyFilter};
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
@@ -204,13 +206,20 @@ impl FilterConfiguration {
             return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
         }
         let period = self.experiment.step_size;
-        match &self.integrator {
+        let assured = match &self.integrator {
             None => AssuredFilter::new(filter, period),
             Some(section) => {
                 let integrated = self.integrated(filter, section).map_err(|e| e.to_string())?;
                 AssuredFilter::integrated(integrated, period)
             }
         }
-        .map_err(|e| e.to_string())
+        .map_err(|e| e.to_string())?;
+        let Some(policy) = &self.policy else { return Ok(assured) };
+        let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
+        let functions = RefCell::new(functions);
+        Ok(assured.policy(move |t: f64, x: &[f64], u: &mut [f64]| {
+            let values = &mut *functions.borrow_mut();
+            u.iter_mut().zip(values.at(t, |i| x[i])).for_each(|(u, value)| *u = value);
+        }))
     }
 }

@@ -5,6 +5,7 @@
 //! parameters: [`Parameter`] is the one table of their names, units, ranges and meaning.
 
 mod adding;
+mod alone;
 mod barrier;
 mod controller;
 mod external;
@@ -21,6 +22,7 @@ mod reference;
 mod unit;
 mod words;
 
+pub use alone::RunSection;
 pub use barrier::{
     Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
 };
@@ -103,7 +105,7 @@ impl Configuration {
         Ok(match kind {
             Kind::Filter => Self::Filter(FilterConfiguration::parse(read_toml(text)?, loader)?),
             Kind::Plant => Self::Plant(PlantConfiguration::parse(read_toml(text)?, loader)?),
-            Kind::Controller => Self::Controller(ControllerConfiguration::parse(&read_toml(text)?)?),
+            Kind::Controller => Self::Controller(ControllerConfiguration::parse(read_toml(text)?)?),
         })
     }
 
@@ -160,7 +162,7 @@ impl Configuration {
 }
 
 /// The files and their tables, each after the tables that contain it.
-pub static SECTIONS: [&Section; 12] = [
+pub static SECTIONS: [&Section; 11] = [
     &filter::SECTION,
     &barrier::SECTION,
     &model::PLANT,
@@ -171,7 +173,6 @@ pub static SECTIONS: [&Section; 12] = [
     &plant::INTEGRATION,
     &plant::DISTURBANCE,
     &controller::SECTION,
-    &reference::SECTION,
     &EXPERIMENT,
 ];
 

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_models::Model;
+use punctual_core::scalar::Scalar;
+use punctual_models::{Functions, Model};
 use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
@@ -85,7 +86,7 @@ impl From<&Signal> for VariableSection {
 }
 
 /// `[plant]` of a filter or plant as it stands in a file: the keys of every kind of plant.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, expecting = "struct PlantSection")]
 pub(super) struct RawModel {
     pub(super) model: Option<ModelName>,
@@ -397,16 +398,50 @@ impl PlantSection {
     ///
     /// An expression that cannot be used, by its path.
     pub fn expressions(&self) -> Result<Model, ConfigurationError> {
+        self.with_derivatives(&self.derivatives())
+    }
+
+    /// A model of expressions with its names and constants.
+    fn with_derivatives(&self, derivatives: &[&str]) -> Result<Model, ConfigurationError> {
         let (states, inputs) = (self.states(), self.inputs());
         let names =
             |variables: &[VariableSection]| variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
         let (states, inputs) = (names(&states), names(&inputs));
-        let derivatives = self.derivatives();
         let constants = self.reference().into_iter().flat_map(ReferenceSection::constants);
         let mut parameters: Vec<(&str, f64)> = constants.collect();
         parameters.extend(self.own_parameters().iter().map(|p| (p.name.as_str(), p.start)));
-        Model::new(&texts(&states), &texts(&inputs), &parameters, &derivatives)
+        Model::new(&texts(&states), &texts(&inputs), &parameters, derivatives)
             .map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
+    }
+
+    /// The values of an expression for each input, which stand in the table `field` by name, in the order of the inputs.
+    ///
+    /// # Errors
+    ///
+    /// An input without expression, an expression without input, one that cannot be used: by its path.
+    pub(super) fn functions<C: Scalar>(
+        &self,
+        field: &str,
+        given: &BTreeMap<String, String>,
+    ) -> Result<Functions<C>, ConfigurationError> {
+        let inputs = self.inputs();
+        let refuse =
+            |input: &str, message: String| Err(ConfigurationError::new(format!("{field}.{input}"), message));
+        if let Some(unknown) = given.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
+            let names: Vec<_> = inputs.iter().map(|s| s.name.as_str()).collect();
+            return refuse(unknown, format!("unknown input, must be one of {}", names.join(", ")));
+        }
+        let mut expressions = Vec::with_capacity(inputs.len());
+        for VariableSection { name, .. } in &inputs {
+            let Some(text) = given.get(name) else {
+                return refuse(name, "missing, every input needs one; \"0\" is one".into());
+            };
+            expressions.push((name.as_str(), text.as_str()));
+        }
+        // Whatever the derivatives are, be they affine or not.
+        self.with_derivatives(&vec!["0"; self.states().len()])?
+            .functions(&expressions)
+            .map_err(|e| ConfigurationError::new(format!("{field}.{}", e.field()), e.message()))
     }
 
     /// The expressions for the derivatives of its states, in order; none where no expressions are known.

@@ -177,7 +177,7 @@ pub(super) struct RawPlant {
 /// A plant FMU: `ẋ = f(x) + g(x) u` with held input u.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlantConfiguration {
-    kind: PlantKind,
+    pub(super) kind: PlantKind,
     /// The FMU's name, a C identifier.
     pub name: String,
     /// The plant's model.
@@ -196,33 +196,39 @@ pub struct PlantConfiguration {
 impl PlantConfiguration {
     /// Completes and checks `raw`.
     pub(super) fn parse(raw: RawPlant, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
-        let RawPlant { kind, mut name, plant, integration, disturbance, mut x0, experiment } = raw;
+        let RawPlant { kind: PlantKind::Plant, mut name, plant, integration, disturbance, x0, experiment } =
+            raw;
         if name.is_empty() {
             name = plant.model.map_or("plant", ModelName::name).to_owned();
         }
         check_identifier("name", &name)?;
         let plant = PlantSection::parse(plant, loader)?;
+        Self { kind: PlantKind::Plant, name, plant, integration, disturbance, x0, experiment }.completed()
+    }
+
+    /// Completes and checks what has a valid name and plant.
+    pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
+        let Self { plant, disturbance, x0, experiment, .. } = &mut self;
         let states = plant.states();
         if let Some(unknown) = x0.keys().find(|k| states.iter().all(|s| s.name != **k)) {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let message = format!("unknown state, must be one of {}", names.join(", "));
             return Err(ConfigurationError::new(format!("x0.{unknown}"), message));
         }
-        if let Some(disturbance) = &disturbance {
-            disturbance.check(&plant)?;
+        if let Some(disturbance) = disturbance {
+            disturbance.check(plant)?;
         }
         for state in states {
             let start = state.range().nearest(0.0);
             x0.entry(state.name).or_insert(start);
         }
         experiment.check()?;
-        let mut configuration = Self { kind, name, plant, integration, disturbance, x0, experiment };
-        for parameter in configuration.parameters() {
-            parameter.check(&mut configuration)?;
+        for parameter in self.parameters() {
+            parameter.check(&mut self)?;
         }
         // The plant itself refuses what the ranges of single numbers cannot.
-        configuration.build()?;
-        Ok(configuration)
+        self.build()?;
+        Ok(self)
     }
 
     /// The numbers that are parameters of the FMU; `x0.*` come first, in the order of the states.

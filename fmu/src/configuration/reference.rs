@@ -5,11 +5,10 @@ use punctual_reference::plants::{
     Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
     SteeredBicycle, Steering, Unicycle,
 };
-use serde::Deserialize;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::words::words;
-use super::{ConfigurationError, Key, Parameter, Range, Section, Unit, Value};
+use super::{ConfigurationError, Key, Parameter, Range, Unit, Value};
 
 words! {
     /// The reference plants by name.
@@ -99,29 +98,14 @@ pub(super) const L_F: Key = Key::new(
 );
 const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
 
-/// `[plant]` of a controller.
-pub(super) static SECTION: Section = Section {
-    name: "vehicle",
-    keys: || {
-        static KEYS: [Key; 3] = [
-            Key::new("model", Value::Word(ModelName::WORDS), None, "a [vehicle](#models) by name"),
-            L_R,
-            L_F,
-        ];
-        KEYS.iter().collect()
-    },
-};
-
-/// `[plant]` of a controller as it stands in a file, and what a reference plant has of the `[plant]` of others.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, expecting = "struct ReferenceSection")]
+/// What a reference plant has of `[plant]` in a file.
 pub(super) struct RawReference {
     pub(super) model: ModelName,
     pub(super) l_r: Option<f64>,
     pub(super) l_f: Option<f64>,
 }
 
-/// A reference plant with its constants: `[plant]` of a controller, or of a filter or plant without expressions.
+/// A reference plant with its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSection {
     /// The plant's model.

@@ -226,7 +226,7 @@ defects! {
     turn_limit_of_a_point_mass: HEADING, "\"unicycle\" }" => "\"point_mass\" }\nturn_limit = 1.0",
         "turn_limit: heading of point_mass has none";
     heading_of_a_bicycle_steered_by_a_rate: HEADING, "\"unicycle\"" => "\"bicycle_kinematic\"",
-        "controller: is \"heading\", which bicycle_kinematic has none of; must be \"damping\"";
+        "controller: is \"heading\", which bicycle_kinematic has none of; must be \"damping\" or \"expressions\"";
     no_points: WAYPOINTS, "points = [[4.0, 3.0], [5.0, 6.0]]" => "points = []",
         "points: missing, waypoints needs it";
     infinite_point: WAYPOINTS, "[5.0, 6.0]" => "[5.0, inf]", "points[1][2]: is inf, must be finite";
@@ -280,6 +280,52 @@ fn unknown_and_missing_keys_and_wrong_types() {
     }
 }
 
+/// A controller of expressions.
+const EXPRESSIONS: &str = "kind = \"controller\"\ncontroller = \"expressions\"\nplant.model = \"bicycle\"\nplant.l_r = 2.0\n\
+                           u_ref.a = \"-v\"\nu_ref.beta = \"l_r * sin(t - theta)\"\n";
+
+/// A filter with a policy.
+const POLICY: &str = "kind = \"filter\"\nplant.model = \"unicycle\"\npolicy.a = \"-v\"\npolicy.omega = \"2 - theta\"\n\
+                      bounds = { a = [-4.0, 4.0], omega = [-2.0, 2.0] }\n\
+                      [[barrier]]\nname = \"goal\"\ncentre = [1.0, 2.0]\nradius = 1.0\ndeadline = 5.0\n";
+
+#[test]
+fn expressions_of_inputs_are_checked() {
+    for (valid, from, to, wanted) in [
+        (EXPRESSIONS, "u_ref.a", "u_ref.b", "u_ref.b: unknown input, must be one of a, beta"),
+        (EXPRESSIONS, "u_ref.a = \"-v\"", "", "u_ref.a: missing, every input needs one; \"0\" is one"),
+        (
+            EXPRESSIONS,
+            "\"-v\"",
+            "\"-v + beta\"",
+            "u_ref.a: names beta, an input, which it does not depend on",
+        ),
+        (EXPRESSIONS, "\"expressions\"", "\"damping\"", "u_ref: damping has none"),
+        (EXPRESSIONS, "u_ref.a =", "gain = 2.0\nu_ref.a =", "gain: expressions of bicycle has none"),
+        (
+            EXPRESSIONS,
+            "plant.model = \"bicycle\"",
+            "plant.plugin = \"arm\"",
+            "plant.plugin: is for filters and plants; give `model`, or `states`, `inputs` and `derivatives`",
+        ),
+        (POLICY, "policy.a", "policy.b", "policy.b: unknown input, must be one of a, omega"),
+        (
+            POLICY,
+            "\"2 - theta\"",
+            "\"2 - thta\"",
+            "policy.omega: names thta, which is unknown (did you mean theta?); the names are x_p, y_p, theta, v",
+        ),
+        (
+            POLICY,
+            "policy.a",
+            "assurance = \"off\"\npolicy.a",
+            "policy: is for plans, of which there are none: assurance is \"off\"",
+        ),
+    ] {
+        assert_eq!(refusal(valid, from, to), wanted, "{to}");
+    }
+}
+
 /// Every model.
 const MODELS: [&str; 8] = [
     "point_mass",
@@ -296,6 +342,8 @@ const MODELS: [&str; 8] = [
 fn every_kind() -> Vec<String> {
     let mut texts = vec![FILTER.to_owned(), PLANT.to_owned(), HEADING.to_owned(), WAYPOINTS.to_owned()];
     texts.push(STEERED.to_owned());
+    texts.push(EXPRESSIONS.to_owned());
+    texts.push(POLICY.to_owned());
     texts.push(FILTER.replace("bounds =", "measurement_errors = { y_p = 0.1, v = 0.2 }\nbounds ="));
     texts.push(format!("{FILTER}disturbance = 0.5\n"));
     texts.push(format!("{PLANT}[disturbance]\nseed = 3\ninputs = {{ a = 0.5 }}\nmeasurements.v = 0.1\n"));
@@ -432,7 +480,6 @@ fn defaults_of_the_tables_are_those_of_the_files() {
         (plant, "experiment"),
         (plant, "model"),
         (controller, "controller"),
-        (controller, "vehicle"),
         (&heading, "controller"),
         (WAYPOINTS, "controller"),
     ] {
@@ -444,7 +491,7 @@ fn defaults_of_the_tables_are_those_of_the_files() {
             let table = match place {
                 "filter" | "plant" | "controller" => &mut file,
                 "barrier" => file["barrier"][0].as_table_mut().unwrap(),
-                "model" | "vehicle" => file["plant"].as_table_mut().unwrap(),
+                "model" => file["plant"].as_table_mut().unwrap(),
                 place => file[place].as_table_mut().unwrap(),
             };
             table.insert(key.name.to_owned(), value);

@@ -154,3 +154,47 @@ fn a_state_that_is_not_finite_gives_no_number() {
         }
     }
 }
+
+#[test]
+fn expressions_are_computed_as_written() {
+    let mut bench = Bench::new(
+        "unicycle",
+        "controller = \"expressions\"\nu_ref = { a = \"-0.5 * v + x_p / 8\", omega = \"3 * sin(atan2(-y_p, 4 - x_p) - theta)\" }",
+    );
+    for x in STATES {
+        let wanted = [-0.5 * x[3] + x[0] / 8.0, 3.0 * ((-x[1]).atan2(4.0 - x[0]) - x[2]).sin()];
+        let found = bench.sample(&x).map(f64::from_bits);
+        for (found, wanted) in found.iter().zip(wanted) {
+            // The order of operations is the same, the functions need not be.
+            assert!((found - wanted).abs() <= 1e-14 * (1.0 + wanted.abs()), "{found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn expressions_have_states_parameters_and_time_of_a_model_of_ones_own() {
+    let text = "kind = \"controller\"\ncontroller = \"expressions\"\n[plant]\n\
+                states = [{ name = \"p\" }, { name = \"v\" }]\ninputs = [{ name = \"F\" }]\n\
+                parameters = [{ name = \"k\", start = 2.0 }]\n\
+                [plant.derivatives]\np = \"v\"\nv = \"F\"\n[u_ref]\nF = \"-k * p^2 + sin(t)\"\n";
+    let product = Configuration::parse(text).and_then(Product::new).unwrap();
+    let mut values = Values::zeros(product.variables.len());
+    let k = product.layout.parameters;
+    assert_eq!(product.variables[k].name, "k");
+    (values.reals[0], values.reals[k]) = (3.0, 2.5);
+    let mut block = build(&product).unwrap();
+    block.configure(&values).unwrap();
+    block.output(0.25, &mut values);
+    let u = product.layout.outputs;
+    assert_eq!(values.reals[u], -2.5 * 9.0 + 0.25_f64.sin());
+    // Along p.
+    let mut derivative = vec![0.0; values.reals.len()];
+    let mut direction = derivative.clone();
+    direction[0] = 1.0;
+    block.differentiate(0.25, &values, &direction, &mut derivative).unwrap();
+    assert_eq!(derivative[u], -2.5 * 2.0 * 3.0);
+    // What is not a number is handed on as such.
+    values.reals[0] = f64::NAN;
+    block.output(0.25, &mut values);
+    assert!(values.reals[u].is_nan());
+}
