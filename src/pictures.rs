@@ -2,13 +2,186 @@
 
 use std::path::Path;
 
-use crate::coupling::{PathPicture, Picture, TimePicture, Variant};
+use punctual_fmu::configuration::{BarrierSection, Configuration, FilterConfiguration, RESOURCE, UNBOUNDED};
+
+use crate::coupling::{
+    Component, DiscEntry, Model, PathEntry, PathPicture, Picture, StartValue, System, TimePicture, Variant,
+};
 use crate::error::Error;
+use crate::host::Causality;
 use crate::plot::{self, Disc, Mark, PathPlot, Scale, Series, Style, TimePlot};
-use crate::recording::Recording;
+use crate::recording::{Column, Recording};
 
 /// Percentiles between which [`Variant::Clipped`] shows values.
 const BULK: (f64, f64) = (1.0, 99.0);
+
+/// Names of two states that are the axes of a plane.
+const PLANES: [[&str; 2]; 4] = [["x_p", "y_p"], ["x", "y"], ["px", "py"], ["p_x", "p_y"]];
+
+/// The pictures of a system that asks for none: the paths where there is a plane, h with its lower bound for every filter,
+/// every input with its limits. Of the signals in `recorded` alone.
+pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Picture> {
+    let components: Vec<_> = system.components().iter().zip(models).map(|(c, m)| Part(c, m)).collect();
+    let is_recorded = |signal: &String| recorded.iter().any(|column| column.name == *signal);
+    let mut pictures: Vec<Picture> =
+        plane(&components, &is_recorded).into_iter().map(Picture::Path).collect();
+    for part in &components {
+        let all = |names: Vec<String>| Some(names).filter(|names| names.iter().all(is_recorded));
+        for (name, unit, barriers) in part.barriers() {
+            let signals =
+                |field: &str| barriers.iter().map(|b| part.signal(&format!("{b}.{field}"))).collect();
+            let (Some(signals), Some(dashed)) = (all(signals("h")), all(signals("profile"))) else {
+                continue;
+            };
+            let mut deadlines = barriers.iter().filter_map(|b| part.number(&format!("{b}.deadline")));
+            pictures.push(Picture::Time(TimePicture {
+                name: Some(name),
+                title: None,
+                signals,
+                dashed,
+                ylabel: Some(format!("h, and what it may not fall below ({unit})")),
+                deadline: deadlines.next().filter(|_| deadlines.next().is_none()),
+                bounds: vec![0.0],
+                scale: Variant::Linear,
+            }));
+        }
+        for input in part.inputs() {
+            let (u, wanted) = (part.signal(&format!("u.{input}")), part.signal(&format!("u_ref.{input}")));
+            let limits = ["u_min", "u_max"].map(|side| part.number(&format!("{side}.{input}")));
+            let Some(signals) = all(vec![u]) else { continue };
+            pictures.push(Picture::Time(TimePicture {
+                name: Some(part.file(&format!("u-{input}"))),
+                title: None,
+                signals,
+                dashed: all(vec![wanted]).unwrap_or_default(),
+                ylabel: None,
+                deadline: None,
+                bounds: limits.into_iter().flatten().filter(|limit| limit.abs() < UNBOUNDED).collect(),
+                scale: Variant::Linear,
+            }));
+        }
+    }
+    pictures
+}
+
+/// A component and what it is made of.
+struct Part<'a>(&'a Component, &'a Model);
+
+impl Part<'_> {
+    fn signal(&self, variable: &str) -> String {
+        format!("{}.{variable}", self.0.name)
+    }
+
+    /// The name of a picture of this component alone, `what` it shows.
+    fn file(&self, what: &str) -> String {
+        match self.0.name.as_str() {
+            "filter" => what.to_owned(),
+            name => format!("{}-{what}", name.replace(['/', '\\', '\0'], "_")),
+        }
+    }
+
+    /// The start value of a Real variable.
+    fn number(&self, variable: &str) -> Option<f64> {
+        let description = self.1.description();
+        let start = description.variables[description.index_of(variable)?].kind.start_number();
+        self.0.start.get(variable).map_or(start, StartValue::number)
+    }
+
+    /// The filter, where it is one of this program.
+    fn filter(&self) -> Option<FilterConfiguration> {
+        match self.1 {
+            Model::Own(own, _) => Some(own.configuration.clone()),
+            Model::Fmu(fmu) => fmu.resource(RESOURCE).and_then(|text| Configuration::parse(&text).ok()),
+        }
+        .and_then(|configuration| match configuration {
+            Configuration::Filter(filter) => Some(filter),
+            _ => None,
+        })
+    }
+
+    /// The barriers with h in one unit, by the name of their picture.
+    fn barriers(&self) -> Vec<(String, String, Vec<String>)> {
+        let mut groups: Vec<(String, String, Vec<String>)> = Vec::new();
+        for variable in &self.1.description().variables {
+            let Some(barrier) = variable.name.strip_suffix(".profile") else { continue };
+            let unit = variable.kind.unit().unwrap_or("1");
+            match groups.iter_mut().find(|(_, of, _)| of == unit) {
+                Some((.., barriers)) => barriers.push(barrier.to_owned()),
+                None => {
+                    let number =
+                        if groups.is_empty() { String::new() } else { format!("-{}", groups.len() + 1) };
+                    groups.push((
+                        self.file(&format!("h{number}")),
+                        unit.to_owned(),
+                        vec![barrier.to_owned()],
+                    ));
+                }
+            }
+        }
+        groups
+    }
+
+    /// The inputs that it hands out.
+    fn inputs(&self) -> Vec<&str> {
+        let outputs = self.1.description().variables.iter().filter(|v| v.causality == Causality::Output);
+        outputs.filter_map(|v| v.name.strip_prefix("u.")).collect()
+    }
+
+    /// The discs of its barriers that stay where they are.
+    fn discs(&self) -> Vec<DiscEntry> {
+        let filter = self.filter();
+        let sections = filter.iter().flat_map(|filter| &filter.barrier);
+        let disc = |section: &BarrierSection| {
+            let number = |field: &str| self.number(&format!("{}.{field}", section.name));
+            let still = ["velocity[1]", "velocity[2]"].iter().all(|v| number(v).unwrap_or(0.0) == 0.0);
+            let obstacle = match section.shape.name() {
+                "disc" | "quadratic_disc" => false,
+                "obstacle" => true,
+                _ => return None,
+            };
+            let label = Some(section.name.clone()).filter(|_| !obstacle);
+            let (x, y, radius) = (number("centre[1]")?, number("centre[2]")?, number("radius")?);
+            still.then_some(DiscEntry { centre: [x, y], radius, label, obstacle })
+        };
+        sections.filter_map(disc).collect()
+    }
+
+    /// The barrier with the first deadline.
+    fn goal(&self) -> Option<String> {
+        let variables = &self.1.description().variables;
+        variables.iter().find_map(|v| v.name.strip_suffix(".deadline")).map(str::to_owned)
+    }
+}
+
+/// The paths of all components that move in a plane, with the discs of all filters.
+fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<PathPicture> {
+    let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
+    let arrival = arrival.filter(is_recorded);
+    let mut paths = parts.iter().flat_map(|part| {
+        PLANES.iter().filter_map(|axes| {
+            let [x, y] = axes.map(|axis| part.signal(&format!("x.{axis}")));
+            let moves = |signal: &str| {
+                let description = part.1.description();
+                let found = signal.split_once('.').and_then(|(_, name)| description.index_of(name));
+                found.is_some_and(|i| description.variables[i].causality == Causality::Output)
+            };
+            (moves(&x) && moves(&y) && is_recorded(&x) && is_recorded(&y)).then_some((x, y))
+        })
+    });
+    let (x, y) = paths.next()?;
+    let more: Vec<_> = paths.map(|(x, y)| PathEntry { x, y, label: None, arrival: None }).collect();
+    Some(PathPicture {
+        name: Some("path".to_owned()),
+        title: None,
+        // With several vehicles it is not known whose arrival it is.
+        arrival: arrival.filter(|_| more.is_empty()),
+        x,
+        y,
+        label: None,
+        more,
+        discs: parts.iter().flat_map(Part::discs).collect(),
+    })
+}
 
 /// Draws `picture` from `recording` into the SVG file `file`.
 ///
@@ -53,7 +226,7 @@ fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error>
                 label: disc.label.clone().unwrap_or_default(),
                 centre: disc.centre,
                 radius: disc.radius,
-                obstacle: false,
+                obstacle: disc.obstacle,
             })
             .collect(),
     })

@@ -12,11 +12,10 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
-use super::in_process::InProcess;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{Simulation, System, links, port};
+use crate::coupling::{InProcess, Own, Simulation, System, links, port};
 use crate::error::Error;
-use crate::host::{Causality, Description, Fmu, ScalarType};
+use crate::host::{Causality, Fmu, ScalarType};
 use crate::package;
 
 /// A campaign file as it is written.
@@ -144,9 +143,7 @@ pub struct Choice {
 pub struct Campaign {
     source: Source,
     system: System,
-    configurations: Vec<Configuration>,
-    guids: Vec<String>,
-    descriptions: Vec<Description>,
+    models: Vec<Own>,
     varied: Vec<Varied>,
     sampler: Sampler,
     runs: u64,
@@ -213,24 +210,19 @@ impl Campaign {
             in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))
         })?;
         // The components, from their configurations.
-        let (mut configurations, mut guids, mut descriptions) = (Vec::new(), Vec::new(), Vec::new());
-        for text in &source.configurations {
-            let product = parsed(text).and_then(Product::new)?;
-            let xml = product.model_description().to_xml();
-            let xml = xml.map_err(|e| Error::configuration("", e.to_string()))?;
-            let name = Path::new(product.configuration.name());
-            descriptions.push(Description::parse(&xml).map_err(|problem| Error::fmu(name, problem))?);
-            guids.push(product.guid);
-            configurations.push(product.configuration);
-        }
-        let refer: Vec<_> = descriptions.iter().collect();
+        let models = source
+            .configurations
+            .iter()
+            .map(|text| Own::new(parsed(text)?))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let refer: Vec<_> = models.iter().map(|model| &model.description).collect();
         let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
         // The varied variables.
         let mut varied = Vec::new();
         for (name, section) in &file.vary {
             let field = format!("vary.{name:?}");
             let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
-            let variable = &descriptions[port.component].variables[port.variable];
+            let variable = &refer[port.component].variables[port.variable];
             let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
             let of = variable.kind.scalar_type();
             if !settable || of != ScalarType::Real {
@@ -256,7 +248,7 @@ impl Campaign {
         }
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
-        Ok(Self { source, system, configurations, guids, descriptions, varied, sampler, runs, success })
+        Ok(Self { source, system, models, varied, sampler, runs, success })
     }
 
     /// The texts it is made of.
@@ -269,14 +261,9 @@ impl Campaign {
         &self.system
     }
 
-    /// The configurations of the components.
-    pub fn configurations(&self) -> &[Configuration] {
-        &self.configurations
-    }
-
-    /// The model descriptions of the components.
-    pub fn descriptions(&self) -> &[Description] {
-        &self.descriptions
+    /// The components, in the order of the system.
+    pub fn models(&self) -> &[Own] {
+        &self.models
     }
 
     /// The varied variables, by name.
@@ -311,10 +298,8 @@ impl Campaign {
     ///
     /// A signal to record or draw that does not exist.
     pub fn simulation(&self, system: &System) -> Result<Simulation<InProcess>, Error> {
-        let descriptions: Vec<_> = self.descriptions.iter().collect();
-        let instance = |c: usize| {
-            InProcess::new(&system.components()[c].name, self.configurations[c].clone(), &self.guids[c])
-        };
+        let descriptions: Vec<_> = self.models.iter().map(|model| &model.description).collect();
+        let instance = |c: usize| self.models[c].instance(&system.components()[c].name);
         Simulation::assembled(system, &descriptions, instance)
     }
 

@@ -4,9 +4,8 @@ use punctual_core::filter::{Standing, Status};
 use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
-use super::in_process::InProcess;
 use super::table::{Cell, Column, Kind, Row};
-use crate::coupling::{Kept, Promise, Simulation};
+use crate::coupling::{InProcess, Kept, Own, Promise, Simulation};
 use crate::error::Error;
 
 /// A filter of the system.
@@ -47,10 +46,9 @@ impl Measures {
     /// Measures for the runs of `campaign`.
     pub fn new(campaign: &Campaign) -> Self {
         let mut filters = Vec::new();
-        for (c, configuration) in campaign.configurations().iter().enumerate() {
+        for (c, Own { configuration, description, .. }) in campaign.models().iter().enumerate() {
             let Configuration::Filter(filter) = configuration else { continue };
             let component = &campaign.system().components()[c];
-            let description = &campaign.descriptions()[c];
             let unit = |variable: &str| {
                 let found = description.index_of(variable).map(|i| &description.variables[i]);
                 found.and_then(|v| v.kind.unit()).unwrap_or_default().to_owned()

@@ -6,7 +6,6 @@
 
 mod distribution;
 mod file;
-mod in_process;
 mod measures;
 mod runner;
 mod sampling;
@@ -16,7 +15,6 @@ mod table;
 
 pub use distribution::{Distribution, VarySection};
 pub use file::{Campaign, Choice, Source, Success, Varied};
-pub use in_process::InProcess;
 pub use measures::Measures;
 pub use runner::{Options, Progress, recorded, run, version};
 pub use sampling::{Sampler, Sampling};

@@ -18,10 +18,9 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::file::{Campaign, Source};
-use super::in_process::InProcess;
 use super::measures::Measures;
 use super::table::{GROUP, Reader, Row, Writer};
-use crate::coupling::Simulation;
+use crate::coupling::{InProcess, Simulation};
 use crate::error::Error;
 
 /// Time that the runs of a segment take together: the most that is lost when the process is killed.

@@ -1,4 +1,4 @@
-//! `punctual run`: couples FMUs as a system file says.
+//! `punctual run`: couples FMUs as a system file says, or simulates what a filter's file has.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -6,22 +6,26 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_fmu::configuration::{Configuration, read_toml};
 use serde::Serialize;
 
-use crate::coupling::{Kept, Order, Outcome, Picture, Promise, Simulation, System};
+use crate::coupling::{self, Kept, Model, Order, Outcome, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
 use crate::output::{self, Progress};
+use crate::package;
 use crate::pictures;
 use crate::recording::{self, Recording};
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The system file (TOML): experiment, components, connections, pictures
+    /// The system file (TOML): experiment, components, connections, pictures; or the file of a filter, which runs with its
+    /// own model from its `x0`
     system: PathBuf,
-    /// Write the CSV file (named as the system) and the pictures into this folder
+    /// Write the CSV file (named as the system) and the pictures into this folder [default: for a filter's file, a
+    /// folder named as the file]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print JSON instead of text
@@ -159,14 +163,48 @@ fn stream(rows: &mut Option<File>, write: impl FnOnce(&mut Vec<u8>) -> io::Resul
     }
 }
 
+/// A system ready to run.
+struct Opened {
+    system: System,
+    models: Vec<Model>,
+    simulation: Simulation,
+    /// The folder for what is written.
+    out: Option<PathBuf>,
+}
+
+/// Opens a system file, or the file of a filter.
+fn open(arguments: &Arguments) -> Result<Opened, Error> {
+    #[derive(serde::Deserialize)]
+    struct Head {
+        kind: Option<serde::de::IgnoredAny>,
+    }
+    let (path, out) = (&arguments.system, arguments.out.clone());
+    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+    if !read_toml::<Head>(&text).is_ok_and(|head| head.kind.is_some()) {
+        let system = System::parse(&text)?;
+        let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;
+        return Ok(Opened { system, models, simulation, out });
+    }
+    let (system, models) = match package::read_configuration(path)? {
+        Configuration::Filter(filter) => coupling::alone(path, filter)?,
+        other => {
+            let message = format!(
+                "is {:?}; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
+                other.kind()
+            );
+            return Err(Error::configuration("kind", message));
+        }
+    };
+    let simulation = Simulation::of(&system, &models)?;
+    let out = Some(out.unwrap_or_else(|| stem(path).into()));
+    Ok(Opened { system, models, simulation, out })
+}
+
 /// Runs the system in this process; each row also goes to `rows` at once.
 fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error> {
     let path = &arguments.system;
-    let system = System::read(path)?;
-    let base = path.parent().unwrap_or(Path::new(""));
-    let mut simulation = Simulation::new(&system, base).map_err(|e| e.in_file(path))?;
-
-    if let Some(folder) = &arguments.out {
+    let Opened { system, models, mut simulation, out } = open(arguments).map_err(|e| e.in_file(path))?;
+    if let Some(folder) = &out {
         // The folder is made before the run, which may be long.
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
@@ -182,18 +220,24 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     drop(progress);
 
     if let Some(failure) = outcome.failure {
-        if let Some(folder) = &arguments.out {
+        if let Some(folder) = &out {
             let csv = csv_file(path, folder);
             outcome.recording.save_csv(&csv)?;
             output::note(&format!("note: what was recorded until then is in {}", csv.display()));
         }
         return Err(failure);
     }
-    let files = match &arguments.out {
-        Some(folder) => write_files(system.pictures(), &stem(path), folder, &outcome.recording)?,
+    let files = match &out {
+        Some(folder) => {
+            let usual = match system.pictures() {
+                [] => pictures::usual(&system, &models, outcome.recording.columns()),
+                asked => asked.to_vec(),
+            };
+            write_files(&usual, &stem(path), folder, &outcome.recording)?
+        }
         None => Vec::new(),
     };
-    let report = report(path, &system, &simulation, outcome, files);
+    let report = report(path, &system, &models, outcome, files);
     for note in &report.notes {
         output::note(&format!("note: {note}"));
     }
@@ -236,13 +280,7 @@ pub(super) fn write_files(
     Ok(files.iter().map(|file| file.display().to_string()).collect())
 }
 
-fn report(
-    path: &Path,
-    system: &System,
-    simulation: &Simulation,
-    outcome: Outcome,
-    files: Vec<String>,
-) -> Report {
+fn report(path: &Path, system: &System, models: &[Model], outcome: Outcome, files: Vec<String>) -> Report {
     let recording = &outcome.recording;
     let signal = |index: usize| {
         let column = &recording.columns()[index];
@@ -257,12 +295,14 @@ fn report(
     Report {
         system: path.display().to_string(),
         order: system.experiment().order,
-        components: simulation
+        components: system
             .components()
-            .map(|(name, fmu)| ComponentReport {
-                name: name.to_owned(),
-                fmu: fmu.path().display().to_string(),
-                model: fmu.description().model_name.clone(),
+            .iter()
+            .zip(models)
+            .map(|(component, model)| ComponentReport {
+                name: component.name.clone(),
+                fmu: model.path().display().to_string(),
+                model: model.description().model_name.clone(),
             })
             .collect(),
         steps: outcome.statistics.steps,

@@ -4,7 +4,7 @@
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::instance::Instance;
 
-use crate::coupling::Participant;
+use super::Participant;
 use crate::error::Error;
 
 /// An instance in this process.

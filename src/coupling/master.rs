@@ -13,23 +13,22 @@
 //! Jacobi order: at t_k all inputs are set to the values read after the previous step, the row is recorded, all
 //! step, all is read.
 
-use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::grid::Grid;
 use super::layout::{Layout, Recorder};
+use super::model::Model;
 use super::network::{self, Network, Start};
 use super::participant::Participant;
 use super::ports::{Group, Source};
 use super::promises::{self, Promise, Watched};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
-use crate::host::{Description, Fmu, Slave};
+use crate::host::Description;
 use crate::recording::{Column, Recording};
 
 /// A component while it runs.
-#[derive(Debug)]
 struct Member<P> {
     participant: P,
     starts: Vec<Start>,
@@ -42,8 +41,7 @@ struct Member<P> {
 }
 
 /// A coupled system of FMUs or of other participants, ready to run.
-#[derive(Debug)]
-pub struct Simulation<P = Slave> {
+pub struct Simulation<P = Box<dyn Participant>> {
     members: Vec<Member<P>>,
     /// Components with direct feedthrough, in running order.
     direct: Vec<usize>,
@@ -102,56 +100,41 @@ impl Statistics {
     }
 }
 
-fn instantiate(fmu: Rc<Fmu>, name: &str) -> Result<Slave, Error> {
-    Slave::instantiate(fmu, name).map_err(|e| e.in_component(name))
-}
-
-impl Simulation<Slave> {
-    /// Opens the FMUs of `system`, found relative to the folder `base`, and instantiates them.
+impl Simulation<Box<dyn Participant>> {
+    /// Opens the FMUs and configurations of `system`, found relative to the folder `base`, and instantiates them. Returns
+    /// them too, in the order of the components.
     ///
     /// # Errors
     ///
-    /// An FMU that cannot be opened, loaded or instantiated; a connection, start value, recorded
-    /// signal or picture that does not fit the FMUs (with the field of the system file).
-    pub fn new(system: &System, base: &Path) -> Result<Self, Error> {
-        let mut opened: Vec<(PathBuf, Rc<Fmu>)> = Vec::new();
-        let mut fmus = Vec::new();
+    /// An FMU that cannot be opened, loaded or instantiated; a configuration that cannot be used; a connection, start value,
+    /// recorded signal or picture that does not fit them (with the field of the system file).
+    pub fn new(system: &System, base: &Path) -> Result<(Self, Vec<Model>), Error> {
+        let mut models: Vec<Model> = Vec::new();
         for (i, component) in system.components().iter().enumerate() {
             let path = base.join(&component.fmu);
             if !path.exists() {
                 let message = format!(
-                    "there is no file {}; `punctual build` makes an FMU from a configuration",
+                    "there is no file {}; it is an FMU, or the .toml file that `punctual build` makes one from",
                     path.display()
                 );
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            let shared = opened.iter().find(|(other, fmu)| {
-                *other == path && !fmu.description().co_simulation.can_be_instantiated_only_once_per_process
-            });
-            let fmu = match shared {
-                Some((_, fmu)) => Rc::clone(fmu),
-                None => Rc::new(Fmu::open(&path).map_err(|e| e.in_component(&component.name))?),
-            };
-            opened.push((path, Rc::clone(&fmu)));
-            fmus.push(fmu);
+            models.push(Model::open(&path, &models).map_err(|e| e.in_component(&component.name))?);
         }
-        Self::with_fmus(system, &fmus)
+        Ok((Self::of(system, &models)?, models))
     }
 
-    /// Instantiates `fmus`, one for each component of `system`, in order. The paths in the system are not used.
+    /// Instantiates `models`, one for each component of `system`, in order. The paths in the system are not used.
     ///
     /// # Errors
     ///
-    /// As for [`Simulation::new`]; or not one FMU for each component.
-    pub fn with_fmus(system: &System, fmus: &[Rc<Fmu>]) -> Result<Self, Error> {
-        let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
-        let slave = |c: usize| instantiate(Rc::clone(&fmus[c]), &system.components()[c].name);
-        Self::assembled(system, &descriptions, slave)
-    }
-
-    /// Component names and their FMUs, in the system's order.
-    pub fn components(&self) -> impl Iterator<Item = (&str, &Rc<Fmu>)> {
-        self.members.iter().map(|member| (member.participant.name(), member.participant.fmu()))
+    /// As for [`Simulation::new`]; or not one model for each component.
+    pub fn of(system: &System, models: &[Model]) -> Result<Self, Error> {
+        let descriptions: Vec<_> = models.iter().map(Model::description).collect();
+        Self::assembled(system, &descriptions, |c| {
+            let name = &system.components()[c].name;
+            models[c].instance(name).map_err(|e| e.in_component(name))
+        })
     }
 }
 

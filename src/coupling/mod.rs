@@ -1,18 +1,24 @@
 //! Couples FMUs. A system file says which FMUs, how they are wired and for how long; a fixed-step master runs
 //! them and records. Knows FMUs only through [`crate::host`], and steps any [`Participant`].
 
+mod alone;
 mod graph;
 mod grid;
+mod in_process;
 mod layout;
 mod master;
+mod model;
 mod network;
 mod participant;
 mod ports;
 mod promises;
 mod system;
 
+pub use alone::alone;
 pub use grid::Grid;
+pub use in_process::InProcess;
 pub use master::{Outcome, Simulation, Statistics};
+pub use model::{Model, Own};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;
 pub use promises::{Kept, Promise};

@@ -1,5 +1,7 @@
 //! The calls of FMI 2.0 co-simulation that the master makes, whoever answers them.
 
+use std::borrow::BorrowMut;
+
 use punctual_fmu::fmi2::Status;
 
 use crate::error::Error;
@@ -98,11 +100,27 @@ pub trait Participant {
     fn remark(&self) -> Option<String>;
 }
 
-/// Passes calls on to a slave, which answers them under the same name.
+/// Passes calls on to what is inside, which answers them under the same name.
 macro_rules! calls {
-    ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
+    ($inside:ty) => {
+        calls! { $inside:
+            reset();
+            setup_experiment(start_time: f64, stop_time: f64);
+            enter_initialization_mode();
+            exit_initialization_mode();
+            do_step(time: f64, step: f64);
+            terminate();
+            get_real(references: &[u32], values: &mut [f64]);
+            get_integer(references: &[u32], values: &mut [i32]);
+            get_boolean(references: &[u32], values: &mut [i32]);
+            set_real(references: &[u32], values: &[f64]);
+            set_integer(references: &[u32], values: &[i32]);
+            set_boolean(references: &[u32], values: &[i32]);
+        }
+    };
+    ($inside:ty: $($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
         fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
-            Self::$method(self, $($argument),*)
+            <$inside>::$method(BorrowMut::<$inside>::borrow_mut(self), $($argument),*)
         }
     )*};
 }
@@ -112,20 +130,7 @@ impl Participant for Slave {
         Self::name(self)
     }
 
-    calls! {
-        reset();
-        setup_experiment(start_time: f64, stop_time: f64);
-        enter_initialization_mode();
-        exit_initialization_mode();
-        do_step(time: f64, step: f64);
-        terminate();
-        get_real(references: &[u32], values: &mut [f64]);
-        get_integer(references: &[u32], values: &mut [i32]);
-        get_boolean(references: &[u32], values: &mut [i32]);
-        set_real(references: &[u32], values: &[f64]);
-        set_integer(references: &[u32], values: &[i32]);
-        set_boolean(references: &[u32], values: &[i32]);
-    }
+    calls! { Slave }
 
     fn remark(&self) -> Option<String> {
         let (count, log) = (self.warnings(), self.log());
@@ -134,5 +139,17 @@ impl Participant for Slave {
             return Some(format!("{count} calls returned fmi2Warning{last}"));
         }
         log.into_iter().rfind(|message| message.status == Status::WARNING).map(|message| message.text)
+    }
+}
+
+impl Participant for Box<dyn Participant> {
+    fn name(&self) -> &str {
+        self.as_ref().name()
+    }
+
+    calls! { dyn Participant }
+
+    fn remark(&self) -> Option<String> {
+        self.as_ref().remark()
     }
 }

@@ -88,6 +88,17 @@ pub enum StartValue {
     Boolean(bool),
 }
 
+impl StartValue {
+    /// The value as a number; of a Boolean none.
+    pub fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Real(value) => Some(value),
+            Self::Integer(value) => Some(value as f64),
+            Self::Boolean(_) => None,
+        }
+    }
+}
+
 impl<'de> Deserialize<'de> for StartValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Expected;
@@ -225,6 +236,9 @@ pub struct DiscEntry {
     pub radius: f64,
     /// Its legend entry; default none.
     pub label: Option<String>,
+    /// Whether it is to be kept out of; default false.
+    #[serde(default)]
+    pub obstacle: bool,
 }
 
 /// Signals over time.

@@ -73,6 +73,14 @@ impl Store {
                 let message = format!("there is no file {}{advice}", path.display());
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
+            if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+                let (file, fmu) = (path.display(), path.with_extension("fmu"));
+                let message = format!(
+                    "is {file}, a configuration; an .ssp file takes FMUs: make one with `punctual build {file} -o {}`",
+                    fmu.display()
+                );
+                return Err(Error::configuration(format!("component[{i}].fmu"), message));
+            }
             let fmu = Fmu::open(&path).map_err(|e| e.in_component(&component.name))?;
             let bytes = std::fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
             let place = store.place(&path);

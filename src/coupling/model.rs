@@ -1,0 +1,120 @@
+//! What a component is made from: an FMU, or a configuration of this program, which runs in process without one. The
+//! numbers are the same, bit for bit.
+
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use punctual_fmu::configuration::{Configuration, RESOURCE};
+use punctual_fmu::product::Product;
+
+use super::{InProcess, Participant};
+use crate::error::Error;
+use crate::host::{Description, Fmu, Slave};
+use crate::{output, package};
+
+/// A configuration with what an FMU of it would say.
+pub struct Own {
+    /// The configuration.
+    pub configuration: Configuration,
+    /// The GUID of its FMU.
+    pub guid: String,
+    /// The model description of its FMU.
+    pub description: Description,
+}
+
+impl Own {
+    /// Derives everything from `configuration`.
+    ///
+    /// # Errors
+    ///
+    /// A configuration that cannot be built.
+    pub fn new(configuration: Configuration) -> Result<Self, Error> {
+        let product = Product::new(configuration)?;
+        let xml = product.model_description().to_xml();
+        let xml = xml.map_err(|e| Error::configuration("", e.to_string()))?;
+        let name = Path::new(product.configuration.name());
+        let description = Description::parse(&xml).map_err(|problem| Error::fmu(name, problem))?;
+        Ok(Self { configuration: product.configuration, guid: product.guid, description })
+    }
+
+    /// An instance in this process.
+    ///
+    /// # Errors
+    ///
+    /// None in practice: the GUID is the configuration's.
+    pub fn instance(&self, name: &str) -> Result<InProcess, Error> {
+        InProcess::new(name, self.configuration.clone(), &self.guid)
+    }
+}
+
+/// An FMU, or a configuration that runs in process.
+pub enum Model {
+    /// An FMU.
+    Fmu(Rc<Fmu>),
+    /// A configuration, from this file.
+    Own(Box<Own>, PathBuf),
+}
+
+impl Model {
+    /// Opens the FMU at `path`, or reads the configuration, if the name ends in `.toml`. `shared` are those opened before.
+    ///
+    /// # Errors
+    ///
+    /// A file that is not there or cannot be used.
+    pub(super) fn open(path: &Path, shared: &[Self]) -> Result<Self, Error> {
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+            let own = Own::new(package::read_configuration(path)?)?;
+            return Ok(Self::Own(Box::new(own), path.to_owned()));
+        }
+        let once = |fmu: &Fmu| fmu.description().co_simulation.can_be_instantiated_only_once_per_process;
+        let opened = shared.iter().find_map(|model| match model {
+            Self::Fmu(fmu) if fmu.path() == path && !once(fmu) => Some(Rc::clone(fmu)),
+            _ => None,
+        });
+        if let Some(fmu) = opened {
+            return Ok(Self::Fmu(fmu));
+        }
+        let fmu = Fmu::open(path)?;
+        tell_stale(&fmu);
+        Ok(Self::Fmu(Rc::new(fmu)))
+    }
+
+    /// The file that it is from.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Fmu(fmu) => fmu.path(),
+            Self::Own(_, path) => path,
+        }
+    }
+
+    /// Its model description.
+    pub fn description(&self) -> &Description {
+        match self {
+            Self::Fmu(fmu) => fmu.description(),
+            Self::Own(own, _) => &own.description,
+        }
+    }
+
+    /// An instance called `name`.
+    pub(super) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
+        Ok(match self {
+            Self::Fmu(fmu) => Box::new(Slave::instantiate(Rc::clone(fmu), name)?),
+            Self::Own(own, _) => Box::new(own.instance(name)?),
+        })
+    }
+}
+
+/// Tells where an FMU of this program is not what the configuration beside it would become.
+fn tell_stale(fmu: &Fmu) {
+    let beside = fmu.path().with_extension("toml");
+    let Some(inside) = fmu.resource(RESOURCE).filter(|_| beside.is_file()) else { return };
+    // One that cannot be used is not what the FMU was made of, or is of something else.
+    let Ok(text) = std::fs::read_to_string(&beside) else { return };
+    let Ok(outside) = Configuration::parse(&text).and_then(|c| c.canonical()) else { return };
+    if inside != outside {
+        let (fmu, beside) = (fmu.path().display(), beside.display());
+        output::note(&format!(
+            "note: {fmu} is not made of {beside} as that is now; build it anew, or name the .toml file in the system"
+        ));
+    }
+}
