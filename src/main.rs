@@ -5,7 +5,9 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use punctual::command::{build, campaign, check, demo, inspect, merge, replay, reproduce, run, validate};
+use punctual::command::{
+    build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, validate,
+};
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
@@ -21,6 +23,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a commented file to begin with
+    New(new::Arguments),
     /// Turn a filter, plant or controller configuration into an FMU, or a system into an SSP package
     Build(build::Arguments),
     /// Check a configuration before it is built: relative degree, rates, guarantee from a start, warnings
@@ -29,7 +33,7 @@ enum Command {
     Demo(demo::Arguments),
     /// Compare the paper's tables and figures with ours and with other methods; write CSV, SVG and a page
     Reproduce(reproduce::Arguments),
-    /// Couple FMUs as a system file says; write CSV and pictures
+    /// Simulate a filter's file, or couple FMUs as a system file says; write CSV and pictures
     Run(run::Arguments),
     /// Run a system from many drawn starts, parameters and disturbances; write a Parquet file
     Campaign(campaign::Arguments),
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => check::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Reproduce(arguments) => reproduce::execute(&arguments),
+        Command::New(arguments) => new::execute(&arguments),
         Command::Merge(arguments) => merge::execute(&arguments),
         Command::Replay(arguments) => replay::execute(&arguments),
         Command::Run(arguments) => run::execute(&arguments),

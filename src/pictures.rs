@@ -39,7 +39,7 @@ pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Pict
                 title: None,
                 signals,
                 dashed,
-                ylabel: Some(format!("h, and what it may not fall below ({unit})")),
+                ylabel: Some(format!("h, and its profile ({unit})")),
                 deadline: deadlines.next().filter(|_| deadlines.next().is_none()),
                 bounds: vec![0.0],
                 scale: Variant::Linear,
@@ -170,6 +170,10 @@ fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<Pa
     });
     let (x, y) = paths.next()?;
     let more: Vec<_> = paths.map(|(x, y)| PathEntry { x, y, label: None, arrival: None }).collect();
+    let mut discs: Vec<_> = parts.iter().flat_map(Part::discs).collect();
+    if let Some(first) = discs.iter_mut().find(|disc| disc.obstacle) {
+        first.label = Some("obstacle".to_owned());
+    }
     Some(PathPicture {
         name: Some("path".to_owned()),
         title: None,
@@ -179,7 +183,7 @@ fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<Pa
         y,
         label: None,
         more,
-        discs: parts.iter().flat_map(Part::discs).collect(),
+        discs,
     })
 }
 
@@ -233,13 +237,19 @@ fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error>
 }
 
 fn time(picture: &TimePicture, recording: &Recording) -> Result<TimePlot, Error> {
-    let solid = picture.signals.iter().map(|signal| (signal, Style::Solid));
-    let dashed = picture.dashed.iter().map(|signal| (signal, Style::Dashed));
+    // What belongs together, such as a barrier's h and its profile, has one colour.
+    let stem = |signal: &str| signal.rsplit_once('.').map(|(stem, _)| stem.to_owned());
+    let solid = picture.signals.iter().map(|signal| (signal, Style::Solid, None));
+    let dashed = picture.dashed.iter().map(|signal| {
+        let twin = picture.signals.iter().position(|other| stem(other) == stem(signal));
+        let only = picture.signals.iter().filter(|other| stem(other) == stem(signal)).count() == 1;
+        (signal, Style::Dashed, twin.filter(|_| only))
+    });
     let lines = solid
         .chain(dashed)
-        .map(|(signal, style)| {
+        .map(|(signal, style, colour)| {
             let (time, values) = (recording.times().to_vec(), series(recording, signal)?);
-            Ok(Series { label: signal.clone(), time, values, style, colour: None })
+            Ok(Series { label: signal.clone(), time, values, style, colour })
         })
         .collect::<Result<_, Error>>()?;
     let all: Vec<&String> = picture.signals.iter().chain(&picture.dashed).collect();

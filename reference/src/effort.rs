@@ -182,7 +182,7 @@ fn standing(phase: Phase) -> Standing {
     }
 }
 
-/// Runs `filter` in the closed loop that `setting` describes. `nominal(x, u_ref)` writes u_ref.
+/// Runs `filter` in the closed loop that `setting` describes. `nominal(t, x, u_ref)` writes u_ref at time t in s.
 ///
 /// # Errors
 ///
@@ -190,7 +190,7 @@ fn standing(phase: Phase) -> Standing {
 pub fn run(
     filter: &mut impl InLoop,
     setting: &Loop<'_>,
-    mut nominal: impl FnMut(&[f64], &mut [f64]),
+    mut nominal: impl FnMut(f64, &[f64], &mut [f64]),
 ) -> Result<Run, Error> {
     let step = positive("step", setting.schedule.step)?;
     non_negative("delay", setting.delay)?;
@@ -213,7 +213,7 @@ pub fn run(
     let mut running = Running { setting, judges, run, h: vec![0.0; count] };
     for k in 0..=setting.schedule.steps {
         let t = t0 + k as f64 * step;
-        nominal(&x, &mut u_ref);
+        nominal(t, &x, &mut u_ref);
         let report = filter.sample(t, step, &x, &u_ref, &mut u)?;
         running.sample(t, &x, &u, report);
         let lost = t - t0 >= setting.until && running.is_broken();

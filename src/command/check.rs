@@ -30,13 +30,14 @@ pub struct Arguments {
     /// Also check the filter from the start of this plant configuration
     #[arg(long, value_name = "FILE", conflicts_with = "x0")]
     plant: Option<PathBuf>,
-    /// Also check the filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are 0
+    /// Also check the filter from this start, such as "x_p=1,v=-2" or "goal.lf0=-9"; states not named are as in the file's
+    /// `x0`, or 0
     #[arg(long, value_name = "STATE", allow_hyphen_values = true)]
     x0: Option<String>,
     /// The u_ref of the closed loop that is simulated from the start: "none" (0), "damping" (the vehicles by name),
-    /// or constants such as "a=0.5,omega=0"
-    #[arg(long, value_name = "WHAT", default_value = "none", allow_hyphen_values = true)]
-    u_ref: String,
+    /// or constants such as "a=0.5,omega=0" [default: the file's `u_ref`, or none]
+    #[arg(long, value_name = "WHAT", allow_hyphen_values = true)]
+    u_ref: Option<String>,
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
     #[arg(long)]
     effort: bool,
@@ -204,7 +205,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Configuration::Filter(configuration) => {
             let start = start(arguments, &configuration)?;
             if arguments.effort && start.is_none() {
-                let message = "needs a start: give --plant or --x0";
+                let message = "needs a start: give --plant, --x0, or [x0] in the file";
                 return Err(Error::configuration("--effort", message));
             }
             if let Some(barrier) = configuration.external().filter(|_| arguments.effort) {
@@ -212,7 +213,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 return Err(Error::configuration("--effort", message));
             }
             // Simulate and judge.
-            let wanted = Wanted::parse(&arguments.u_ref, &configuration)?;
+            let wanted = Wanted::parse(arguments.u_ref.as_deref(), &configuration)?;
             let effort = match &start {
                 Some(x0) if arguments.effort => {
                     Some(closed_loop::ratings(&configuration, x0, &wanted).map_err(|e| e.in_file(file))?)
@@ -301,8 +302,15 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
             }
         };
     }
-    // The start of `--x0`.
-    let Some(text) = &arguments.x0 else { return Ok(None) };
+    // The start of the file, and that of `--x0`.
+    let own = &configuration.run.x0;
+    for (x, state) in x0.iter_mut().zip(configuration.plant.states()) {
+        *x = own.get(&state.name).copied().unwrap_or(*x);
+    }
+    let Some(text) = &arguments.x0 else {
+        let is_given = !own.is_empty() && configuration.external().is_none();
+        return Ok(is_given.then_some(x0));
+    };
     let refuse = |message: String| Error::configuration("--x0", message);
     let names = measured(configuration);
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -341,7 +349,8 @@ fn filter(
     let simulated = start.as_deref().filter(|_| c.external().is_none());
     let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
     let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
-    let damped = simulated.filter(|_| failed && *wanted == Wanted::None && closed_loop::has_damping(c));
+    let damped =
+        simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
     let witness = simulated.map(|x0| witness::find(c, x0, out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);

@@ -1,9 +1,13 @@
 //! Closed loops of `check`, on the filter's own model and with the wanted u_ref. They tell whether each promise
 //! is kept, the soonest deadline, and the smallest bounds.
 
+use std::cell::RefCell;
+
 use punctual_core::filter::{ProfileKind, SafetyFilter};
 use punctual_fmu::FilterLoop;
-use punctual_fmu::configuration::{Automatic, FilterConfiguration, ModelName, ProfileName, UNBOUNDED};
+use punctual_fmu::configuration::{
+    Automatic, FilterConfiguration, Functions, ModelName, ProfileName, UNBOUNDED,
+};
 use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_reference::nominal::damping;
 use punctual_reference::simulation::Schedule;
@@ -31,7 +35,6 @@ const INSTANTS: f64 = 4.0;
 const MOST_SAMPLES: f64 = 1e6;
 
 /// The u_ref of the closed loops.
-#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Wanted {
     /// Zero: the value in an FMU where nothing is connected.
     None,
@@ -39,11 +42,22 @@ pub(super) enum Wanted {
     Damping,
     /// Constant.
     Constant(Vec<f64>),
+    /// That of the file.
+    File(RefCell<Functions<f64>>),
 }
 
 impl Wanted {
-    /// Parses `--u-ref`: `none`, `damping`, or values such as `a=0.5,omega=0`.
-    pub(super) fn parse(text: &str, c: &FilterConfiguration) -> Result<Self, Error> {
+    /// Parses `--u-ref`: `none`, `damping`, or values such as `a=0.5,omega=0`; without, the u_ref of the file, where it is
+    /// for the filter's own model.
+    pub(super) fn parse(text: Option<&str>, c: &FilterConfiguration) -> Result<Self, Error> {
+        let Some(text) = text else {
+            let own = c.integrator.is_none() && c.run.simulated.is_none();
+            let functions = match c.alone() {
+                Ok((_, Some(controller))) if own => controller.functions()?,
+                _ => None,
+            };
+            return Ok(functions.map_or(Self::None, |functions| Self::File(RefCell::new(functions))));
+        };
         let refuse = |message: String| Err(Error::configuration("--u-ref", message));
         let inputs: Vec<String> = c.plant.inputs().into_iter().map(|input| input.name).collect();
         match text.trim() {
@@ -82,6 +96,7 @@ impl Wanted {
         match self {
             Self::None => "u_ref = 0 (--u-ref none)".to_owned(),
             Self::Damping => "damping as u_ref (--u-ref damping)".to_owned(),
+            Self::File(_) => "the u_ref of the file".to_owned(),
             Self::Constant(values) => {
                 let inputs = c.plant.inputs();
                 let named = inputs.iter().zip(values).map(|(s, v)| format!("{} = {}", s.name, number(*v)));
@@ -90,11 +105,15 @@ impl Wanted {
         }
     }
 
-    /// Writes u_ref for the state `x`.
-    fn write(&self, c: &FilterConfiguration, x: &[f64], u_ref: &mut [f64]) {
+    /// Writes u_ref at time `t` in s for the state `x`.
+    fn write(&self, c: &FilterConfiguration, t: f64, x: &[f64], u_ref: &mut [f64]) {
         match self {
             Self::None => u_ref.fill(0.0),
             Self::Constant(values) => u_ref.copy_from_slice(values),
+            Self::File(functions) => {
+                let functions = &mut *functions.borrow_mut();
+                u_ref.iter_mut().zip(functions.at(t, |i| x[i])).for_each(|(u, value)| *u = value);
+            }
             Self::Damping if c.plant.model() == Some(ModelName::PointMass) => {
                 u_ref.copy_from_slice(&[damping(x[2], DAMPING), damping(x[3], DAMPING)]);
             }
@@ -247,7 +266,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         // A lost promise is not followed for long, since steps that cannot be met take the longest.
         until: deadlines.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max),
     };
-    let run = effort::run(&mut filter, &setting, |x, u_ref| wanted.write(c, x, u_ref))?;
+    let run = effort::run(&mut filter, &setting, |t, x, u_ref| wanted.write(c, t, x, u_ref))?;
     // Findings by barrier, input and state.
     let barriers = c.barrier.iter().zip(&run.barriers).map(|(section, seen)| LoopBarrier {
         name: section.name.clone(),
@@ -362,7 +381,7 @@ fn run(
         delay: c.actuation_delay.min(step),
         until: 0.0,
     };
-    effort::run(filter, &setting, |x, u_ref| wanted.write(c, x, u_ref)).map_err(Error::from)
+    effort::run(filter, &setting, |t, x, u_ref| wanted.write(c, t, x, u_ref)).map_err(Error::from)
 }
 
 fn deadlines(c: &FilterConfiguration) -> Vec<f64> {

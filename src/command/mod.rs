@@ -8,6 +8,7 @@ pub mod demo;
 pub mod inspect;
 mod map;
 pub mod merge;
+pub mod new;
 pub mod replay;
 pub mod reproduce;
 pub mod run;

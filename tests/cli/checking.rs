@@ -212,7 +212,7 @@ fn the_least_effort_from_a_start() {
     let workshop = workshop(&edits);
     workshop
         .punctual(["check", "filter.toml", "--effort"])
-        .fails(2, "--effort: needs a start: give --plant or --x0");
+        .fails(2, "--effort: needs a start: give --plant, --x0, or [x0] in the file");
     let words = ["check", "filter.toml", "--plant", "plant.toml", "--effort", "--u-ref", "damping"];
     let text = workshop.punctual(words).success();
     assert_golden("check-effort.txt", &text);

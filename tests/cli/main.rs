@@ -2,6 +2,7 @@
 //! files out. Texts that are stable are kept in `golden/`; run with `PUNCTUAL_UPDATE_GOLDEN=1` to
 //! rewrite them, and read the difference before committing it.
 
+mod alone;
 mod assuring;
 mod bad_configurations;
 mod bad_fmus;

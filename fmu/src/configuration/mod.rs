@@ -35,6 +35,7 @@ pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSecti
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
+pub use punctual_models::Functions;
 pub use read::{ConfigurationError, read_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};

@@ -1,0 +1,179 @@
+//! One file, one command: a new file, checked and run; a filter's file as a system of its own; configurations where
+//! systems take FMUs.
+
+use std::fs;
+
+use crate::table::Table;
+use crate::workshop::{Workshop, examples};
+
+/// A filter with everything that a run of its file needs.
+const CAR: &str = r#"
+kind = "filter"
+plant.model = "unicycle"
+bounds = { a = [-4.0, 4.0], omega = [-2.0, 2.0] }
+x0 = { theta = -1.0, v = 1.0 }
+u_ref = { a = "-0.3 * v", omega = "0.5 * cos(t)" }
+experiment = { stop_time = 3.0, step_size = 0.02 }
+
+[[barrier]]
+name = "goal"
+centre = [8.0, 4.0]
+radius = 2.0
+deadline = 6.0
+
+[[barrier]]
+name = "tree"
+shape = "obstacle"
+centre = [5.0, 7.0]
+radius = 2.0
+"#;
+
+#[test]
+fn a_new_file_is_checked_and_run_and_keeps_its_promise() {
+    for model in ["unicycle", "expressions"] {
+        let workshop = Workshop::new();
+        let done = workshop.punctual(["new", "my.toml", "--model", model]);
+        assert_eq!(done.stderr, "next: `punctual check my.toml`, then `punctual run my.toml`\n");
+        assert_eq!(done.success(), "written: my.toml\n");
+        let checked = workshop.punctual(["check", "my.toml"]).success();
+        assert!(checked.contains("with the u_ref of the file"), "{checked}");
+        assert!(checked.contains("\nwitness: a plan"), "{checked}");
+        let ran = workshop.punctual(["run", "my.toml", "--require", "kept"]).success();
+        assert!(ran.contains("written: my/my.csv"), "{ran}");
+        let inputs = if model == "unicycle" { &["u-a", "u-omega", "path"][..] } else { &["u-F", "h-2"] };
+        for picture in inputs.iter().chain(&["h"]) {
+            let text = workshop.text(&format!("my/my-{picture}.svg"));
+            assert!(text.starts_with("<svg") || text.starts_with("<?xml"), "{picture}");
+        }
+        workshop.punctual(["build", "my.toml", "-o", "my.fmu"]).success();
+        workshop
+            .punctual(["new", "my.toml"])
+            .fails(2, "FILE: my.toml is there already; name another file, or remove that one");
+    }
+    Workshop::new().punctual(["new", "my.fmu"]).fails(2, "FILE: is \"my.fmu\", must end in .toml");
+}
+
+#[test]
+fn a_new_file_for_an_fmu_runs_with_one() {
+    let workshop = Workshop::new();
+    workshop.punctual(["new", "cart.toml", "--model", "fmu"]).success();
+    assert_eq!(workshop.files(), ["cart-filter.toml", "cart.toml"]);
+    // The plant of another tool, with the names of the template.
+    let plant = "kind = \"plant\"\n[plant]\nstates = [{ name = \"position\", unit = \"m\" }, { name = \"speed\", unit = \"m/s\" }]\n\
+                 inputs = [{ name = \"force\", unit = \"N\" }]\n[plant.derivatives]\nposition = \"speed\"\n\
+                 speed = \"(force - 0.5 * speed) / 4\"\n";
+    workshop.write("cart-plant.toml", plant);
+    workshop.punctual(["build", "cart-plant.toml", "-o", "cart-plant.fmu"]).success();
+    let text = workshop.text("cart.toml");
+    let text = text.replace("plant.position", "plant.x.position").replace("plant.speed", "plant.x.speed");
+    workshop.write("cart.toml", text.replace("plant.force", "plant.u.force"));
+    workshop.punctual(["run", "cart.toml", "--out", "out", "--require", "kept"]).success();
+}
+
+#[test]
+fn a_file_alone_is_its_filter_and_plant_coupled() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR);
+    workshop.punctual(["run", "car.toml", "--out", "alone"]).success();
+    // The same by hand: the FMUs, and their configurations.
+    let experiment = "[experiment]\nstop_time = 3.0\nstep_size = 0.02\n";
+    workshop.write(
+        "plant.toml",
+        format!(
+            "kind = \"plant\"\nplant.model = \"unicycle\"\nx0 = {{ theta = -1.0, v = 1.0 }}\n{experiment}"
+        ),
+    );
+    let u_ref = "u_ref = { a = \"-0.3 * v\", omega = \"0.5 * cos(t)\" }\n";
+    workshop.write(
+        "controller.toml",
+        format!(
+            "kind = \"controller\"\ncontroller = \"expressions\"\nplant.model = \"unicycle\"\n{u_ref}{experiment}"
+        ),
+    );
+    let mut system = "[experiment]\nstop_time = 3.0\nstep = 0.02\n".to_owned();
+    for (name, file) in [("filter", "car"), ("plant", "plant"), ("controller", "controller")] {
+        system += &format!("[[component]]\nname = \"{name}\"\nfmu = \"{file}.toml\"\n");
+        workshop.punctual(["build", &format!("{file}.toml"), "-o", &format!("{file}.fmu")]).success();
+    }
+    for pair in [["filter", "plant"], ["controller", "plant"], ["controller", "filter"]] {
+        system += &format!("[[connect_by_name]]\ncomponents = {pair:?}\n");
+    }
+    workshop.write("files.toml", &system);
+    workshop.write("fmus.toml", system.replace(".toml\"", ".fmu\""));
+    for name in ["files", "fmus"] {
+        workshop.punctual(["run", &format!("{name}.toml"), "--out", "out"]).success();
+        assert!(
+            workshop.bytes(&format!("out/{name}.csv")) == workshop.bytes("alone/car.csv"),
+            "{name}: other numbers"
+        );
+    }
+    // The keys of the run are no part of the FMU.
+    let alone = CAR.lines().filter(|line| !line.starts_with("x0") && !line.starts_with("u_ref"));
+    workshop.write("filter.toml", alone.collect::<Vec<_>>().join("\n"));
+    workshop.punctual(["build", "filter.toml", "-o", "filter.fmu"]).success();
+    assert!(workshop.bytes("filter.fmu") == workshop.bytes("car.fmu"), "another FMU");
+    // An FMU that is not made of the file beside it.
+    workshop.write("plant.toml", workshop.text("plant.toml").replace("v = 1.0", "v = 2.0"));
+    let done = workshop.punctual(["run", "fmus.toml"]);
+    let stale = "note: plant.fmu is not made of plant.toml as that is now; build it anew, or name the .toml file in the system\n";
+    assert!(done.stderr.contains(stale), "{}", done.stderr);
+}
+
+#[test]
+fn a_file_alone_has_the_plant_outside_its_integrator() {
+    let workshop = Workshop::new();
+    for (model, state) in [("bicycle_small_slip_rate", "beta"), ("bicycle_kinematic", "delta")] {
+        workshop.write(
+            "bicycle.toml",
+            format!(
+                "kind = \"filter\"\nplant.model = \"{model}\"\nintegrator = {{ state = \"{state}\", min = -0.5, max = 0.5 }}\n\
+                 x0.v = 3.0\nu_ref = {{ a = \"1 - v / 4\", {state} = \"0.1\" }}\n\
+                 experiment = {{ stop_time = 8.0, step_size = 0.02 }}\n\
+                 [[barrier]]\nname = \"goal\"\ncentre = [20.0, 3.0]\nradius = 3.0\ndeadline = 7.0\n"
+            ),
+        );
+        workshop
+            .punctual(["run", "bicycle.toml", "--out", "out", "--require", "on_time_and_inside"])
+            .success();
+        let table = Table::parse(&workshop.text("out/bicycle.csv"));
+        let moved = table.column(&format!("plant.u.{state}"));
+        assert!(moved.iter().all(|u| u.abs() <= 0.5) && moved.iter().any(|u| u.abs() > 0.01), "{moved:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_run_alone_is_told() {
+    for (from, to, wanted) in [
+        (
+            "x0 = { theta",
+            "x0 = { tetha",
+            "car.toml: x0.tetha: unknown state, must be one of x_p, y_p, theta, v",
+        ),
+        (
+            "omega = \"0.5 * cos(t)\"",
+            "",
+            "car.toml: u_ref.omega: missing, every input needs one; \"0\" is one",
+        ),
+        (
+            "-0.3 * v",
+            "-0.3 * w",
+            "car.toml: u_ref.a: names w, which is unknown (did you mean v?); the names are x_p, y_p, theta, v",
+        ),
+        ("x0 = {", "simulated.model = \"point\"\nx0 = {", "car.toml: simulated.model"),
+    ] {
+        let workshop = Workshop::new();
+        workshop.write("car.toml", CAR.replace(from, to));
+        workshop.punctual(["run", "car.toml"]).fails_like(2, wanted, &[]);
+    }
+    let workshop = Workshop::new();
+    workshop.write("external.toml", fs::read(examples().join("../models/external-filter.toml")).unwrap());
+    workshop.punctual(["run", "external.toml"]).fails(
+        2,
+        "external.toml: simulated: missing: of the filter's plant only the inputs are known, so give the plant to simulate",
+    );
+    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
+    workshop.punctual(["run", "plant.toml"]).fails(
+        2,
+        "plant.toml: kind: is \"plant\"; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
+    );
+}
