@@ -53,7 +53,7 @@ def simulate(
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
     FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` judges a barrier.
 
-    Raises `ImportError` without FMPy (`pip install punctual[fmpy]`); `Error` for names or numbers that do not fit, an
+    Raises `ImportError` without FMPy (`pip install fmpy`); `Error` for names or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
     """
     for field, value in [("stop_time", stop_time), ("step_size", step_size)]:

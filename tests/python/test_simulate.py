@@ -211,5 +211,5 @@ def test_a_file_that_is_no_fmu_is_named(fmus, tmp_path):
 
 def test_without_fmpy_the_message_says_what_to_install(fmus, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "fmpy", None)
-    with pytest.raises(ImportError, match=r"pip install punctual\[fmpy\]"):
+    with pytest.raises(ImportError, match=r"pip install fmpy"):
         punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)
