@@ -2,12 +2,20 @@ from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ._configuration import Configuration
 from ._enumerations import Assurance, Phase, Status
 
-__all__ = ["BarrierReport", "Filter", "FilterBatch", "Plan", "Step", "__version__", "judge"]
+__all__ = [
+    "BarrierReport",
+    "Filter",
+    "FilterBatch",
+    "Plan",
+    "Step",
+    "__version__",
+    "judge",
+]
 
 __version__: str
 
@@ -81,12 +89,7 @@ class Filter:
     def inputs(self) -> dict[str, str]: ...
     @property
     def barriers(self) -> dict[str, str]: ...
-    def step(
-        self,
-        t: float,
-        x: NDArray[np.float64] | Sequence[float],
-        u_ref: NDArray[np.float64] | Sequence[float] | None = None,
-    ) -> Step: ...
+    def step(self, t: float, x: ArrayLike, u_ref: ArrayLike | None = None) -> Step: ...
     @property
     def plan(self) -> Plan | None: ...
     @property
@@ -105,10 +108,7 @@ class FilterBatch:
     @property
     def barriers(self) -> dict[str, str]: ...
     def step(
-        self,
-        t: float,
-        x: NDArray[np.float64],
-        u_ref: NDArray[np.float64] | None = None,
+        self, t: float, x: ArrayLike, u_ref: ArrayLike | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]: ...
-    def rearm(self, rows: NDArray[np.bool_] | None = None) -> None: ...
-    def reset(self, rows: NDArray[np.bool_] | None = None) -> None: ...
+    def rearm(self, rows: ArrayLike | None = None) -> None: ...
+    def reset(self, rows: ArrayLike | None = None) -> None: ...

@@ -176,11 +176,15 @@ class _Pair:
 
             def function(t: float) -> None:
                 wanted = nominal(t, x)
+                # Of an array: complex numbers would lose their imaginary part.
+                kind = getattr(getattr(wanted, "dtype", None), "kind", "f")
                 try:
+                    if kind not in "fiu":
+                        raise TypeError
                     values[place] = list(wanted)
                 except (TypeError, ValueError):
                     names = ", ".join(self.wanted)
-                    raise Error(f"nominal: is {wanted!r} at t = {t:g} s, must be numbers for {names}") from None
+                    raise Error(f"nominal: is {wanted!r} at t = {t:g} s, must be real numbers for {names}") from None
 
             self.want: Callable[[float], None] = function
             return

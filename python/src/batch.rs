@@ -88,8 +88,8 @@ impl FilterBatch {
 
     /// Computes the safe inputs of all loops at time `t` (s) and remembers the samples.
     ///
-    /// - `x`: the states, an array of float64 of shape (n, states).
-    /// - `u_ref`: the inputs wanted, of shape (n, inputs). Default: zeros.
+    /// - `x`: the states, an array of real numbers of shape (n, states). One of float64 is the fastest.
+    /// - `u_ref`: the inputs wanted, of shape (n, inputs), likewise. Default: zeros.
     ///
     /// Returns `u` of shape (n, inputs), the numbers of the statuses (`punctual.Status`) of shape (n,) and `h` of shape
     /// (n, barriers). Raises `TypeError` or `ValueError` for an array of another type or shape.
@@ -103,9 +103,11 @@ impl FilterBatch {
     ) -> PyResult<Rows<'py>> {
         let n = self.memories.len();
         let Interface { states, inputs, barriers } = &self.interface;
-        arrays::matrix(x, "x", n, &states.names, &mut self.x)?;
+        arrays::numbers(x, "x", &[n, states.len()], &states.names, &mut self.x)?;
         match u_ref {
-            Some(u_ref) => arrays::matrix(u_ref, "u_ref", n, &inputs.names, &mut self.u_ref)?,
+            Some(u_ref) => {
+                arrays::numbers(u_ref, "u_ref", &[n, inputs.len()], &inputs.names, &mut self.u_ref)?;
+            }
             None => self.u_ref.fill(0.0),
         }
         let threads = pool::threads(py)?;

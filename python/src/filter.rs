@@ -78,8 +78,8 @@ impl Filter {
     /// Computes the safe input at time `t` (s) and remembers the sample. Deadlines count from the first step; the
     /// sampling period is the time between steps, at first `experiment.step_size`.
     ///
-    /// - `x`: the state in the order of `states`, an array of float64 or a sequence of numbers.
-    /// - `u_ref`: the input wanted, in the order of `inputs`. Default: zeros.
+    /// - `x`: the state in the order of `states`, an array or a sequence of real numbers. Those of float64 are the fastest.
+    /// - `u_ref`: the input wanted, in the order of `inputs`, likewise. Default: zeros.
     ///
     /// Raises `TypeError` or `ValueError` for an array of another type or shape. Numerical outcomes (infeasible,
     /// not a number) are statuses.
@@ -92,9 +92,11 @@ impl Filter {
         u_ref: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
         let Interface { states, inputs, .. } = &self.interface;
-        arrays::vector(x, "x", &states.names, &mut self.x)?;
+        arrays::numbers(x, "x", &[states.len()], &states.names, &mut self.x)?;
         match u_ref {
-            Some(u_ref) => arrays::vector(u_ref, "u_ref", &inputs.names, &mut self.u_ref)?,
+            Some(u_ref) => {
+                arrays::numbers(u_ref, "u_ref", &[inputs.len()], &inputs.names, &mut self.u_ref)?;
+            }
             None => self.u_ref.fill(0.0),
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);

@@ -7,7 +7,7 @@ import punctual
 import pytest
 from punctual import Phase, Status
 
-from conftest import FILTER, PLANT, ROOT, STEP
+from conftest import FILTER, PLANT, ROOT, STEP, exactly
 
 STATES = ["x_p", "y_p", "theta", "v"]
 
@@ -69,11 +69,12 @@ def test_deadlines_start_anew():
     assert own.step(0.0, x).u.tolist() == first.u.tolist()
 
 
-def test_arrays_of_any_layout_and_sequences_are_taken():
-    table = np.array([[0.0, 0.0, 0.3, 2.0], [1.0, 2.0, 0.1, 3.0]])
-    given = [table[1], np.asfortranarray(table)[1], table[1].tolist(), tuple(table[1]), [1, 2, 0.1, 3]]
-    answers = [punctual.Filter(FILTER).step(0.0, x).u.tolist() for x in given]
-    assert answers == [answers[0]] * len(given)
+def test_real_numbers_of_any_type_and_layout_are_taken():
+    states, inputs = exactly([1.0, 2.0, 0.0, 3.0], 4), exactly([2.0, 1.0], 2)
+    answers = [punctual.Filter(FILTER).step(0.0, *given).u.tobytes() for given in zip(states, inputs)]
+    assert answers == [answers[0]] * len(states)
+    other = punctual.Filter(FILTER).step(0.0, states[0], inputs[0] + 1.0).u.tobytes()
+    assert other != answers[0]
 
 
 def test_what_is_no_number_is_an_outcome():
@@ -90,10 +91,21 @@ def test_what_is_no_number_is_an_outcome():
         (np.zeros(3), ValueError, r"x: has shape \(3,\), must have \(4,\) \(x_p, y_p, theta, v\)"),
         (np.zeros((1, 4)), ValueError, r"x: has shape \(1, 4\), must have \(4,\)"),
         ([0.0], ValueError, r"x: has shape \(1,\), must have \(4,\)"),
-        (np.zeros(4, np.float32), TypeError, "x: is an array of float32, must be one of float64"),
-        (np.zeros(4, int), TypeError, "x: is an array of int64, must be one of float64"),
-        ("zero", TypeError, "x: is str, must be an array of float64 or a sequence of 4 numbers"),
-        (None, TypeError, "x: is NoneType"),
+        (1.0, ValueError, r"x: has shape \(\), must have \(4,\)"),
+        ([[0.0], [0.0, 0.0]], ValueError, r"x: is list of no shape, must be real numbers .* of shape \(4,\)"),
+        (
+            np.zeros(4, complex),
+            TypeError,
+            r"^x: is ndarray of complex128, must be real numbers \(floats or integers\) of shape \(4,\) \(x_p, y_p, theta, v\)$",
+        ),
+        ([0.0, 0.0, 0.0, 1j], TypeError, "x: is list of complex128, must be real numbers"),
+        (list(np.zeros(4, complex)), TypeError, "x: is list of complex128, must be real numbers"),
+        (np.zeros(4, bool), TypeError, "x: is ndarray of bool, must be real numbers"),
+        (np.zeros(4, object), TypeError, "x: is ndarray of object, must be real numbers"),
+        (["0", "0", "0", "0"], TypeError, "x: is list of <U1, must be real numbers"),
+        (np.zeros(4, "m8[s]"), TypeError, "x: is ndarray of timedelta64.s., must be real numbers"),
+        ("zero", TypeError, "x: is str of <U4, must be real numbers"),
+        (None, TypeError, "x: is NoneType of object, must be real numbers"),
     ],
 )
 def test_another_state_is_refused(x, error, words):

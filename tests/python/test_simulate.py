@@ -111,6 +111,10 @@ def test_a_function_as_nominal_controller(fmus):
     assert t == 1.0 and x.tolist() == [result[f"x.{name}"][-1] for name in ["x_p", "y_p", "theta", "v"]]
     array = punctual.simulate(*fmus, nominal=lambda t, x: np.array([-x[3], 0.0]), **options)
     assert array.tobytes() == result.tobytes()
+    single, plain = (
+        punctual.simulate(*fmus, nominal=lambda t, x: np.array([1, 2], kind), **options) for kind in [np.float32, float]
+    )
+    assert single.tobytes() == plain.tobytes() != array.tobytes()
 
 
 def test_the_result_is_one_of_fmpy(fmus, tmp_path):
@@ -134,7 +138,10 @@ def test_the_result_is_one_of_fmpy(fmus, tmp_path):
         (dict(record=["goal.hh"]), "record: 'goal.hh' is none of x.x_p"),
         (dict(nominal={"b": ("v", 1.0)}), "nominal: 'b' is none of u_ref.a, u_ref.omega"),
         (dict(nominal={"a": ("w", 1.0)}), "nominal.a: 'w' is no output of the plant, which has x.x_p"),
-        (dict(nominal=lambda t, x: [0.0]), r"nominal: is \[0.0\] at t = 0 s, must be numbers for u_ref.a, u_ref.omega"),
+        (dict(nominal=lambda t, x: [0.0]), r"nominal: is \[0.0\] at t = 0 s, must be real numbers for u_ref.a, u_ref.omega"),
+        (dict(nominal=lambda t, x: np.zeros(2, complex)), r"nominal: is array\(\[0.\+0.j, .* must be real numbers for"),
+        (dict(nominal=lambda t, x: np.array(["0", "0"])), "nominal: is array.* must be real numbers for"),
+        (dict(nominal=lambda t, x: "00"), "nominal: is '00' at t = 0 s, must be real numbers for"),
     ],
 )
 def test_what_does_not_fit_is_refused(fmus, change, words):
