@@ -24,6 +24,8 @@ FILTER = {
     "experiment": {"step_size": STEP},
 }
 PLANT = {"kind": "plant", "plant": {"model": "unicycle"}, "x0": {"v": 2.0}}
+# Every input has bounds: plans are followed.
+ASSURED = FILTER | {"bounds": {"a": [-20.0, 20.0], "omega": [-3.0, 3.0]}}
 
 
 def exactly(values, shape):

@@ -1,6 +1,8 @@
 """`punctual.FilterBatch`: many loops, each with the bits of a `Filter` of its own."""
 
+import copy
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -9,7 +11,7 @@ import numpy as np
 import punctual
 import pytest
 
-from conftest import FILTER, ROOT, STEP, exactly, goal
+from conftest import ASSURED, FILTER, ROOT, STEP, exactly, goal
 
 STEPS = 60
 
@@ -78,6 +80,41 @@ def test_u_ref_is_zero_by_default_and_type_and_layout_do_not_matter():
     given.append((given[0][0], None))
     answers = [[a.tobytes() for a in punctual.FilterBatch(FILTER, 20).step(0.0, *g)] for g in given]
     assert answers == [answers[0]] * len(given)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda own: pickle.loads(pickle.dumps(own))])
+@pytest.mark.parametrize("configuration", [FILTER, ASSURED], ids=["rows", "plans"])
+def test_a_copy_goes_on_with_the_same_bits(configuration, copied):
+    n = 20
+    x, u_ref = drawn(n, 8)
+    batch, straight = punctual.FilterBatch(configuration, n), punctual.FilterBatch(configuration, n)
+
+    def said(own, k, wanted):
+        return [a.tobytes() for a in own.step(k * STEP, x[k], wanted)] + [own.guaranteed.tobytes()]
+
+    begun = [said(batch, k, u_ref[k]) for k in range(4)]
+    again = copied(batch)
+    assert (len(again), again.step_size) == (n, STEP) and again.guaranteed.tobytes() == batch.guaranteed.tobytes()
+    gone = [said(again, k, u_ref[k]) for k in range(4, 8)]
+    other = [said(batch, k, -u_ref[k]) for k in range(4, 8)]
+    assert [said(straight, k, u_ref[k]) for k in range(8)] == begun + gone
+    assert gone != other
+    again.reset()
+    assert [said(again, k, u_ref[k]) for k in range(4)] == begun
+
+
+def test_guarantees_are_those_of_the_rows():
+    n = 12
+    x, u_ref = drawn(n, 3)
+    # It starts inside the post, which is then not promised.
+    x[:, 0, :2] = [8.0, 5.0]
+    batch, singles = punctual.FilterBatch(ASSURED, n), [punctual.Filter(ASSURED) for _ in range(n)]
+    assert batch.guaranteed.tolist() == [[False, False]] * n
+    for k in range(3):
+        batch.step(k * STEP, x[k], u_ref[k])
+        steps = [own.step(k * STEP, x[k, i], u_ref[k, i]) for i, own in enumerate(singles)]
+        assert batch.guaranteed.tolist() == [[b.guaranteed for b in step.barriers.values()] for step in steps]
+    assert batch.guaranteed.any() and not batch.guaranteed.all()
 
 
 def test_the_number_of_threads_changes_no_bit():
