@@ -2,7 +2,8 @@
 
 - `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` judges a configuration,
   `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there.
-- `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI.
+- `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI. The module `punctual.gymnasium` wraps
+  environments of Gymnasium with them.
 - `run_cli` runs the command line, which is installed as `punctual` too.
 """
 
