@@ -1,8 +1,9 @@
 """A safety filter that gets a system into its safe set by a deadline and keeps it there.
 
 - `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` judges a configuration,
-  `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there.
-- `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI.
+  `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there, `plot` draws it.
+- `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI. The module `punctual.gymnasium` wraps
+  environments of Gymnasium with them.
 - `run_cli` runs the command line, which is installed as `punctual` too.
 """
 
@@ -12,6 +13,7 @@ from ._enumerations import Assurance, Phase, Status
 from ._error import Error
 from ._fmu import Variable, build, check, variables
 from ._punctual import BarrierReport, Filter, FilterBatch, Plan, Step, __version__
+from ._plot import plot
 from ._promise import Promise, promise
 from ._simulate import simulate
 
@@ -31,6 +33,7 @@ __all__ = [
     "__version__",
     "build",
     "check",
+    "plot",
     "promise",
     "run_cli",
     "simulate",

@@ -42,7 +42,7 @@ def text_folder_file(configuration: Configuration) -> tuple[str, str, str]:
     if isinstance(configuration, Mapping):
         return toml_text(configuration), os.getcwd(), ""
     path = Path(configuration)
-    return path.read_text(encoding="utf-8"), str(path.parent), str(path)
+    return path.read_text(encoding="utf-8"), str(path.absolute().parent), str(path)
 
 
 @contextmanager

@@ -2,12 +2,22 @@ from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ._configuration import Configuration
 from ._enumerations import Assurance, Phase, Status
 
-__all__ = ["BarrierReport", "Filter", "FilterBatch", "Plan", "Step", "__version__", "judge"]
+__all__ = [
+    "BarrierReport",
+    "Filter",
+    "FilterBatch",
+    "Plan",
+    "Step",
+    "__version__",
+    "judge",
+    "unpickled_batch",
+    "unpickled_filter",
+]
 
 __version__: str
 
@@ -15,6 +25,10 @@ def judge(
     rows: Sequence[tuple[float, float, int, bool, int]], deadline: float | None, units: tuple[str, str]
 ) -> dict[str, Any]: ...
 
+_Saved = tuple[str, str, str, list[bytes]]
+
+def unpickled_filter(saved: _Saved, t: float, x: Sequence[float]) -> Filter: ...
+def unpickled_batch(saved: _Saved, guaranteed: Sequence[bool]) -> FilterBatch: ...
 @final
 class BarrierReport:
     @property
@@ -81,12 +95,9 @@ class Filter:
     def inputs(self) -> dict[str, str]: ...
     @property
     def barriers(self) -> dict[str, str]: ...
-    def step(
-        self,
-        t: float,
-        x: NDArray[np.float64] | Sequence[float],
-        u_ref: NDArray[np.float64] | Sequence[float] | None = None,
-    ) -> Step: ...
+    @property
+    def step_size(self) -> float: ...
+    def step(self, t: float, x: ArrayLike, u_ref: ArrayLike | None = None) -> Step: ...
     @property
     def plan(self) -> Plan | None: ...
     @property
@@ -104,11 +115,12 @@ class FilterBatch:
     def inputs(self) -> dict[str, str]: ...
     @property
     def barriers(self) -> dict[str, str]: ...
+    @property
+    def step_size(self) -> float: ...
     def step(
-        self,
-        t: float,
-        x: NDArray[np.float64],
-        u_ref: NDArray[np.float64] | None = None,
+        self, t: float, x: ArrayLike, u_ref: ArrayLike | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float64]]: ...
-    def rearm(self, rows: NDArray[np.bool_] | None = None) -> None: ...
-    def reset(self, rows: NDArray[np.bool_] | None = None) -> None: ...
+    @property
+    def guaranteed(self) -> NDArray[np.bool_]: ...
+    def rearm(self, rows: ArrayLike | None = None) -> None: ...
+    def reset(self, rows: ArrayLike | None = None) -> None: ...

@@ -53,7 +53,7 @@ def simulate(
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
     FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` judges a barrier.
 
-    Raises `ImportError` without FMPy (`pip install punctual[fmpy]`); `Error` for names or numbers that do not fit, an
+    Raises `ImportError` without FMPy (`pip install fmpy`); `Error` for names or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
     """
     for field, value in [("stop_time", stop_time), ("step_size", step_size)]:
@@ -176,11 +176,15 @@ class _Pair:
 
             def function(t: float) -> None:
                 wanted = nominal(t, x)
+                # Of an array: complex numbers would lose their imaginary part.
+                kind = getattr(getattr(wanted, "dtype", None), "kind", "f")
                 try:
+                    if kind not in "fiu":
+                        raise TypeError
                     values[place] = list(wanted)
                 except (TypeError, ValueError):
                     names = ", ".join(self.wanted)
-                    raise Error(f"nominal: is {wanted!r} at t = {t:g} s, must be numbers for {names}") from None
+                    raise Error(f"nominal: is {wanted!r} at t = {t:g} s, must be real numbers for {names}") from None
 
             self.want: Callable[[float], None] = function
             return

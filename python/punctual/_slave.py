@@ -113,7 +113,7 @@ def opened(name: str, path: str | os.PathLike[str]) -> Iterator[Slave]:
         import fmpy
         from fmpy import fmi2
     except ImportError as error:
-        raise ImportError("punctual.simulate needs FMPy: pip install punctual[fmpy]") from error
+        raise ImportError("punctual.simulate needs FMPy: pip install fmpy") from error
     with tempfile.TemporaryDirectory(prefix="punctual-") as folder:
         try:
             description = fmpy.read_model_description(os.fspath(path))

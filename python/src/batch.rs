@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::loading::{Interface, Signals, configuration, refused};
 use crate::sample::Loop;
+use crate::saved::{self, Reduced, Saved};
 use crate::{arrays, pool};
 
 /// Rows go to threads in parts of equal size. There are more parts than threads, since some rows take longer than
@@ -28,7 +29,7 @@ type Rows<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'p
 /// to loop i, and gives the same bits as a `Filter` of its own would.
 ///
 /// `configuration` is as for `Filter`; `n` >= 1. Rows are computed on all cores (`RAYON_NUM_THREADS`: on so many)
-/// without the interpreter's lock.
+/// without the interpreter's lock. It can be pickled and copied as a `Filter` can.
 #[pyclass(module = "punctual")]
 pub(crate) struct FilterBatch {
     configuration: FilterConfiguration,
@@ -40,6 +41,8 @@ pub(crate) struct FilterBatch {
     loops: Mutex<Vec<Loop>>,
     x: Vec<f64>,
     u_ref: Vec<f64>,
+    /// Whether a plan keeps the promise of each barrier after the last step, row after row.
+    guaranteed: Vec<bool>,
 }
 
 #[pymethods]
@@ -49,19 +52,26 @@ impl FilterBatch {
         if n == 0 {
             return Err(PyValueError::new_err("n: is 0, must be >= 1"));
         }
-        let configuration = self::configuration(configuration)?;
-        let interface = Interface::of(&configuration);
-        let own = Loop::new(&configuration)?;
-        let fresh = own.memory();
-        Ok(Self {
-            memories: vec![fresh.clone(); n],
-            fresh,
-            loops: Mutex::new(vec![own]),
-            x: vec![0.0; n * interface.states.len()],
-            u_ref: vec![0.0; n * interface.inputs.len()],
-            configuration,
-            interface,
-        })
+        Self::of(self::configuration(configuration)?, n)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, Vec<bool>)>> {
+        let saved = saved::save(&self.configuration, &self.memories)?;
+        saved::reduced(py, "unpickled_batch", (saved, self.guaranteed.clone()))
+    }
+
+    /// Time in s for which the first input counts as held: `experiment.step_size`.
+    #[getter]
+    fn step_size(&self) -> f64 {
+        self.configuration.experiment.step_size
+    }
+
+    /// After the last step: whether a plan in hand keeps the promise of each barrier whatever u_ref is, an array of bool
+    /// of shape (n, barriers).
+    #[getter]
+    fn guaranteed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        let shape = [self.memories.len(), self.interface.barriers.len()];
+        PyArray1::from_slice(py, &self.guaranteed).reshape(shape)
     }
 
     fn __len__(&self) -> usize {
@@ -88,8 +98,8 @@ impl FilterBatch {
 
     /// Computes the safe inputs of all loops at time `t` (s) and remembers the samples.
     ///
-    /// - `x`: the states, an array of float64 of shape (n, states).
-    /// - `u_ref`: the inputs wanted, of shape (n, inputs). Default: zeros.
+    /// - `x`: the states, an array of real numbers of shape (n, states). One of float64 is the fastest.
+    /// - `u_ref`: the inputs wanted, of shape (n, inputs), likewise. Default: zeros.
     ///
     /// Returns `u` of shape (n, inputs), the numbers of the statuses (`punctual.Status`) of shape (n,) and `h` of shape
     /// (n, barriers). Raises `TypeError` or `ValueError` for an array of another type or shape.
@@ -103,9 +113,11 @@ impl FilterBatch {
     ) -> PyResult<Rows<'py>> {
         let n = self.memories.len();
         let Interface { states, inputs, barriers } = &self.interface;
-        arrays::matrix(x, "x", n, &states.names, &mut self.x)?;
+        arrays::numbers(x, "x", &[n, states.len()], &states.names, &mut self.x)?;
         match u_ref {
-            Some(u_ref) => arrays::matrix(u_ref, "u_ref", n, &inputs.names, &mut self.u_ref)?,
+            Some(u_ref) => {
+                arrays::numbers(u_ref, "u_ref", &[n, inputs.len()], &inputs.names, &mut self.u_ref)?;
+            }
             None => self.u_ref.fill(0.0),
         }
         let threads = pool::threads(py)?;
@@ -119,9 +131,10 @@ impl FilterBatch {
         let (mut u, mut statuses, mut h) = (vec![0.0; n * nu], vec![0; n], vec![0.0; n * nb]);
         let given = self.x.chunks(rows * nx).zip(self.u_ref.chunks(rows * nu));
         let said = u.chunks_mut(rows * nu).zip(statuses.chunks_mut(rows)).zip(h.chunks_mut(rows * nb));
+        let said = said.zip(self.guaranteed.chunks_mut(rows * nb));
         let mut parts: Vec<_> = (loops.iter_mut().zip(self.memories.chunks_mut(rows)))
             .zip(given.zip(said))
-            .map(|((own, memories), ((x, u_ref), ((u, statuses), h)))| Part {
+            .map(|((own, memories), ((x, u_ref), (((u, statuses), h), guaranteed)))| Part {
                 own,
                 memories,
                 x,
@@ -129,6 +142,7 @@ impl FilterBatch {
                 u,
                 statuses,
                 h,
+                guaranteed,
             })
             .collect();
         let done = py.detach(|| match &mut parts[..] {
@@ -167,6 +181,23 @@ impl FilterBatch {
 }
 
 impl FilterBatch {
+    /// `n` loops before their first samples.
+    fn of(configuration: FilterConfiguration, n: usize) -> PyResult<Self> {
+        let interface = Interface::of(&configuration);
+        let own = Loop::new(&configuration)?;
+        let fresh = own.memory();
+        Ok(Self {
+            memories: vec![fresh.clone(); n],
+            fresh,
+            loops: Mutex::new(vec![own]),
+            x: vec![0.0; n * interface.states.len()],
+            u_ref: vec![0.0; n * interface.inputs.len()],
+            guaranteed: vec![false; n * interface.barriers.len()],
+            configuration,
+            interface,
+        })
+    }
+
     /// The rows that a mask chooses; without a mask, all.
     fn chosen(&self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<bool>> {
         let n = self.memories.len();
@@ -187,6 +218,7 @@ struct Part<'a> {
     u: &'a mut [f64],
     statuses: &'a mut [i32],
     h: &'a mut [f64],
+    guaranteed: &'a mut [bool],
 }
 
 impl Part<'_> {
@@ -198,11 +230,24 @@ impl Part<'_> {
             self.own.restore(memory)?;
             let report = self.own.step(t, x, u_ref, &mut self.u[i * nu..][..nu])?;
             self.statuses[i] = report.status as i32;
-            for (h, barrier) in self.h[i * nb..].iter_mut().zip(&report.barriers) {
-                *h = barrier.h;
+            for (k, barrier) in report.barriers.iter().enumerate() {
+                self.h[i * nb + k] = barrier.h;
+                self.guaranteed[i * nb + k] = barrier.guaranteed;
             }
             self.own.save(memory);
         }
         Ok(())
     }
+}
+
+/// The batch that was pickled, and the guarantees of its last step.
+#[pyfunction]
+pub(crate) fn unpickled_batch(saved: Saved, guaranteed: Vec<bool>) -> PyResult<FilterBatch> {
+    let (configuration, memories) = saved::load(saved)?;
+    let mut batch = FilterBatch::of(configuration, memories.len())?;
+    let own = &mut batch.loops.get_mut().unwrap_or_else(PoisonError::into_inner)[0];
+    for memory in &memories {
+        own.restore(memory).map_err(|e| refused(&e))?;
+    }
+    Ok(FilterBatch { memories, guaranteed, ..batch })
 }

@@ -12,6 +12,7 @@ use crate::loading::{Interface, configuration, refused};
 use crate::plan::Plan;
 use crate::report::Step;
 use crate::sample::Loop;
+use crate::saved::{self, Reduced, Saved};
 
 /// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
 /// same bits.
@@ -21,6 +22,9 @@ use crate::sample::Loop;
 /// own that `punctual.check` makes.
 ///
 /// Raises `punctual.Error` for a configuration that cannot be used, with the field, the value and what is allowed.
+///
+/// It can be pickled and copied with all that it remembers; the copy goes on with the same bits. A plug-in is not in
+/// a pickle: it must lie where it lay.
 #[pyclass(module = "punctual")]
 pub(crate) struct Filter {
     configuration: FilterConfiguration,
@@ -40,21 +44,20 @@ pub(crate) struct Filter {
 impl Filter {
     #[new]
     fn new(configuration: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let configuration = self::configuration(configuration)?;
-        let interface = Interface::of(&configuration);
-        let own = Loop::new(&configuration)?;
-        let (states, inputs) = (interface.states.len(), interface.inputs.len());
-        Ok(Self {
-            names: interface.barriers.names.clone().into(),
-            fresh: own.memory(),
-            own: Mutex::new(own),
-            x: vec![0.0; states],
-            u_ref: vec![0.0; inputs],
-            u: vec![0.0; inputs],
-            seen: (0.0, vec![0.0; states]),
-            interface,
-            configuration,
-        })
+        Self::of(self::configuration(configuration)?)
+    }
+
+    fn __reduce__<'py>(&mut self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, f64, Vec<f64>)>> {
+        let memory = self.own.get_mut().unwrap_or_else(PoisonError::into_inner).memory();
+        let saved = saved::save(&self.configuration, &[memory])?;
+        let (t, x) = self.seen.clone();
+        saved::reduced(py, "unpickled_filter", (saved, t, x))
+    }
+
+    /// Time in s for which the first input counts as held: `experiment.step_size`.
+    #[getter]
+    fn step_size(&self) -> f64 {
+        self.configuration.experiment.step_size
     }
 
     /// Components of `x`, in order: name to unit. The measured states, then the inputs of barriers.
@@ -78,8 +81,8 @@ impl Filter {
     /// Computes the safe input at time `t` (s) and remembers the sample. Deadlines count from the first step; the
     /// sampling period is the time between steps, at first `experiment.step_size`.
     ///
-    /// - `x`: the state in the order of `states`, an array of float64 or a sequence of numbers.
-    /// - `u_ref`: the input wanted, in the order of `inputs`. Default: zeros.
+    /// - `x`: the state in the order of `states`, an array or a sequence of real numbers. Those of float64 are the fastest.
+    /// - `u_ref`: the input wanted, in the order of `inputs`, likewise. Default: zeros.
     ///
     /// Raises `TypeError` or `ValueError` for an array of another type or shape. Numerical outcomes (infeasible,
     /// not a number) are statuses.
@@ -92,9 +95,11 @@ impl Filter {
         u_ref: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
         let Interface { states, inputs, .. } = &self.interface;
-        arrays::vector(x, "x", &states.names, &mut self.x)?;
+        arrays::numbers(x, "x", &[states.len()], &states.names, &mut self.x)?;
         match u_ref {
-            Some(u_ref) => arrays::vector(u_ref, "u_ref", &inputs.names, &mut self.u_ref)?,
+            Some(u_ref) => {
+                arrays::numbers(u_ref, "u_ref", &[inputs.len()], &inputs.names, &mut self.u_ref)?;
+            }
             None => self.u_ref.fill(0.0),
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -133,4 +138,37 @@ impl Filter {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
         own.restore(&self.fresh).map_err(|e| refused(&e))
     }
+}
+
+impl Filter {
+    /// The filter before its first sample.
+    fn of(configuration: FilterConfiguration) -> PyResult<Self> {
+        let interface = Interface::of(&configuration);
+        let own = Loop::new(&configuration)?;
+        let (states, inputs) = (interface.states.len(), interface.inputs.len());
+        Ok(Self {
+            names: interface.barriers.names.clone().into(),
+            fresh: own.memory(),
+            own: Mutex::new(own),
+            x: vec![0.0; states],
+            u_ref: vec![0.0; inputs],
+            u: vec![0.0; inputs],
+            seen: (0.0, vec![0.0; states]),
+            interface,
+            configuration,
+        })
+    }
+}
+
+/// The filter that was pickled, and the time and state of its last sample.
+#[pyfunction]
+pub(crate) fn unpickled_filter(saved: Saved, t: f64, x: Vec<f64>) -> PyResult<Filter> {
+    let (configuration, memories) = saved::load(saved)?;
+    let mut filter = Filter::of(configuration)?;
+    let own = filter.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+    for memory in &memories {
+        own.restore(memory).map_err(|e| refused(&e))?;
+    }
+    filter.seen = (t, x);
+    Ok(filter)
 }

@@ -9,6 +9,7 @@
 //! | `arrays` | arguments that are arrays: type, shape, and the errors of those that do not fit |
 //! | `loading` | a path or dict to a configuration and the names of its signals |
 //! | `sample` | one loop: a filter, and its memory |
+//! | `saved` | what `pickle` and `copy` keep of a filter |
 //! | `promise` | the verdict on a promise in a recorded run |
 //! | `report` | the report of a step, as Python objects |
 //! | `plan` | the plan of a filter that follows plans |
@@ -26,6 +27,7 @@ mod pool;
 mod promise;
 mod report;
 mod sample;
+mod saved;
 
 use pyo3::prelude::*;
 
@@ -38,5 +40,7 @@ fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<report::Step>()?;
     module.add_class::<report::BarrierReport>()?;
     module.add_function(wrap_pyfunction!(promise::judge, module)?)?;
+    module.add_function(wrap_pyfunction!(filter::unpickled_filter, module)?)?;
+    module.add_function(wrap_pyfunction!(batch::unpickled_batch, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

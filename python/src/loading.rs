@@ -21,11 +21,17 @@ pub(crate) fn configuration(argument: &Bound<'_, PyAny>) -> PyResult<FilterConfi
     let helper = argument.py().import("punctual._configuration")?;
     let (text, folder, file): (String, PathBuf, String) =
         helper.call_method1("text_folder_file", (argument,))?.extract()?;
-    let refused = |error: ConfigurationError| match &*file {
+    parse(&text, folder, &file)
+}
+
+/// Reads and completes the TOML text of a filter, whose plug-in is in `folder`; errors begin with the name of the `file`,
+/// if it has one.
+pub(crate) fn parse(text: &str, folder: PathBuf, file: &str) -> PyResult<FilterConfiguration> {
+    let refused = |error: ConfigurationError| match file {
         "" => refused(&error),
         file => refused(&format!("{file}: {error}")),
     };
-    match Configuration::parse_with(&text, &PluginFolder::new(folder)).map_err(refused)? {
+    match Configuration::parse_with(text, &PluginFolder::new(folder)).map_err(refused)? {
         Configuration::Filter(filter) => Ok(filter),
         other => {
             let message = format!("is {:?}, must be \"filter\"", other.kind());

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import punctual
 import pytest
 
@@ -23,6 +24,22 @@ FILTER = {
     "experiment": {"step_size": STEP},
 }
 PLANT = {"kind": "plant", "plant": {"model": "unicycle"}, "x0": {"v": 2.0}}
+# Every input has bounds: plans are followed.
+ASSURED = FILTER | {"bounds": {"a": [-20.0, 20.0], "omega": [-3.0, 3.0]}}
+
+
+def exactly(values, shape):
+    """The same numbers in every way that NumPy or a program may hold them; float64 first. All are exact in float16."""
+    plain = np.array(values, float).reshape(shape)
+    strided = np.repeat(plain, 2, -1)[..., ::2]
+    assert not strided.flags.c_contiguous
+    frozen = plain.copy()
+    frozen.flags.writeable = False
+    kinds = [np.float16, np.float32, np.longdouble, ">f8", np.int8, np.int64, np.uint16]
+    nested = plain.tolist()
+    tuples = tuple(map(tuple, nested)) if plain.ndim == 2 else tuple(nested)
+    scalars = [list(row) for row in plain.astype(np.float32)] if plain.ndim == 2 else list(plain.astype(np.float32))
+    return [plain, strided, frozen, np.asfortranarray(plain), nested, tuples, scalars, *map(plain.astype, kinds)]
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 """`punctual.FilterBatch`: many loops, each with the bits of a `Filter` of its own."""
 
+import copy
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -9,7 +11,7 @@ import numpy as np
 import punctual
 import pytest
 
-from conftest import FILTER, ROOT, STEP, goal
+from conftest import ASSURED, FILTER, ROOT, STEP, exactly, goal
 
 STEPS = 60
 
@@ -73,11 +75,46 @@ def test_all_is_forgotten_by_reset():
             assert a.tobytes() == b.tobytes()
 
 
-def test_u_ref_is_zero_by_default_and_layout_does_not_matter():
-    x, _ = drawn(20)
-    given = [(x[0], np.zeros((20, 2))), (x[0], None), (np.asfortranarray(x[0]), None), (np.repeat(x[0], 2, 0)[::2], None)]
+def test_u_ref_is_zero_by_default_and_type_and_layout_do_not_matter():
+    given = [*zip(exactly(range(80), (20, 4)), exactly([0.0] * 40, (20, 2)))]
+    given.append((given[0][0], None))
     answers = [[a.tobytes() for a in punctual.FilterBatch(FILTER, 20).step(0.0, *g)] for g in given]
     assert answers == [answers[0]] * len(given)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda own: pickle.loads(pickle.dumps(own))])
+@pytest.mark.parametrize("configuration", [FILTER, ASSURED], ids=["rows", "plans"])
+def test_a_copy_goes_on_with_the_same_bits(configuration, copied):
+    n = 20
+    x, u_ref = drawn(n, 8)
+    batch, straight = punctual.FilterBatch(configuration, n), punctual.FilterBatch(configuration, n)
+
+    def said(own, k, wanted):
+        return [a.tobytes() for a in own.step(k * STEP, x[k], wanted)] + [own.guaranteed.tobytes()]
+
+    begun = [said(batch, k, u_ref[k]) for k in range(4)]
+    again = copied(batch)
+    assert (len(again), again.step_size) == (n, STEP) and again.guaranteed.tobytes() == batch.guaranteed.tobytes()
+    gone = [said(again, k, u_ref[k]) for k in range(4, 8)]
+    other = [said(batch, k, -u_ref[k]) for k in range(4, 8)]
+    assert [said(straight, k, u_ref[k]) for k in range(8)] == begun + gone
+    assert gone != other
+    again.reset()
+    assert [said(again, k, u_ref[k]) for k in range(4)] == begun
+
+
+def test_guarantees_are_those_of_the_rows():
+    n = 12
+    x, u_ref = drawn(n, 3)
+    # It starts inside the post, which is then not promised.
+    x[:, 0, :2] = [8.0, 5.0]
+    batch, singles = punctual.FilterBatch(ASSURED, n), [punctual.Filter(ASSURED) for _ in range(n)]
+    assert batch.guaranteed.tolist() == [[False, False]] * n
+    for k in range(3):
+        batch.step(k * STEP, x[k], u_ref[k])
+        steps = [own.step(k * STEP, x[k, i], u_ref[k, i]) for i, own in enumerate(singles)]
+        assert batch.guaranteed.tolist() == [[b.guaranteed for b in step.barriers.values()] for step in steps]
+    assert batch.guaranteed.any() and not batch.guaranteed.all()
 
 
 def test_the_number_of_threads_changes_no_bit():
@@ -124,8 +161,12 @@ def test_a_forked_process_has_threads_of_its_own():
         ((np.zeros((3, 4)),), ValueError, r"x: has shape \(3, 4\), must have \(5, 4\) \(x_p, y_p, theta, v\)"),
         ((np.zeros(20),), ValueError, r"x: has shape \(20,\), must have \(5, 4\)"),
         ((np.zeros((5, 4)), np.zeros((5, 4))), ValueError, r"u_ref: has shape \(5, 4\), must have \(5, 2\) \(a, omega\)"),
-        ((np.zeros((5, 4), np.float32),), TypeError, "x: is an array of float32, must be one of float64"),
-        (([[0.0] * 4] * 5,), TypeError, r"x: is list, must be an array of float64 of shape \(5, 4\)"),
+        (([[0.0] * 4] * 4,), ValueError, r"x: has shape \(4, 4\), must have \(5, 4\)"),
+        (([[0.0] * 4, [0.0]],), ValueError, r"x: is list of no shape, must be real numbers .* of shape \(5, 4\)"),
+        ((np.zeros((5, 4), complex),), TypeError, r"x: is ndarray of complex128, must be real numbers .* of shape \(5, 4\)"),
+        ((np.zeros((5, 4), bool),), TypeError, "x: is ndarray of bool, must be real numbers"),
+        ((np.zeros((5, 4)), np.full((5, 2), "a")), TypeError, "u_ref: is ndarray of <U1, must be real numbers"),
+        ((np.zeros((5, 4)), np.zeros((5, 2), object)), TypeError, "u_ref: is ndarray of object, must be real numbers"),
     ],
 )
 def test_other_arrays_are_refused(arguments, error, words):
@@ -141,5 +182,6 @@ def test_other_arguments_are_refused():
     batch = punctual.FilterBatch(FILTER, 5)
     with pytest.raises(ValueError, match=r"rows: has shape \(4,\), must have \(5,\)"):
         batch.rearm(np.zeros(4, bool))
-    with pytest.raises(TypeError, match="rows: is an array of int64, must be one of bool"):
+    with pytest.raises(TypeError, match=r"rows: is ndarray of int64, must be bool of shape \(5,\)"):
         batch.reset(np.zeros(5, int))
+    batch.reset([True, False, True, False, True])

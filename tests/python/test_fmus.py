@@ -1,5 +1,6 @@
 """`build`, `check`, `variables` and `run_cli`: the command line by way of the package."""
 
+import pickle
 import shutil
 import subprocess
 import sys
@@ -64,6 +65,17 @@ def test_a_plugin_of_a_dict_is_looked_for_in_the_current_folder(tmp_path, monkey
     punctual.build(filter_, "filter.fmu")
     assert punctual.Filter(filter_).states == {"p": "m", "v": "m/s", "acc": "m/s2"}
     assert sorted(p.name for p in tmp_path.iterdir()) == ["filter.fmu", "libjerk_car.so"]
+    # A pickle knows where it lies, from any folder, and notices one with other bytes.
+    pickled = pickle.dumps(punctual.Filter(filter_))
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert pickle.loads(pickled).states == {"p": "m", "v": "m/s", "acc": "m/s2"}
+    subprocess.run([*command, "-DOTHER", "-O1"], check=True)
+    with pytest.raises(punctual.Error, match=r"^plant\.plugin_digest: "):
+        pickle.loads(pickled)
+    (tmp_path / "libjerk_car.so").unlink()
+    with pytest.raises(punctual.Error, match=r"^plant\.plugin: is \"jerk_car\", but .*libjerk_car\.so cannot be read"):
+        pickle.loads(pickled)
 
 
 def test_check_is_what_the_command_line_says():

@@ -19,9 +19,9 @@ def test_it_is_the_installed_one_with_the_version_of_the_workspace():
     assert ROOT not in FOLDER.parents
     manifest = tomllib.loads((ROOT / "Cargo.toml").read_text())
     version = manifest["workspace"]["package"]["version"]
-    assert punctual.__version__ == version == metadata.version("punctual")
-    assert metadata.metadata("punctual")["License-Expression"] == "MIT OR Apache-2.0"
-    licences = {Path(file).name for file in metadata.files("punctual") if "licenses" in str(file)}
+    assert punctual.__version__ == version == metadata.version("punctual-filter")
+    assert metadata.metadata("punctual-filter")["License-Expression"] == "MIT OR Apache-2.0"
+    licences = {Path(file).name for file in metadata.files("punctual-filter") if "licenses" in str(file)}
     assert licences == {"LICENSE-MIT", "LICENSE-APACHE"}
 
 

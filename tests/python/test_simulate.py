@@ -111,6 +111,10 @@ def test_a_function_as_nominal_controller(fmus):
     assert t == 1.0 and x.tolist() == [result[f"x.{name}"][-1] for name in ["x_p", "y_p", "theta", "v"]]
     array = punctual.simulate(*fmus, nominal=lambda t, x: np.array([-x[3], 0.0]), **options)
     assert array.tobytes() == result.tobytes()
+    single, plain = (
+        punctual.simulate(*fmus, nominal=lambda t, x: np.array([1, 2], kind), **options) for kind in [np.float32, float]
+    )
+    assert single.tobytes() == plain.tobytes() != array.tobytes()
 
 
 def test_the_result_is_one_of_fmpy(fmus, tmp_path):
@@ -134,7 +138,10 @@ def test_the_result_is_one_of_fmpy(fmus, tmp_path):
         (dict(record=["goal.hh"]), "record: 'goal.hh' is none of x.x_p"),
         (dict(nominal={"b": ("v", 1.0)}), "nominal: 'b' is none of u_ref.a, u_ref.omega"),
         (dict(nominal={"a": ("w", 1.0)}), "nominal.a: 'w' is no output of the plant, which has x.x_p"),
-        (dict(nominal=lambda t, x: [0.0]), r"nominal: is \[0.0\] at t = 0 s, must be numbers for u_ref.a, u_ref.omega"),
+        (dict(nominal=lambda t, x: [0.0]), r"nominal: is \[0.0\] at t = 0 s, must be real numbers for u_ref.a, u_ref.omega"),
+        (dict(nominal=lambda t, x: np.zeros(2, complex)), r"nominal: is array\(\[0.\+0.j, .* must be real numbers for"),
+        (dict(nominal=lambda t, x: np.array(["0", "0"])), "nominal: is array.* must be real numbers for"),
+        (dict(nominal=lambda t, x: "00"), "nominal: is '00' at t = 0 s, must be real numbers for"),
     ],
 )
 def test_what_does_not_fit_is_refused(fmus, change, words):
@@ -194,6 +201,24 @@ components = ["filter", "plant"]
         punctual.promise(result[["time", "status", "goal.h"]], "goal")
 
 
+def test_a_result_is_drawn(fmus, tmp_path):
+    result = punctual.simulate(*fmus, stop_time=1.0, step_size=STEP, nominal=DAMPING)
+    figure = punctual.plot(result)
+    labels = [[line.get_label() for line in axes.lines if line.get_label()[0] != "_"] for axes in figure.axes]
+    inputs = ["u.a", "u_ref.a", "u.omega", "u_ref.omega"]
+    assert labels == [["goal.h", "goal.profile"], ["post.h", "post.profile"], inputs]
+    for line in (line for axes in figure.axes for line in axes.lines if line.get_label()[0] != "_"):
+        assert line.get_ydata().tolist() == result[line.get_label()].tolist()
+    # The deadline of the one, and none of the other.
+    assert [[line.get_xdata()[0] for line in axes.lines[3:]] for axes in figure.axes[:2]] == [[5.0], []]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["h in m", "h in m", ""]
+    only = punctual.plot(result[["time", "post.h", "post.profile"]], "post")
+    assert len(only.axes) == 1
+    only.savefig(tmp_path / "post.png")
+    with pytest.raises(punctual.Error, match="^result: has no field 'gate.h', only time, "):
+        punctual.plot(result, "gate")
+
+
 def test_a_refused_step_names_fmu_time_and_reason(fmus):
     # A state that is no number is an outcome of the filter; a plant cannot go on from one.
     with pytest.raises(punctual.Error, match="fmi2.* of the plant.* was refused: ") as refused:
@@ -209,7 +234,11 @@ def test_a_file_that_is_no_fmu_is_named(fmus, tmp_path):
         punctual.simulate(fmus[0], tmp_path / "none.fmu", stop_time=0.1, step_size=STEP)
 
 
-def test_without_fmpy_the_message_says_what_to_install(fmus, monkeypatch):
+def test_without_a_package_the_message_says_what_to_install(fmus, monkeypatch):
+    result = punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    with pytest.raises(ImportError, match="punctual.plot needs Matplotlib: pip install matplotlib"):
+        punctual.plot(result)
     monkeypatch.setitem(__import__("sys").modules, "fmpy", None)
-    with pytest.raises(ImportError, match=r"pip install punctual\[fmpy\]"):
+    with pytest.raises(ImportError, match=r"pip install fmpy"):
         punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)

@@ -1,0 +1,208 @@
+"""`punctual.gymnasium`: what a policy wants goes through the filter, one environment or many at a time."""
+
+import copy
+import importlib
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import punctual
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from punctual.gymnasium import SafetyFilterEnv, SafetyFilterVectorEnv
+
+from conftest import ROOT
+
+# A power of two, so that times and deadlines are exact wherever an episode begins.
+DT = 1 / 32
+STEPS = 12
+LEAN = 0.2
+UPRIGHT = {
+    "kind": "filter",
+    "plant": {
+        "states": [{"name": "y", "unit": "rad", "min": -0.4, "max": 0.4}, {"name": "omega", "unit": "rad/s"}],
+        "inputs": [{"name": "torque", "unit": "N.m", "min": -2.0, "max": 2.0}],
+        "derivatives": {"y": "omega", "omega": "15 * sin(y) + 3 * torque"},
+    },
+    "barrier": [
+        {"name": "left", "expression": f"y + {LEAN}", "unit": "rad", "deadline": 1.0},
+        {"name": "right", "expression": f"{LEAN} - y", "unit": "rad", "deadline": 1.0},
+    ],
+    "experiment": {"step_size": DT},
+}
+START = {"x_init": 0.1, "y_init": 0.1}
+
+
+class Upright(gymnasium.Wrapper):
+    """Pendulum-v1 that starts upright, with steps of DT, and remembers what it was told to do."""
+
+    def __init__(self):
+        super().__init__(gymnasium.make("Pendulum-v1", max_episode_steps=STEPS))
+        self.unwrapped.dt = DT
+        self.done = []
+
+    def reset(self, *, seed=None, options=None):
+        return self.env.reset(seed=seed, options=START)
+
+    def step(self, action):
+        self.done.append(action)
+        return self.env.step(action)
+
+
+def state(observation):
+    """Of one observation, or of a row each."""
+    return np.stack([np.arctan2(observation[..., 1], observation[..., 0]), observation[..., 2]], axis=-1)
+
+
+def wanted(seed, count, n=None):
+    """Torques of the type of the action space."""
+    space = gymnasium.spaces.Box(-2.0, 2.0, (1,) if n is None else (n, 1), np.float32, seed=seed)
+    return [space.sample() for _ in range(count)]
+
+
+def test_actions_are_those_of_the_filter_and_info_says_so():
+    bare, own = Upright(), punctual.Filter(UPRIGHT)
+    env = SafetyFilterEnv(bare, UPRIGHT, state=state)
+    assert env.dt == DT
+    changed = set()
+    for episode in range(2):
+        observation, _ = env.reset(seed=3)
+        own.reset()
+        for k, action in enumerate(wanted(5, STEPS)):
+            step = own.step(k * DT, state(observation), action)
+            observation, _, _, truncated, info = env.step(action)
+            assert info["filter_action"].tobytes() == step.u.astype(np.float32).tobytes()
+            assert bare.done[-1] is info["filter_action"] and info["filter_nominal"] is action
+            assert info["filter_action"] in env.action_space
+            assert info["filter_changed"] == (step.u[0] != action[0])
+            assert info["filter_status"] is step.status
+            assert info["filter_guaranteed"] is all(b.guaranteed for b in step.barriers.values()) is True
+            assert (info["filter_action"] is action) == (not info["filter_changed"])
+            changed.add(info["filter_changed"])
+        assert truncated
+    assert changed == {True, False}
+    # The second episode is the first once more: the filter has forgotten it.
+    assert np.array(bare.done[:STEPS]).tobytes() == np.array(bare.done[STEPS:]).tobytes()
+
+
+def test_state_and_action_may_be_scaled_and_picked():
+    bare = Upright()
+    # From [0, cos, sin, speed], in small angles; an action of 1 is the whole torque.
+    shown = gymnasium.wrappers.TransformObservation(
+        bare, lambda o: np.append(0.0, o), gymnasium.spaces.Box(-9.0, 9.0, (4,))
+    )
+    scaled = gymnasium.wrappers.RescaleAction(shown, np.float32(-1.0), np.float32(1.0))
+    env = SafetyFilterEnv(
+        scaled, punctual.Filter(UPRIGHT), state=[2, 3], to_input=lambda a: 2.0 * a, to_action=lambda u: u / 2.0
+    )
+    own = punctual.Filter(UPRIGHT)
+    observation, _ = env.reset(seed=3)
+    for k, action in enumerate(wanted(5, STEPS)):
+        step = own.step(k * DT, observation[[2, 3]], action)
+        observation, *_, info = env.step(action / np.float32(2.0))
+        assert info["filter_action"].tobytes() == (step.u / 2.0).astype(np.float32).tobytes()
+
+
+def test_an_environment_is_copied_with_its_filter():
+    env = SafetyFilterEnv(Upright(), UPRIGHT, state=state)
+    env.reset(seed=3)
+    actions = wanted(5, STEPS)
+    [env.step(action) for action in actions[:5]]
+    again = copy.deepcopy(env)
+    [again.step(-action) for action in actions[:3]]
+    straight = SafetyFilterEnv(Upright(), UPRIGHT, state=state)
+    straight.reset(seed=3)
+    expected = [straight.step(action)[0].tobytes() for action in actions]
+    assert [env.step(action)[0].tobytes() for action in actions[5:]] == expected[5:]
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_every_row_is_an_environment_of_its_own(mode):
+    n, seed = 3, 11
+    envs = SyncVectorEnv([Upright for _ in range(n)], autoreset_mode=mode)
+    batch = SafetyFilterVectorEnv(envs, UPRIGHT, state=state)
+    singles = [SafetyFilterEnv(Upright(), UPRIGHT, state=state) for _ in range(n)]
+    seen, _ = batch.reset(seed=seed)
+    assert seen.tolist() == [env.reset(seed=seed + i)[0].tolist() for i, env in enumerate(singles)]
+    # An early end of one row, so that episodes begin at different times.
+    for env in (singles[1], envs.envs[1]):
+        while not isinstance(env, gymnasium.wrappers.TimeLimit):
+            env = env.env
+        env._max_episode_steps = STEPS - 5
+    over, begun = np.zeros(n, bool), 0
+    for actions in wanted(5, 3 * STEPS, n):
+        if mode is AutoresetMode.DISABLED and over.any():
+            seen, _ = batch.reset(options={"reset_mask": over.copy()})
+            begun += over.sum()
+            for i in np.flatnonzero(over):
+                assert singles[i].reset()[0].tolist() == seen[i].tolist()
+            over[:] = False
+        seen, _, terminated, truncated, info = batch.step(actions)
+        for i, env in enumerate(singles):
+            if mode is AutoresetMode.NEXT_STEP and over[i]:
+                assert env.reset()[0].tolist() == seen[i].tolist()
+                over[i], begun = False, begun + 1
+                continue
+            observation, _, _, ended, said = env.step(actions[i])
+            over[i] = ended
+            for key in ["filter_changed", "filter_nominal", "filter_action", "filter_status", "filter_guaranteed"]:
+                assert np.array_equal(info[key][i], said[key]) and info[f"_{key}"][i], key
+            if mode is AutoresetMode.SAME_STEP and ended:
+                observation, begun = env.reset()[0], begun + 1
+            assert observation.tolist() == seen[i].tolist()
+        assert truncated.tolist() == over.tolist() and not terminated.any()
+    assert begun >= 2 * n
+    # All at once start at time 0.
+    again, _ = batch.reset(seed=seed)
+    assert again.tolist() == [env.reset(seed=seed + i)[0].tolist() for i, env in enumerate(singles)]
+
+
+def test_the_checker_of_gymnasium_finds_nothing_new():
+    def warned(env):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            check_env(env, skip_render_check=True)
+        return {str(warning.message) for warning in said}
+
+    bare = gymnasium.make("Pendulum-v1").unwrapped
+    env = SafetyFilterEnv(bare, UPRIGHT | {"experiment": {"step_size": 0.05}}, state=state)
+    new = warned(env) - warned(bare)
+    assert [text for text in new if "is different from the unwrapped version" not in text] == []
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(punctual.Error, match=r"^experiment.step_size: is 0.001 s, must be .* dt, 0.03125 s$"):
+        SafetyFilterEnv(Upright(), UPRIGHT | {"experiment": {}})
+    with pytest.raises(punctual.Error, match="^experiment.step_size: is 0.03125 s, must be .* dt, 0.1 s$"):
+        SafetyFilterEnv(Upright(), UPRIGHT, dt=0.1)
+    car = gymnasium.make("MountainCarContinuous-v0")
+    with pytest.raises(punctual.Error, match="^dt: is not given, and the environment has no dt or tau; must be"):
+        SafetyFilterEnv(car, UPRIGHT)
+    assert SafetyFilterEnv(car, UPRIGHT, dt=DT).dt == DT
+    envs = SyncVectorEnv([Upright, Upright])
+    with pytest.raises(punctual.Error, match="^filter: has 3 rows, must have 2, one for each environment$"):
+        SafetyFilterVectorEnv(envs, punctual.FilterBatch(UPRIGHT, 3))
+    for env, action in [(SafetyFilterEnv(Upright(), UPRIGHT), [0.0]), (SafetyFilterVectorEnv(envs, UPRIGHT), [[0.0]] * 2)]:
+        with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+            env.step(action)
+    # The observation as it is has three components.
+    env.reset()
+    with pytest.raises(ValueError, match=r"x: has shape \(2, 3\), must have \(2, 2\) \(y, omega\)"):
+        env.step([[0.0]] * 2)
+
+
+def test_without_gymnasium_the_message_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "punctual.gymnasium")
+    with pytest.raises(ImportError, match="punctual.gymnasium needs Gymnasium 1.1 or later: pip install gymnasium"):
+        importlib.import_module("punctual.gymnasium")
+
+
+def test_the_example_keeps_what_it_claims(tmp_path):
+    script = ROOT / "examples" / "gymnasium_pendulum.py"
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, check=True, capture_output=True, text=True)
+    bare, filtered = done.stdout.splitlines()
+    assert "20 of 20 episodes fall" in bare and "at most 0.1" in filtered
