@@ -13,7 +13,7 @@ use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{InProcess, Own, Simulation, System, links, port};
+use crate::coupling::{self, InProcess, Own, Simulation, System, links, port};
 use crate::error::Error;
 use crate::host::{Causality, Fmu, ScalarType};
 use crate::package;
@@ -158,8 +158,8 @@ impl Campaign {
     ///
     /// A file that cannot be read; a key or value that cannot be used; an FMU of another program.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read(path)?;
-        let file: File = read_toml(&text).map_err(|e| Error::from(e).in_file(path))?;
+        let source_text = read(path)?;
+        let file: File = read_toml(&source_text).map_err(|e| Error::from(e).in_file(path))?;
         let system_path = match &file.system {
             SystemSource::File(name) => path.with_file_name(name),
             SystemSource::Inline(_) => path.to_owned(),
@@ -167,12 +167,25 @@ impl Campaign {
         let (system, system_text) = match file.system {
             SystemSource::File(_) => {
                 let text = read(&system_path)?;
+                if coupling::is_configuration(&text) {
+                    let own = |e: Error| e.in_file(&system_path);
+                    let configuration = package::read_configuration(&system_path)?;
+                    let (system, configurations) = coupling::alone(configuration).map_err(own)?;
+                    let configurations =
+                        configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
+                    let system = Some(system);
+                    return Self::of(
+                        Source { file: source_text, system, configurations },
+                        path,
+                        &system_path,
+                    );
+                }
                 let system = System::parse(&text).map_err(|e| e.in_file(&system_path))?;
                 (system, Some(text))
             }
             SystemSource::Inline(system) => (*system, None),
         };
-        let configuration = |(i, component): (usize, &crate::coupling::Component)| {
+        let configuration = |(i, component): (usize, &coupling::Component)| {
             let name = system_path.with_file_name(&component.fmu);
             let prefix = if system_text.is_none() { "system." } else { "" };
             configuration(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
@@ -180,7 +193,7 @@ impl Campaign {
         let configurations =
             system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
         let configurations = configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
-        Self::of(Source { file: text, system: system_text, configurations }, path, &system_path)
+        Self::of(Source { file: source_text, system: system_text, configurations }, path, &system_path)
     }
 
     /// Checks a campaign whose texts are given; errors name `path` or `system_path`.

@@ -6,10 +6,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::{Configuration, read_toml};
 use serde::Serialize;
 
-use crate::coupling::{self, Kept, Model, Order, Outcome, Picture, Promise, Simulation, System};
+use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
@@ -174,27 +173,17 @@ struct Opened {
 
 /// Opens a system file, or the file of a filter.
 fn open(arguments: &Arguments) -> Result<Opened, Error> {
-    #[derive(serde::Deserialize)]
-    struct Head {
-        kind: Option<serde::de::IgnoredAny>,
-    }
     let (path, out) = (&arguments.system, arguments.out.clone());
     let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
-    if !read_toml::<Head>(&text).is_ok_and(|head| head.kind.is_some()) {
+    if !coupling::is_configuration(&text) {
         let system = System::parse(&text)?;
         let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;
         return Ok(Opened { system, models, simulation, out });
     }
-    let (system, models) = match package::read_configuration(path)? {
-        Configuration::Filter(filter) => coupling::alone(path, filter)?,
-        other => {
-            let message = format!(
-                "is {:?}; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
-                other.kind()
-            );
-            return Err(Error::configuration("kind", message));
-        }
-    };
+    let (text, configurations) = coupling::alone(package::read_configuration(path)?)?;
+    let system = System::parse(&text)?;
+    let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned()));
+    let models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
     let simulation = Simulation::of(&system, &models)?;
     let out = Some(out.unwrap_or_else(|| stem(path).into()));
     Ok(Opened { system, models, simulation, out })

@@ -174,6 +174,18 @@ fn what_cannot_be_run_alone_is_told() {
     workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
     workshop.punctual(["run", "plant.toml"]).fails(
         2,
-        "plant.toml: kind: is \"plant\"; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
+        "plant.toml: kind: is \"plant\"; must be \"filter\", which runs with its own model, or a system file, which couples components",
     );
+}
+
+#[test]
+fn a_campaign_takes_a_file_alone() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 8.0"));
+    workshop.write(
+        "many.toml",
+        "system = \"car.toml\"\n[campaign]\nruns = 4\n[vary]\n\"plant.x0.theta\" = { distribution = \"uniform\", min = -1.0, max = 1.0 }\n",
+    );
+    workshop.punctual(["campaign", "many.toml", "--require", "success"]).success();
+    workshop.punctual(["replay", "many.parquet", "--run", "2"]).success();
 }
