@@ -6,6 +6,7 @@
 //! ```text
 //! error                the errors of all commands, with names and numbers
 //! host                 one FMU: archive, description, library, instance
+//! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! recording            the rows of a run; CSV
@@ -34,3 +35,4 @@ pub mod plot;
 pub mod recording;
 pub mod reproduce;
 pub mod validate;
+pub mod whole;

@@ -198,6 +198,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
 
+    simulation.stop_by(super::interruption()?);
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
     let columns = simulation.columns().to_vec();

@@ -14,6 +14,8 @@
 //! step, all is read.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::grid::Grid;
@@ -65,6 +67,8 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// Notes that hold for every run.
     standing_notes: usize,
     used: bool,
+    /// Set by somebody else to end a run.
+    stop: Option<Arc<AtomicBool>>,
 }
 
 /// Result of a run.
@@ -210,6 +214,7 @@ impl<P: Participant> Simulation<P> {
             notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
             standing_notes: 0,
             used: false,
+            stop: None,
         };
         simulation.note_shortened_step(descriptions);
         simulation.notes.extend(promises::unfed(system, descriptions, &links));
@@ -224,6 +229,18 @@ impl<P: Participant> Simulation<P> {
         match given {
             Some(start) => *start = Start::Real(reference, value),
             None => starts.push(Start::Real(reference, value)),
+        }
+    }
+
+    /// Ends a run at the next step once `stop` is set; what was recorded until then is kept.
+    pub fn stop_by(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = Some(stop);
+    }
+
+    fn check_stop(&self, time: f64) -> Result<(), Error> {
+        match &self.stop {
+            Some(stop) if stop.load(Ordering::Relaxed) => Err(Error::interrupted(time)),
+            _ => Ok(()),
         }
     }
 
@@ -284,6 +301,7 @@ impl<P: Participant> Simulation<P> {
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
+            self.check_stop(time)?;
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
                 self.set_inputs(c)?;
@@ -321,6 +339,7 @@ impl<P: Participant> Simulation<P> {
         }
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
+            self.check_stop(time)?;
             for c in 0..self.members.len() {
                 self.set_inputs(c)?;
             }

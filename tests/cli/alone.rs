@@ -189,3 +189,35 @@ fn a_campaign_takes_a_file_alone() {
     workshop.punctual(["campaign", "many.toml", "--require", "success"]).success();
     workshop.punctual(["replay", "many.parquet", "--run", "2"]).success();
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_its_rows() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 1e5"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_punctual"))
+        .args(["run", "car.toml", "--out", "out"])
+        .current_dir(workshop.path(""))
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary under test");
+    // The folder is made before the first step; the handler is there by then, or soon.
+    let begin = Instant::now();
+    while !workshop.path("out").exists() && begin.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
+    assert_eq!(child.wait().expect("a child").code(), Some(130));
+    let mut told = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut told).expect("UTF-8");
+    assert!(
+        told.starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
+        "{told}"
+    );
+    assert!(Table::parse(&workshop.text("out/car.csv")).len() > 1);
+}
