@@ -178,6 +178,7 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     if !coupling::is_configuration(&text) {
         let system = System::parse(&text)?;
         let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;
+        models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
         return Ok(Opened { system, models, simulation, out });
     }
     let (text, configurations) = coupling::alone(package::read_configuration(path)?)?;
@@ -344,6 +345,14 @@ pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = Str
     })
 }
 
+/// A verdict, coloured for a terminal.
+pub(super) fn shown(promise: Kept) -> String {
+    match promise {
+        Kept::Open => promise.words().to_owned(),
+        _ => output::verdict(promise.words(), promise == Kept::Kept),
+    }
+}
+
 /// A row for each promise and an empty line; nothing where there is no promise.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
@@ -365,7 +374,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
     rows.extend(promises.iter().map(|p| {
         vec![
             p.barrier.clone(),
-            p.promise.words().to_owned(),
+            shown(p.promise),
             time(p.arrival),
             time(p.late),
             time(p.left),

@@ -143,7 +143,7 @@ pub struct FilterConfiguration {
     pub experiment: ExperimentSection,
     /// What a run of this file alone has besides. It is no part of the FMU.
     #[serde(skip)]
-    pub run: RunSection,
+    pub run: Box<RunSection>,
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -341,7 +341,7 @@ impl FilterConfiguration {
             bounds: raw.bounds,
             measurement_errors: raw.measurement_errors,
             experiment: raw.experiment,
-            run: RunSection {
+            run: Box::new(RunSection {
                 x0: raw.x0,
                 u_ref: raw.u_ref,
                 simulated: raw
@@ -351,7 +351,7 @@ impl FilterConfiguration {
                     .map_err(|e| within("simulated", &e))?,
                 integration: raw.integration,
                 disturbance: raw.disturbance,
-            },
+            }),
         };
         configuration.check_sampling()?;
         configuration.complete_bounds()?;
@@ -378,7 +378,7 @@ impl FilterConfiguration {
         configuration.unassured = configuration.why_unassured();
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
-        if configuration.run != RunSection::default() {
+        if *configuration.run != RunSection::default() {
             configuration.alone()?;
         }
         Ok(configuration)
