@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! error                the errors of all commands, with names and numbers
+//! text                 files of text, and what is said of others in their place
 //! host                 one FMU: archive, description, library, instance
 //! isolation            FMUs in a child process, which may crash
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
@@ -33,4 +34,5 @@ pub mod pictures;
 pub mod plot;
 pub mod recording;
 pub mod reproduce;
+pub mod text;
 pub mod validate;

@@ -112,7 +112,8 @@ impl Simulation<Slave> {
     /// # Errors
     ///
     /// An FMU that cannot be opened, loaded or instantiated; a connection, start value, recorded
-    /// signal or picture that does not fit the FMUs (with the field of the system file).
+    /// signal or picture that does not fit the FMUs (with the field of the system file); an input that nothing
+    /// feeds.
     pub fn new(system: &System, base: &Path) -> Result<Self, Error> {
         let mut opened: Vec<(PathBuf, Rc<Fmu>)> = Vec::new();
         let mut fmus = Vec::new();
@@ -145,6 +146,7 @@ impl Simulation<Slave> {
     /// As for [`Simulation::new`]; or not one FMU for each component.
     pub fn with_fmus(system: &System, fmus: &[Rc<Fmu>]) -> Result<Self, Error> {
         let descriptions: Vec<_> = fmus.iter().map(|fmu| fmu.description()).collect();
+        promises::check_fed(system, &descriptions, &network::links(system, &descriptions)?, &[])?;
         let slave = |c: usize| instantiate(Rc::clone(&fmus[c]), &system.components()[c].name);
         Self::assembled(system, &descriptions, slave)
     }
@@ -229,7 +231,7 @@ impl<P: Participant> Simulation<P> {
             used: false,
         };
         simulation.note_shortened_step(descriptions);
-        simulation.notes.extend(promises::unfed(system, descriptions, &links));
+        simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
     }
@@ -372,7 +374,7 @@ impl<P: Participant> Simulation<P> {
                 });
                 given.unwrap_or(own)
             });
-            watched.reset(deadline);
+            self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
         // Set start values, and go to initialization mode.
         let used = std::mem::replace(&mut self.used, true);

@@ -15,7 +15,7 @@ pub use grid::Grid;
 pub use master::{Outcome, Simulation, Statistics};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;
-pub use promises::{Kept, Promise};
+pub use promises::{Kept, Promise, check_fed};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,

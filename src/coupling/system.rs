@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use punctual_fmu::configuration::{ConfigurationError, read_toml};
+use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
 use crate::error::Error;
+use crate::text;
 
 /// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
 /// so its numbers are in range and its component names are unique.
@@ -281,7 +282,7 @@ impl System {
     /// Text that is not TOML, unknown or missing keys, values of the wrong type or out of range,
     /// component names that are empty, have a dot or are used twice: each with the field.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let system: Self = read_toml(text)?;
+        let system: Self = read_toml(text).map_err(|e| FileKind::System.instead(text).unwrap_or(e))?;
         system.check()?;
         Ok(system)
     }
@@ -292,8 +293,7 @@ impl System {
     ///
     /// A file that cannot be read, or as for [`System::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
-        Self::parse(&text).map_err(|e| e.in_file(path))
+        Self::parse(&text::read(path)?).map_err(|e| e.in_file(path))
     }
 
     /// The same system, run to `stop_time` in steps of `step` (s), where these are given.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_models::Model;
+use punctual_models::{Model, Unit, unit_of};
 use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,8 @@ use super::key::{
 use super::names::{Named, check_identifier, is_reserved, taken};
 use super::plugin::{PluginDigest, PluginLoader, PluginSection};
 use super::reference::{self, RawReference};
-use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit};
+use super::unit::measured;
+use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit, over_seconds};
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -86,21 +87,17 @@ impl From<&Signal> for VariableSection {
 
 /// `[plant]` of a filter or plant as it stands in a file: the keys of every kind of plant.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields, expecting = "struct PlantSection")]
+#[serde(deny_unknown_fields)]
 pub(super) struct RawModel {
     pub(super) model: Option<ModelName>,
     pub(super) plugin: Option<String>,
     pub(super) plugin_digest: Option<PluginDigest>,
     l_r: Option<f64>,
     l_f: Option<f64>,
-    #[serde(default)]
-    pub(super) states: Vec<VariableSection>,
-    #[serde(default)]
-    pub(super) inputs: Vec<VariableSection>,
-    #[serde(default)]
-    pub(super) parameters: Vec<ParameterSection>,
-    #[serde(default)]
-    pub(super) derivatives: BTreeMap<String, String>,
+    pub(super) states: Option<Vec<VariableSection>>,
+    pub(super) inputs: Option<Vec<VariableSection>>,
+    pub(super) parameters: Option<Vec<ParameterSection>>,
+    pub(super) derivatives: Option<BTreeMap<String, String>>,
 }
 
 /// `[plant]` of a filter or plant.
@@ -234,10 +231,10 @@ impl PlantSection {
         // The kind of plant decides which keys belong to it.
         let given = [
             ("plugin", raw.plugin.is_some()),
-            ("states", !raw.states.is_empty()),
-            ("inputs", !raw.inputs.is_empty()),
-            ("parameters", !raw.parameters.is_empty()),
-            ("derivatives", !raw.derivatives.is_empty()),
+            ("states", raw.states.is_some()),
+            ("inputs", raw.inputs.is_some()),
+            ("parameters", raw.parameters.is_some()),
+            ("derivatives", raw.derivatives.is_some()),
         ];
         if raw.plugin_digest.is_some() && raw.plugin.is_none() {
             return refuse("plugin_digest", "given without `plugin`".into());
@@ -268,13 +265,16 @@ impl PlantSection {
         }
         // Expressions, or inputs alone: check the names and ranges.
         let RawModel { states, inputs, parameters, derivatives, .. } = raw;
+        let is_external = states.is_none() && parameters.is_none() && derivatives.is_none();
+        let (states, inputs) = (states.unwrap_or_default(), inputs.unwrap_or_default());
+        let (parameters, derivatives) = (parameters.unwrap_or_default(), derivatives.unwrap_or_default());
         for (group, variables) in [("states", &states), ("inputs", &inputs)] {
             for (i, variable) in variables.iter().enumerate() {
                 let path = format!("plant.{group}[{i}]");
                 check_variable(&path, &variable.name, &variable.unit, variable.range())?;
             }
         }
-        if states.is_empty() && parameters.is_empty() && derivatives.is_empty() {
+        if is_external {
             check_external_inputs(&inputs)?;
             return Ok(Self::External { inputs });
         }
@@ -290,7 +290,47 @@ impl PlantSection {
         }
         let plant = Self::Expressions(ExpressionSection { states, inputs, parameters, derivatives });
         plant.expressions()?;
+        plant.check_units()?;
         Ok(plant)
+    }
+
+    /// Refuses derivatives whose units certainly are not those of their states per second.
+    fn check_units(&self) -> Result<(), ConfigurationError> {
+        for (state, text) in self.states().iter().zip(self.derivatives()) {
+            let name = &state.name;
+            let refuse =
+                |message: String| ConfigurationError::new(format!("plant.derivatives.{name}"), message);
+            let wanted = measured(&state.unit).and_then(|_| measured(&over_seconds(&state.unit, 1)));
+            let (Some(found), Some(wanted)) = (self.unit_of(text).map_err(refuse)?, wanted) else { continue };
+            if found.is(&wanted) {
+                continue;
+            }
+            let why = if found.is_like(&wanted) {
+                let factor = found.per(&wanted);
+                format!("; numbers are taken as they are, so that this is wrong by the factor {factor:.6}")
+            } else {
+                String::new()
+            };
+            let unit = &state.unit;
+            return Err(refuse(format!(
+                "is {text:?}, which is in {found}; the derivative of {name}, which is in {unit}, must be in {wanted}{why}"
+            )));
+        }
+        Ok(())
+    }
+
+    /// The unit of an expression of states, inputs, constants and time, where it is known.
+    ///
+    /// # Errors
+    ///
+    /// Units that certainly do not fit together, in words.
+    pub(super) fn unit_of(&self, text: &str) -> Result<Option<Unit>, String> {
+        let constants = self.reference().into_iter().flat_map(ReferenceSection::constants);
+        let constants = constants.map(|(name, _)| (name.to_owned(), reference::LENGTH_UNIT.to_owned()));
+        let variables = self.states().into_iter().chain(self.inputs()).map(|v| (v.name, v.unit));
+        let own = self.own_parameters().iter().map(|p| (p.name.clone(), p.unit.clone()));
+        let units: BTreeMap<_, _> = variables.chain(constants).chain(own).collect();
+        unit_of(text, &|name| units.get(name).and_then(|unit| measured(unit)))
     }
 
     /// The reference plant, if it is one.

@@ -97,7 +97,9 @@ pub(super) const L_F: Key = Key::new(
     Some("10"),
     "`bicycle_kinematic`, `bicycle_kinematic_angle`: from the centre of mass to the front axle",
 );
-const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
+const LENGTH_VALUE: Value = Value::Number(Unit::Is(LENGTH_UNIT), Range::POSITIVE);
+/// The unit of the constants.
+pub(super) const LENGTH_UNIT: &str = "m";
 
 /// `[plant]` of a controller.
 pub(super) static SECTION: Section = Section {
@@ -114,7 +116,7 @@ pub(super) static SECTION: Section = Section {
 
 /// `[plant]` of a controller as it stands in a file, and what a reference plant has of the `[plant]` of others.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields, expecting = "struct ReferenceSection")]
+#[serde(deny_unknown_fields)]
 pub(super) struct RawReference {
     pub(super) model: ModelName,
     pub(super) l_r: Option<f64>,
@@ -185,7 +187,7 @@ impl ReferenceSection {
     ) -> Vec<Parameter<C>> {
         let row = |field: &str, what: &str, access: fn(&mut Self) -> &mut f64| {
             let names = (field.to_owned(), format!("plant.{field}"));
-            Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| section(c).map(access))
+            Parameter::new(names, LENGTH_UNIT, Range::POSITIVE, what, move |c: &mut C| section(c).map(access))
         };
         let mut rows = Vec::new();
         if self.model.has_l_r() {
