@@ -17,6 +17,7 @@ mod inspecting;
 mod judging;
 mod merging;
 mod misbehaving;
+mod mistakes;
 mod models;
 mod packing;
 mod plugins;

@@ -212,7 +212,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
                     (Ok(number), _) => visitor.visit_i64(number),
                     (_, Ok(number)) => visitor.visit_u64(number),
                     _ => refuse(format!(
-                        "is {number}, more than a whole number may be; a number with a decimal point may"
+                        "is {number}, which is too large for a whole number; write it with a decimal point"
                     )),
                 }
             }
@@ -247,7 +247,10 @@ impl<'de> Deserializer<'de> for Found<'de> {
         match self.value.get_ref() {
             DeValue::Array(list) if list.len() == length => self.list(visitor, true),
             DeValue::Array(list) => {
-                let message = format!("has {} entries, must have {length}", list.len());
+                let message = match list.len() {
+                    1 => format!("has 1 entry, must have {length}"),
+                    found => format!("has {found} entries, must have {length}"),
+                };
                 Err(Refusal::custom(message).at(self.value.span()))
             }
             _ => Err(self.refused(&format!("a list with {length} entries").as_str())),

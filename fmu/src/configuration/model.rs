@@ -13,7 +13,7 @@ use super::key::{
     Unit::Of,
     Value::{Name, Number, Tables, Text, TextByName, TextOrByName, Word},
 };
-use super::names::{Named, check_identifier, is_reserved, taken};
+use super::names::{Named, check_identifier, check_known, is_reserved, taken};
 use super::plugin::{PluginDigest, PluginLoader, PluginSection};
 use super::reference::{self, RawReference};
 use super::unit::measured;
@@ -178,7 +178,7 @@ pub(super) static PLANT: Section = Section {
 };
 
 const NAME: Key = Key::new("name", Name, None, "unique");
-const UNIT: Key = Key::new("unit", Text, Some("`1`"), "such as `m/s2` or `kg.m2/s`");
+const UNIT: Key = Key::new("unit", Text, Some("`1`"), "such as `m/s2`, `kg.m2/s` or `km/h`");
 const DESCRIPTION: Key = Key::new("description", Text, Some("none"), "for a human");
 
 /// An entry of `states` or `inputs`.
@@ -280,11 +280,7 @@ impl PlantSection {
         }
         // Every state has one expression, and every expression can be used.
         check_parameters(&parameters)?;
-        if let Some(unknown) = derivatives.keys().find(|k| states.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
-            let message = format!("unknown state, must be one of {}", names.join(", "));
-            return refuse(&format!("derivatives.{unknown}"), message);
-        }
+        check_known("plant.derivatives", &derivatives, "state", &states)?;
         if let Some(state) = states.iter().find(|s| !derivatives.contains_key(&s.name)) {
             return refuse(&format!("derivatives.{}", state.name), "missing, every state needs one".into());
         }

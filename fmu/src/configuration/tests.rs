@@ -280,7 +280,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
         (FILTER, "name = \"goal\"", "", "barrier[0].name: missing, it must be given (line 5)"),
         (FILTER, "plant = { model = \"unicycle\" }", "", "plant: missing, it must be given"),
         (FILTER, "radius = 2.0", "radius = \"2\"", "barrier[0].radius: is \"2\", must be a number (line 8)"),
-        (FILTER, "[45.0, 44.0]", "[45.0]", "barrier[0].centre: has 1 entries, must have 2 (line 7)"),
+        (FILTER, "[45.0, 44.0]", "[45.0]", "barrier[0].centre: has 1 entry, must have 2 (line 7)"),
         (
             FILTER,
             "[45.0, 44.0]",
@@ -311,8 +311,8 @@ fn unknown_and_missing_keys_and_wrong_types() {
             FILTER,
             "deadline = 10.0",
             "deadline = 99999999999999999999",
-            "barrier[0].deadline: is 99999999999999999999, more than a whole number may be; a number with a decimal point \
-             may (line 9)",
+            "barrier[0].deadline: is 99999999999999999999, which is too large for a whole number; write it with a decimal point \
+             (line 9)",
         ),
         (
             FILTER,
@@ -376,7 +376,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
             "\"headng\"",
             "controller: is \"headng\", must be \"damping\", \"heading\" or \"waypoints\" (did you mean heading?) (line 3)",
         ),
-        (HEADING, "[4.0, 3.0]", "[4.0]", "goal: has 1 entries, must have 2 (line 4)"),
+        (HEADING, "[4.0, 3.0]", "[4.0]", "goal: has 1 entry, must have 2 (line 4)"),
         (
             WAYPOINTS,
             "points = [[4.0, 3.0]",
