@@ -10,11 +10,11 @@ pub fn nearest(name: &str, known: &[&str]) -> String {
         let other = other.to_lowercase();
         let begins = name.len() >= BEGINNING && other.starts_with(&name)
             || other.len() >= BEGINNING && name.starts_with(&other);
-        if begins { 1 } else { strsim::damerau_levenshtein(&name, &other) }
+        if begins { 0 } else { strsim::damerau_levenshtein(&name, &other) }
     };
     let near = known.iter().map(|other| (distance(other), *other)).min();
     match near {
-        Some((distance, other)) if distance <= (name.chars().count() / 2).max(1) => {
+        Some((distance, other)) if distance <= name.chars().count() / 2 => {
             format!(" (did you mean {other}?)")
         }
         _ => String::new(),
@@ -27,18 +27,20 @@ mod tests {
 
     #[test]
     fn near_names_are_found_and_others_are_not() {
-        let known = ["margin", "centre", "step_size", "stop_time", "unit"];
+        let known = ["margin", "centre", "step_size", "stop_time", "unit", "v"];
         for (name, wanted) in [
             ("margn", "margin"),
             ("center", "centre"),
             ("Margin", "margin"),
             ("step", "step_size"),
+            ("stop", "stop_time"),
             ("units", "unit"),
+            ("V", "v"),
             ("stop_time_s", "stop_time"),
         ] {
             assert_eq!(nearest(name, &known), format!(" (did you mean {wanted}?)"), "{name}");
         }
-        for name in ["colour", "s", ""] {
+        for name in ["colour", "s", "w", ""] {
             assert_eq!(nearest(name, &known), "", "{name}");
         }
         assert_eq!(nearest("x", &[]), "");

@@ -142,14 +142,13 @@ pub(crate) fn parse(text: &str) -> Result<Tree, String> {
 }
 
 /// What is written otherwise here than in another language, or with another character.
-const HABITS: [(&str, &str); 17] = [
+const HABITS: [(&str, &str); 16] = [
     ("=", "an expression has no =; a barrier is what is to be >= 0, a derivative the right-hand side alone"),
     ("<", "an expression has no comparison; a barrier is what is to be >= 0, as b - a for a <= b"),
     (">", "an expression has no comparison; a barrier is what is to be >= 0, as a - b for a >= b"),
     ("&", "both a >= 0 and b >= 0 is min(a, b), or two barriers"),
     ("|", "an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
     ("'", "a derivative has no sign of its own; name the state that it is"),
-    ("%", "there is no remainder; sin and cos take any angle"),
     (".", "a name has no dots: sqrt, not np.sqrt"),
     ("[", "only ( and ) group"),
     ("{", "only ( and ) group"),
@@ -398,7 +397,6 @@ mod tests {
             ("|x|", "; an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
             ("x' + 1", "; a derivative has no sign of its own; name the state that it is"),
             ("np.sqrt(x)", "; a name has no dots: sqrt, not np.sqrt"),
-            ("x % 2", "; there is no remainder; sin and cos take any angle"),
             ("[x + 1]*2", "; only ( and ) group"),
             ("2x", "; a product is written with *"),
             ("(a + b)(c + d)", "; a product is written with *"),

@@ -370,8 +370,7 @@ fn outside_the_domain_nothing_crashes() {
     }
     workshop.write("p.toml", "kind = \"plant\"\nplant.plugin = \"fixture\"\nx0.v = 1.0\n");
     workshop.punctual(["build", "p.toml", "-o", "p.fmu"]).success();
-    let system =
-        "experiment = { stop_time = 4.0, step = 0.1 }\n[[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n\
+    let system = "experiment = { stop_time = 4.0, step = 0.1 }\n[[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n\
          start = { \"u.u\" = 0.0 }\n";
     workshop.write("s.toml", system);
     let done = workshop.punctual(["run", "s.toml", "--out", "out"]);

@@ -158,7 +158,7 @@ impl Found<'_> {
             DeValue::Array(_) => Unexpected::Seq,
             DeValue::Table(_) => Unexpected::Map,
         };
-        Refusal::invalid_type(found, wanted).at(self.value.span())
+        Refusal::invalid_type(found, wanted)
     }
 }
 
@@ -184,14 +184,14 @@ impl<'a> Found<'a> {
             return Err(self.written(self.refused(&visitor)));
         };
         let items = Items { rest: list.iter(), next: 0, key: self.key, fixed };
-        visitor.visit_seq(items).map_err(|e| e.at(self.value.span()))
+        visitor.visit_seq(items)
     }
 
     fn table<V: Visitor<'a>>(&self, visitor: V) -> Result<V::Value, Refusal> {
         let DeValue::Table(table) = self.value.get_ref() else {
             return Err(self.written(self.refused(&visitor)));
         };
-        visitor.visit_map(Entries::of(table)).map_err(|e| e.at(self.value.span()))
+        visitor.visit_map(Entries::of(table))
     }
 }
 
@@ -200,9 +200,9 @@ impl<'de> Deserializer<'de> for Found<'de> {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
         let refuse = |message: String| Err(Refusal::custom(message));
-        let read = match self.value.get_ref() {
-            DeValue::Array(_) => return self.list(visitor, false),
-            DeValue::Table(_) => return self.table(visitor),
+        match self.value.get_ref() {
+            DeValue::Array(_) => self.list(visitor, false),
+            DeValue::Table(_) => self.table(visitor),
             DeValue::String(text) => visitor.visit_str(text),
             DeValue::Boolean(flag) => visitor.visit_bool(*flag),
             DeValue::Datetime(_) => Err(self.refused(&visitor)),
@@ -222,8 +222,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
                 }
                 _ => refuse(format!("is {number}, must be at most {:e} in size", f64::MAX)),
             },
-        };
-        read.map_err(|e| e.at(self.value.span()))
+        }
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
@@ -251,7 +250,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
                     1 => format!("has 1 entry, must have {length}"),
                     found => format!("has {found} entries, must have {length}"),
                 };
-                Err(Refusal::custom(message).at(self.value.span()))
+                Err(Refusal::custom(message))
             }
             _ => Err(self.refused(&format!("a list with {length} entries").as_str())),
         }
@@ -280,7 +279,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
             return Err(self.refused(&one_of(words).as_str()));
         };
         let word: StrDeserializer<'_, Refusal> = text.as_ref().into_deserializer();
-        visitor.visit_enum(word).map_err(|e| e.at(self.value.span()))
+        visitor.visit_enum(word)
     }
 
     fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
@@ -310,7 +309,8 @@ impl<'de> SeqAccess<'de> for Items<'de> {
         let Some(value) = self.rest.next() else { return Ok(None) };
         let place = format!("[{}]", self.next + usize::from(self.fixed));
         self.next += 1;
-        seed.deserialize(Found { value, key: self.key }).map(Some).map_err(|e| e.within(&place))
+        let read = seed.deserialize(Found { value, key: self.key });
+        read.map(Some).map_err(|e| e.at(value.span()).within(&place))
     }
 }
 
@@ -339,7 +339,7 @@ impl<'de> MapAccess<'de> for Entries<'de> {
 
     fn next_value_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<T::Value, Refusal> {
         let found = self.value.take().ok_or_else(|| Refusal::custom("is a value without a key"))?;
-        let key = shown(found.key);
-        seed.deserialize(found).map_err(|e| e.within(&key))
+        let (key, place) = (shown(found.key), found.value.span());
+        seed.deserialize(found).map_err(|e| e.at(place).within(&key))
     }
 }

@@ -86,7 +86,7 @@ defects! {
     measurement_error_of_no_state: FILTER, "bounds =" => "measurement_errors = { w = 0.1 }\nbounds =",
         "measurement_errors.w: unknown measured state, must be one of x_p, y_p, theta, v";
     measurement_error_of_an_integrated_state: STEERED, "bounds =" => "measurement_errors = { beta = 0.1 }\nbounds =",
-        "measurement_errors.beta: unknown measured state, must be one of x_p, y_p, theta, v";
+        "measurement_errors.beta: unknown measured state (did you mean theta?), must be one of x_p, y_p, theta, v";
     measurement_error_of_a_pointwise_row: FILTER,
         "bounds =" => "sampling = \"pointwise\"\nmeasurement_errors = { v = 0.1 }\nbounds =",
         "measurement_errors: needs the prediction over the period, the sampling is pointwise";
