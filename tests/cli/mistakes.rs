@@ -341,6 +341,21 @@ fn inputs_that_nothing_feeds() {
     workshop.punctual(["run", "system.toml"]).success();
 }
 
+/// In a campaign, an input that is varied has its values.
+#[test]
+fn inputs_that_a_campaign_varies() {
+    let workshop = Workshop::new();
+    workshop.write("plant.toml", example("unicycle-plant"));
+    let alone = "[system.experiment]\nstop_time = 0.01\nstep = 0.001\n[[system.component]]\nname = \"plant\"\n\
+                 fmu = \"plant.toml\"\nstart = { \"u.omega\" = 0.0 }\n[campaign]\nruns = 2\n";
+    let vary = "[vary.\"plant.u.a\"]\ndistribution = \"uniform\"\nmin = 0.0\nmax = 1.0\n";
+    workshop.write("c.toml", alone);
+    let begin = "c.toml: component[0]: nothing feeds u.a of plant: ";
+    workshop.punctual(["campaign", "c.toml"]).fails_like(2, begin, &["start = { \"u.a\" = 0.0 }"]);
+    workshop.write("c.toml", format!("{alone}{vary}"));
+    workshop.punctual(["campaign", "c.toml"]).success();
+}
+
 /// A step that is longer than the deadline is told in a run, as `check` tells it.
 #[test]
 fn a_step_longer_than_the_deadline() {
