@@ -242,7 +242,7 @@ pub fn check_fed(
     for (component, description) in descriptions.iter().enumerate() {
         let mut loose = loose(system, component, description, links);
         let filter = is_filter(description);
-        loose.retain(|(port, name)| !given.contains(port) && !(filter && name.starts_with(WANTED)));
+        loose.retain(|(port, name)| !(given.contains(port) || filter && name.starts_with(WANTED)));
         let Some((_, first)) = loose.first() else { continue };
         let names: Vec<_> = loose.iter().take(NAMES).map(|(_, name)| *name).collect();
         let more = match loose.len() - names.len() {
