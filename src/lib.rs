@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! error                the errors of all commands, with names and numbers
+//! text                 files of text, and what is said of others in their place
 //! host                 one FMU: archive, description, library, instance
 //! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
@@ -34,5 +35,6 @@ pub mod pictures;
 pub mod plot;
 pub mod recording;
 pub mod reproduce;
+pub mod text;
 pub mod validate;
 pub mod whole;

@@ -16,6 +16,7 @@ use crate::output::{self, Progress};
 use crate::package;
 use crate::pictures;
 use crate::recording::{self, Recording};
+use crate::text;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -174,7 +175,7 @@ struct Opened {
 /// Opens a system file, or the file of a filter.
 fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let (path, out) = (&arguments.system, arguments.out.clone());
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+    let text = text::read(path)?;
     if !coupling::is_configuration(&text) {
         let system = System::parse(&text)?;
         let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;

@@ -29,6 +29,9 @@ pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>
         return Err(Error::configuration("kind", message));
     };
     let (plant, controller) = filter.alone()?;
+    // What a barrier follows stays where it starts: nothing here moves it.
+    let start: Vec<_> =
+        filter.barrier_inputs().iter().map(|input| format!("{:?} = {:?}", input.name, input.start)).collect();
     let experiment = filter.experiment;
     let mut configurations = vec![Configuration::Filter(filter), Configuration::Plant(plant)];
     configurations.extend(controller.map(Configuration::Controller));
@@ -39,6 +42,9 @@ pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>
     let names: Vec<_> = configurations.iter().map(Configuration::kind).collect();
     for (i, name) in names.iter().enumerate() {
         text += &format!("[[component]]\nname = \"{name}\"\nfmu = \"{name}\"\n");
+        if i == 0 {
+            text += &format!("start = {{ {} }}\n", start.join(", "));
+        }
         for other in &names[..i] {
             text += &format!("[[connect_by_name]]\ncomponents = [\"{other}\", \"{name}\"]\n");
         }

@@ -111,7 +111,7 @@ impl Simulation<Box<dyn Participant>> {
     /// # Errors
     ///
     /// An FMU that cannot be opened, loaded or instantiated; a configuration that cannot be used; a connection, start value,
-    /// recorded signal or picture that does not fit them (with the field of the system file).
+    /// recorded signal or picture that does not fit them (with the field of the system file); an input that nothing feeds.
     pub fn new(system: &System, base: &Path) -> Result<(Self, Vec<Model>), Error> {
         let mut models: Vec<Model> = Vec::new();
         for (i, component) in system.components().iter().enumerate() {
@@ -135,6 +135,7 @@ impl Simulation<Box<dyn Participant>> {
     /// As for [`Simulation::new`]; or not one model for each component.
     pub fn of(system: &System, models: &[Model]) -> Result<Self, Error> {
         let descriptions: Vec<_> = models.iter().map(Model::description).collect();
+        promises::check_fed(system, &descriptions, &network::links(system, &descriptions)?, &[])?;
         Self::assembled(system, &descriptions, |c| {
             let name = &system.components()[c].name;
             models[c].instance(name).map_err(|e| e.in_component(name))
@@ -217,7 +218,7 @@ impl<P: Participant> Simulation<P> {
             stop: None,
         };
         simulation.note_shortened_step(descriptions);
-        simulation.notes.extend(promises::unfed(system, descriptions, &links));
+        simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
     }
@@ -374,7 +375,7 @@ impl<P: Participant> Simulation<P> {
                 });
                 given.unwrap_or(own)
             });
-            watched.reset(deadline);
+            self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
         // Set start values, and go to initialization mode.
         let used = std::mem::replace(&mut self.used, true);

@@ -21,7 +21,7 @@ pub use master::{Outcome, Simulation, Statistics};
 pub use model::{Model, Own};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;
-pub use promises::{Kept, Promise};
+pub use promises::{Kept, Promise, check_fed};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,
