@@ -147,7 +147,7 @@ fn what_cannot_be_run_alone_is_told() {
         (
             "x0 = { theta",
             "x0 = { tetha",
-            "car.toml: x0.tetha: unknown state, must be one of x_p, y_p, theta, v",
+            "car.toml: x0.tetha: unknown state (did you mean theta?), must be one of x_p, y_p, theta, v",
         ),
         (
             "omega = \"0.5 * cos(t)\"",
@@ -157,7 +157,7 @@ fn what_cannot_be_run_alone_is_told() {
         (
             "-0.3 * v",
             "-0.3 * w",
-            "car.toml: u_ref.a: names w, which is unknown (did you mean v?); the names are x_p, y_p, theta, v",
+            "car.toml: u_ref.a: names w, which is unknown; the names are x_p, y_p, theta, v",
         ),
         ("x0 = {", "simulated.model = \"point\"\nx0 = {", "car.toml: simulated.model"),
     ] {
