@@ -178,7 +178,8 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let text = text::read(path)?;
     if !coupling::is_configuration(&text) {
         let system = System::parse(&text)?;
-        let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;
+        let (simulation, models) =
+            Simulation::new(&system, path.parent().unwrap_or(Path::new("")), package::read_configuration)?;
         models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
         return Ok(Opened { system, models, simulation, out });
     }

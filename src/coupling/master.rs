@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 use super::grid::Grid;
 use super::layout::{Layout, Recorder};
-use super::model::Model;
+use super::model::{Model, Reader};
 use super::network::{self, Network, Start};
 use super::participant::Participant;
 use super::ports::{Group, Source};
@@ -105,14 +105,14 @@ impl Statistics {
 }
 
 impl Simulation<Box<dyn Participant>> {
-    /// Opens the FMUs and configurations of `system`, found relative to the folder `base`, and instantiates them. Returns
-    /// them too, in the order of the components.
+    /// Opens the FMUs of `system` and its configurations, which `read` reads, found relative to the folder `base`, and
+    /// instantiates them. Returns them too, in the order of the components.
     ///
     /// # Errors
     ///
     /// An FMU that cannot be opened, loaded or instantiated; a configuration that cannot be used; a connection, start value,
     /// recorded signal or picture that does not fit them (with the field of the system file); an input that nothing feeds.
-    pub fn new(system: &System, base: &Path) -> Result<(Self, Vec<Model>), Error> {
+    pub fn new(system: &System, base: &Path, read: Reader) -> Result<(Self, Vec<Model>), Error> {
         let mut models: Vec<Model> = Vec::new();
         for (i, component) in system.components().iter().enumerate() {
             let path = base.join(&component.fmu);
@@ -123,7 +123,7 @@ impl Simulation<Box<dyn Participant>> {
                 );
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            models.push(Model::open(&path, &models).map_err(|e| e.in_component(&component.name))?);
+            models.push(Model::open(&path, &models, read).map_err(|e| e.in_component(&component.name))?);
         }
         Ok((Self::of(system, &models)?, models))
     }

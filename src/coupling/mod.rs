@@ -18,7 +18,7 @@ pub use alone::{alone, is_configuration};
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use master::{Outcome, Simulation, Statistics};
-pub use model::{Model, Own};
+pub use model::{Model, Own, Reader};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;
 pub use promises::{Kept, Promise, check_fed};

@@ -10,7 +10,6 @@ use punctual_fmu::product::Product;
 use super::{InProcess, Participant};
 use crate::error::Error;
 use crate::host::{Description, Fmu, Slave};
-use crate::package;
 
 /// A configuration with what an FMU of it would say.
 pub struct Own {
@@ -47,6 +46,9 @@ impl Own {
     }
 }
 
+/// Reads a configuration from a file, with its plug-in.
+pub type Reader = fn(&Path) -> Result<Configuration, Error>;
+
 /// An FMU, or a configuration that runs in process.
 pub enum Model {
     /// An FMU.
@@ -61,9 +63,9 @@ impl Model {
     /// # Errors
     ///
     /// A file that is not there or cannot be used.
-    pub(super) fn open(path: &Path, shared: &[Self]) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path, shared: &[Self], read: Reader) -> Result<Self, Error> {
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
-            let own = Own::new(package::read_configuration(path)?)?;
+            let own = Own::new(read(path)?)?;
             return Ok(Self::Own(Box::new(own), path.to_owned()));
         }
         let once = |fmu: &Fmu| fmu.description().co_simulation.can_be_instantiated_only_once_per_process;

@@ -82,7 +82,7 @@ fn bounds_that_contradict_each_other() {
 fn an_fmu_that_is_missing() {
     run("plant.fmu", "plants.fmu").fails(
         2,
-        "system.toml: component[1].fmu: there is no file plants.fmu; `punctual build` makes an FMU from a configuration",
+        "system.toml: component[1].fmu: there is no file plants.fmu; it is an FMU, or the .toml file that `punctual build` makes one from",
     );
 }
 
@@ -92,8 +92,8 @@ fn a_configuration_instead_of_a_system_file() {
     workshop.write("my.toml", "kind = \"plant\"\n[plant]\nmodel = \"unicycle\"\n");
     workshop.punctual(["run", "my.toml"]).fails(
         2,
-        "my.toml: component: missing: this is the file of a filter, plant or controller, which `punctual check` and \
-         `punctual build` take",
+        "my.toml: kind: is \"plant\"; must be \"filter\", which runs with its own model, or a system file, which couples \
+         components",
     );
 }
 

@@ -279,9 +279,9 @@ fn files_of_another_kind() {
         workshop.write(name, bytes);
     }
     fs::create_dir(workshop.path("folder")).expect("a folder");
-    let one =
-        "this is the file of a filter, plant or controller, which `punctual check` and `punctual build` take";
+    let one = "this is the file of a filter, plant or controller, which `punctual check` and `punctual build` take; `punctual run` takes that of a filter";
     let system = "this is a system file, which `punctual run` takes, and `punctual build` with an output that ends in .ssp";
+    let alone = "is \"plant\"; must be \"filter\", which runs with its own model, or a system file, which couples components";
     let many = "this is a campaign file, which `punctual campaign` takes";
     let archive =
         "it is an archive, such as an FMU, and no text; `punctual inspect` and `punctual validate` take FMUs";
@@ -290,7 +290,7 @@ fn files_of_another_kind() {
     for (command, file, message) in [
         ("check", "system.toml", format!("system.toml: kind: missing: {system}")),
         ("check", "campaign.toml", format!("campaign.toml: kind: missing: {many}")),
-        ("run", "plant.toml", format!("plant.toml: component: missing: {one}")),
+        ("run", "plant.toml", format!("plant.toml: kind: {alone}")),
         ("run", "campaign.toml", format!("campaign.toml: component: missing: {many}")),
         ("campaign", "system.toml", format!("system.toml: campaign: missing: {system}")),
         ("campaign", "filter.toml", format!("filter.toml: campaign: missing: {one}")),

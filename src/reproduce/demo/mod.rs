@@ -64,7 +64,7 @@ fn couple(
     build(folder, &case.filter_stem(), &case.filter(), library)?;
     let text = case.system();
     write(&folder.join(format!("{}.toml", case.stem())), &text)?;
-    let (mut simulation, _) = Simulation::new(&System::parse(&text)?, folder)?;
+    let (mut simulation, _) = Simulation::new(&System::parse(&text)?, folder, package::read_configuration)?;
     let outcome = simulation.run(|time, _| progress(time / case.setup.end))?;
     if let Some(failure) = outcome.failure {
         return Err(failure);
