@@ -104,7 +104,7 @@ const views = (() => {
       // In pixels of the screen, so that text has its size on a phone too.
       const width = Math.max(280, holder.clientWidth || 800), small = width < 560;
       const height = Math.round(chart.equal ? Math.min(width * 0.8, 620) : Math.max(260, Math.min(width * 0.55, 440)));
-      area = { left: small ? 56 : 74, top: 44, width: 0, height: 0 };
+      area = { left: small ? 56 : 74, top: chart.title || chart.verticals.length ? 44 : 12, width: 0, height: 0 };
       area.width = width - area.left - 12;
       area.height = height - area.top - 48;
       view = fitted(view);

@@ -45,41 +45,47 @@ pub fn document(
     let times = recording.times();
     let time = [times.first(), times.last()].map(|t| t.copied().unwrap_or_default());
     let mut scene = Scene { time, ..Scene::default() };
-    let mut body = head(file, &parts, outcome, notes);
+    let mut drawn = String::new();
     let filters: Vec<&Part<'_>> = parts.iter().filter(|part| !part.barriers().is_empty()).collect();
     if let Some(chart) = plane(&parts, outcome, &mut scene) {
-        body += "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n";
+        drawn += "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
+                 <p class=\"hint\">Circle: start. Diamond: arrival. Green: to be inside. Red: to stay out.</p>\n";
         charts.push(("path".to_owned(), chart));
     }
     for (f, part) in filters.iter().enumerate() {
         let title = if filters.len() > 1 { &part.component.name } else { "Over time" };
-        let _ = writeln!(body, "<h2>{}</h2>", escape(title));
+        let _ = writeln!(drawn, "<h2>{}</h2>", escape(title));
         if let Some(strip) = Strip::new(part, shown(&parts, &part.signal("status")), recording) {
             let key = format!("status-{f}");
-            let _ = writeln!(body, "<div class=\"strip\" data-strip=\"{key}\"></div>");
+            let _ = writeln!(drawn, "<div class=\"strip\" data-strip=\"{key}\"></div>");
             scene.strips.push((key, strip));
         }
-        let drawn = barriers(&parts, part, outcome).into_iter().chain(inputs(&parts, part, recording));
-        for (c, chart) in drawn.enumerate() {
+        let over_time = barriers(&parts, part, outcome).into_iter().chain(inputs(&parts, part, recording));
+        for (c, chart) in over_time.enumerate() {
             let key = format!("chart-{f}-{c}");
-            let _ = writeln!(body, "<div class=\"chart over-time\" data-chart=\"{key}\"></div>");
+            let _ = writeln!(drawn, "<div class=\"chart over-time\" data-chart=\"{key}\"></div>");
             charts.push((key, chart));
         }
     }
-    if charts.is_empty() {
-        body += "<p>Nothing is drawn: no filter of this program and nothing that moves in a plane was recorded.</p>\n";
+    let head = head(file, &parts, outcome, notes);
+    let body = if charts.is_empty() {
+        format!(
+            "{head}<p>Nothing is drawn: no filter of this program and nothing that moves in a plane was recorded.</p>\n"
+        )
     } else {
-        body += CONTROLS;
-    }
+        format!("{head}{HINT}{drawn}{CONTROLS}")
+    };
     let script = format!("const scene = {};\n{SCRIPT}", json(&scene));
     let title = format!("{file}: run");
     Page { title: &title, body: &body, charts, style: STYLE, script: &script }.document()
 }
 
+/// What the reader can do.
+const HINT: &str = "<p class=\"hint\">Play the run below, or click into a chart over time to go there. Point at a curve to read \
+    it off; drag to zoom (two fingers on a phone), double-click to see all again.</p>\n";
+
 /// What the reader moves the time with.
-const CONTROLS: &str = "<p class=\"hint\">Click into a chart over time to go there. Point at a curve to read it off; drag \
-    to zoom (two fingers on a phone), double-click to see all again.</p>\n\
-    <div class=\"controls\"><button type=\"button\" id=\"play\" aria-label=\"play\">\u{25b6}</button>\
+const CONTROLS: &str = "<div class=\"controls\"><button type=\"button\" id=\"play\" aria-label=\"play\">\u{25b6}</button>\
     <input type=\"range\" id=\"time\" aria-label=\"time in s\" /><output id=\"clock\" for=\"time\"></output>\
     <div id=\"now\"></div></div>\n\
     <noscript><p>The charts need JavaScript. The pictures beside this page do not.</p></noscript>\n";
@@ -122,8 +128,7 @@ fn verdicts(parts: &[Part<'_>], outcome: &Outcome) -> String {
     let broken = promises.iter().filter(|p| p.promise == Kept::Broken).count();
     let kept = promises.iter().filter(|p| p.promise == Kept::Kept).count();
     let (worst, sentence) = match (broken, promises.len()) {
-        (0, 1) if kept == 1 => (Kept::Kept, "The promise is kept.".to_owned()),
-        (0, all) if kept == all => (Kept::Kept, format!("All {all} promises are kept.")),
+        (0, all) if kept == all => (Kept::Kept, "Every promise is kept.".to_owned()),
         (0, all) => (Kept::Open, format!("{kept} of {all} promises are kept, none is broken.")),
         (_, 1) => (Kept::Broken, "The promise is not kept.".to_owned()),
         (_, all) => (Kept::Broken, format!("{broken} of {all} promises are not kept.")),
@@ -134,7 +139,7 @@ fn verdicts(parts: &[Part<'_>], outcome: &Outcome) -> String {
     let plans = guaranteed.iter().any(Option::is_some);
     let mut header = vec!["barrier", "promise"];
     header.extend(plans.then_some("at the start"));
-    header.extend(["deadline (s)", "arrival (s)", "least h after the deadline", "samples not met"]);
+    header.extend(["deadline (s)", "arrival (s)", "least h when promised", "samples not met"]);
     let cell = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), number);
     let rows = promises.iter().zip(guaranteed).map(|(p, guaranteed)| {
         let verdict = format!("<span class=\"{}\">{}</span>", class(p.promise), p.promise.words());
@@ -143,7 +148,10 @@ fn verdicts(parts: &[Part<'_>], outcome: &Outcome) -> String {
             let word = guaranteed.map_or("–", |yes| if yes { "guaranteed" } else { "not guaranteed" });
             word.to_owned()
         }));
-        row.extend([cell(p.deadline), cell(p.arrival), cell(p.least_h), p.unmet.to_string()]);
+        let h = outcome.recording.index_of(&format!("{}.h", p.barrier));
+        let unit = h.and_then(|h| outcome.recording.columns()[h].unit.as_deref()).unwrap_or_default();
+        let least = format!("{} {}", cell(p.least_h), escape(unit));
+        row.extend([cell(p.deadline), cell(p.arrival), least, p.unmet.to_string()]);
         row
     });
     format!(
@@ -324,7 +332,7 @@ fn inputs(parts: &[Part<'_>], part: &Part<'_>, recording: &Recording) -> Vec<Cha
                 let span = high - low;
                 let wanted = dashed.iter().flat_map(|c| &c.y).map(|v| v.clamp(low - span, high + span));
                 let shown = plot::extent(solid.y.iter().copied().chain(wanted).chain([low, high]));
-                shown.map(|(from, to)| [from - 0.05 * span, to + 0.05 * span])
+                shown.map(|(from, to)| [from - 0.1 * span, to + 0.1 * span])
             }
             _ => None,
         };
