@@ -60,7 +60,7 @@ pub fn document(
             let _ = writeln!(drawn, "<div class=\"strip\" data-strip=\"{key}\"></div>");
             scene.strips.push((key, strip));
         }
-        let over_time = barriers(&parts, part, outcome).into_iter().chain(inputs(&parts, part, recording));
+        let over_time = barriers(&parts, part, outcome).into_iter().chain(inputs(&parts, part, outcome));
         for (c, chart) in over_time.enumerate() {
             let key = format!("chart-{f}-{c}");
             let _ = writeln!(drawn, "<div class=\"chart over-time\" data-chart=\"{key}\"></div>");
@@ -284,13 +284,24 @@ fn curve(recording: &Recording, signal: &str, label: &str, colour: usize, style:
     Some(Curve { label: label.to_owned(), x, y, colour, style, ..Curve::default() }.thinned(POINTS))
 }
 
+/// The time of all charts: the run, and the deadlines that do not lie far behind it.
+fn time_axis(outcome: &Outcome) -> Scaling {
+    let axis = Scaling::linear("time (s)");
+    let Some((first, last)) = plot::extent(outcome.recording.times().iter().copied()) else { return axis };
+    let deadlines = outcome.promises.iter().filter_map(|p| p.deadline);
+    let near = deadlines.filter(|at| (first..=2.0 * last - first).contains(at));
+    let last = near.fold(last, f64::max);
+    let room = 0.03 * (last - first);
+    axis.over(first - room, last + room)
+}
+
 /// h of each barrier with its profile, a chart for each unit.
 fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> {
     let mut colour = 0;
     let chart = |Group { unit, barriers, .. }: Group| {
         let mut chart = Chart {
             title: "h of each barrier, its profile dashed".to_owned(),
-            x: Scaling::linear("time (s)"),
+            x: time_axis(outcome),
             y: Scaling::linear(format!("h ({unit})")),
             horizontals: vec![Mark { label: String::new(), at: 0.0 }],
             ..Chart::default()
@@ -306,8 +317,11 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
             chart.curves.extend(curve(recording, &signal("profile"), "", colour, Style::Dashed));
             colour += 1;
             let promise = outcome.promises.iter().find(|p| p.barrier == name);
-            let deadline = promise.and_then(|p| p.deadline).filter(|at| at.is_finite());
-            chart.verticals.extend(deadline.map(|at| Mark { label: barrier.clone(), at }));
+            let Some(at) = promise.and_then(|p| p.deadline) else { continue };
+            match chart.verticals.iter_mut().find(|mark| mark.at == at) {
+                Some(mark) => mark.label = format!("{}, {barrier}", mark.label),
+                None => chart.verticals.push(Mark { label: barrier.clone(), at }),
+            }
         }
         if let [only] = &mut chart.verticals[..] {
             only.label = "deadline".to_owned();
@@ -318,7 +332,8 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
 }
 
 /// Each input with u_ref and its limits.
-fn inputs(parts: &[Part<'_>], part: &Part<'_>, recording: &Recording) -> Vec<Chart> {
+fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> {
+    let recording = &outcome.recording;
     let chart = |input: &str| {
         let signal = part.signal(&format!("u.{input}"));
         let unit = recording.columns()[recording.index_of(&signal)?].unit.clone().unwrap_or_default();
@@ -340,7 +355,7 @@ fn inputs(parts: &[Part<'_>], part: &Part<'_>, recording: &Recording) -> Vec<Cha
         let limit = |(side, at): (&str, Option<f64>)| at.map(|at| Mark { label: side.to_owned(), at });
         Some(Chart {
             title: format!("{input}{wanted}"),
-            x: Scaling::linear("time (s)"),
+            x: time_axis(outcome),
             y: Scaling { label: format!("{input} ({unit})"), range, logarithmic: false },
             curves: std::iter::once(solid).chain(dashed).collect(),
             horizontals: ["lower limit", "upper limit"].into_iter().zip(limits).filter_map(limit).collect(),

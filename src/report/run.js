@@ -42,10 +42,14 @@
         const corners = o.corners.map((c) => [path.X(x + c[0]), path.Y(y + c[1])]);
         node.setAttribute("d", `M${corners.map((c) => c.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`);
         if (name) {
-          name.setAttribute("x", path.X(x));
-          name.setAttribute("y", path.Y(y) + 4);
-          const wide = Math.max(...corners.map((c) => c[0])) - Math.min(...corners.map((c) => c[0]));
-          name.setAttribute("visibility", wide > 7 * o.label.length ? "visible" : "hidden");
+          const [across, down] = [0, 1].map((i) => corners.map((c) => c[i]));
+          const top = Math.min(...down), large = Math.max(...down) - top > 150;
+          // Above a shape, so that a vehicle in it is seen; within a large one.
+          name.setAttribute("x", large ? across[down.indexOf(top)] : path.X(x));
+          name.setAttribute("y", large ? top + 16 : top - 4);
+          // Where there are many, only those with room.
+          const room = scene.outlines.length <= 12 || Math.max(...across) - Math.min(...across) > 6 * o.label.length;
+          name.setAttribute("visibility", room ? "visible" : "hidden");
         }
       };
     };

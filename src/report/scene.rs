@@ -183,19 +183,8 @@ impl Strip {
         let description = part.model.description();
         let items = description.items(&description.variables[description.index_of("status")?]);
         let seen = recording.series(&part.signal("status"))?;
-        // Of a long run's samples that one is drawn that people should see.
-        let together = seen.len().div_ceil(POINTS).max(1);
-        let times = recording.times().chunks(together).filter_map(|chunk| chunk.first().copied());
-        let gravest = seen
-            .chunks(together)
-            .filter_map(|chunk| chunk.iter().map(|s| *s as i32).max_by_key(|s| gravity(*s)));
         let mut strip = Self { label: label.to_owned(), parts: Vec::new(), words: Vec::new() };
-        let mut last = None;
-        for (time, status) in times.zip(gravest) {
-            if last == Some(status) {
-                continue;
-            }
-            last = Some(status);
+        for (time, status) in changes(recording.times(), &seen) {
             let item = items.iter().find(|item| item.value == status);
             let word = item.map_or_else(|| status.to_string(), |item| item.name.clone());
             let known = strip.words.iter().position(|(other, _)| *other == word);
@@ -207,6 +196,19 @@ impl Strip {
         }
         Some(strip)
     }
+}
+
+/// The times at which the status changes, and what it is from then on. Of samples that lie too close to be told apart in a
+/// picture the gravest counts.
+fn changes(times: &[f64], seen: &[f64]) -> Vec<(f64, i32)> {
+    let together = seen.len().div_ceil(POINTS).max(1);
+    let gravest =
+        |chunk: &[f64]| chunk.iter().map(|&status| status as i32).max_by_key(|&status| gravity(status));
+    let firsts = times.chunks(together).map(|chunk| chunk[0]);
+    let mut changes: Vec<_> =
+        firsts.zip(seen.chunks(together)).filter_map(|(time, chunk)| Some((time, gravest(chunk)?))).collect();
+    changes.dedup_by_key(|(_, status)| *status);
+    changes
 }
 
 /// How much a status matters to a reader: what the filter left alone least, then what it did, then what it could not do.
@@ -229,5 +231,38 @@ fn colour(status: i32) -> usize {
         Some(Status::NoAuthority) => 4,
         Some(Status::SolverFailed) => 0,
         _ => 6,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_of_one_sample_is_seen_in_a_long_run() {
+        let times: Vec<f64> = (0..100_000).map(f64::from).collect();
+        let number = |status: Status| f64::from(status as u8);
+        // It goes back and forth at every sample, as at the edge of a set.
+        let mut seen: Vec<f64> =
+            (0..times.len()).map(|k| number([Status::Unchanged, Status::Filtered][k % 2])).collect();
+        assert_eq!(changes(&times, &seen), [(0.0, Status::Filtered as i32)]);
+        seen[77_777] = number(Status::Infeasible);
+        let found = changes(&times, &seen);
+        let graver: Vec<_> =
+            found.iter().filter(|(_, status)| *status == Status::Infeasible as i32).collect();
+        // 50 samples are one.
+        assert_eq!(graver, [&(77_750.0, Status::Infeasible as i32)]);
+        assert_eq!(found.len(), 3);
+        assert_eq!(changes(&times[..4], &seen[..4]).len(), 4, "a short run is drawn as it is");
+    }
+
+    #[test]
+    fn a_half_plane_is_where_its_normal_shows() {
+        let normal = [3.0, 4.0];
+        let side = |[x, y]: [f64; 2]| (x * normal[0] + y * normal[1]) / 5.0;
+        // Round-off of products of 10.
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        let depths: Vec<f64> = beside(normal, 10.0).into_iter().map(side).collect();
+        assert!(depths.iter().zip([0.0, 0.0, 10.0, 10.0]).all(|(a, b)| near(*a, b)), "{depths:?}");
     }
 }
