@@ -48,8 +48,13 @@ pub fn document(
     let mut drawn = String::new();
     let filters: Vec<&Part<'_>> = parts.iter().filter(|part| !part.barriers().is_empty()).collect();
     if let Some(chart) = plane(&parts, outcome, &mut scene) {
-        drawn += "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
-                 <p class=\"hint\">Circle: start. Diamond: arrival. Green: to be inside. Red: to stay out.</p>\n";
+        let arrival = chart.curves.iter().any(|curve| curve.ends[1].is_some());
+        let arrival = if arrival { " Diamond: arrival." } else { "" };
+        let _ = writeln!(
+            drawn,
+            "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
+             <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.</p>"
+        );
         charts.push(("path".to_owned(), chart));
     }
     for (f, part) in filters.iter().enumerate() {
