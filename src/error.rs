@@ -9,6 +9,9 @@ use punctual_fmu::configuration::ConfigurationError;
 
 use crate::host::{LogMessage, Status};
 
+/// The exit code after Ctrl-C, as shells have it.
+pub const INTERRUPTED: u8 = 130;
+
 /// An error that keeps the command from being carried out.
 #[derive(Debug)]
 pub struct Error(Box<Kind>);
@@ -21,6 +24,7 @@ enum Kind {
     Call(CallFailure),
     Broken { what: String, how: String },
     Plot { path: PathBuf, message: String },
+    Interrupted { time: f64 },
 }
 
 /// Reasons why an `.fmu` file cannot be used.
@@ -194,6 +198,11 @@ impl Error {
         Self(Box::new(Kind::Plot { path: path.to_owned(), message: message.into() }))
     }
 
+    /// A run that was interrupted, at `time` (s).
+    pub fn interrupted(time: f64) -> Self {
+        Self(Box::new(Kind::Interrupted { time }))
+    }
+
     /// The same error, naming the configuration file it is about.
     #[must_use]
     pub fn in_file(mut self, path: &Path) -> Self {
@@ -219,11 +228,12 @@ impl Error {
         }
     }
 
-    /// The exit code: 1 where an FMU is at fault, 2 where usage, configuration or a file is.
+    /// The exit code: 1 where an FMU is at fault, 2 where usage, configuration or a file is, [`INTERRUPTED`] after Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match &*self.0 {
             Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => 1,
             Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => 2,
+            Kind::Interrupted { .. } => INTERRUPTED,
         }
     }
 }
@@ -253,6 +263,7 @@ impl fmt::Display for Error {
             Kind::Fmu { component: None, path, problem } => write!(f, "{}: {problem}", path.display()),
             Kind::Broken { what, how } => write!(f, "{what} {how}"),
             Kind::Call(failure) => failure.fmt(f),
+            Kind::Interrupted { time } => write!(f, "interrupted at t = {} s", brief_time(*time)),
             Kind::Plot { path, message } => write!(f, "cannot draw {}: {message}", path.display()),
         }
     }

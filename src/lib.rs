@@ -5,7 +5,9 @@
 //!
 //! ```text
 //! error                the errors of all commands, with names and numbers
+//! text                 files of text, and what is said of others in their place
 //! host                 one FMU: archive, description, library, instance
+//! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! recording            the rows of a run; CSV
@@ -37,4 +39,6 @@ pub mod plot;
 pub mod recording;
 pub mod report;
 pub mod reproduce;
+pub mod text;
 pub mod validate;
+pub mod whole;

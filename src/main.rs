@@ -4,16 +4,16 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use punctual::command::{
-    build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, validate,
+    build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, shell, validate,
 };
 use punctual::output;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
 ///
 /// Exit codes: 0 success; 1 the run finished but a promise was not kept, or an FMU is at fault; 2 bad
-/// usage or configuration. Results go to stdout, talk and progress to stderr.
+/// usage or configuration; 130 interrupted, with what was done until then kept. Results go to stdout, talk and progress to stderr.
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true)]
 struct Arguments {
@@ -45,6 +45,10 @@ enum Command {
     Merge(merge::Arguments),
     /// Find what is wrong with an FMU, ours or another's, before a master stumbles over it
     Validate(validate::Arguments),
+    /// Print the script that completes these commands in a shell
+    Completions(shell::CompletionArguments),
+    /// Write man pages
+    Man(shell::ManArguments),
     /// The part of `validate` that may crash, in a process of its own
     #[command(hide = true)]
     Trial(validate::TrialArguments),
@@ -66,6 +70,8 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::execute(&arguments),
         Command::Inspect(arguments) => inspect::execute(&arguments),
         Command::Validate(arguments) => validate::execute(&arguments),
+        Command::Completions(arguments) => shell::execute_completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => shell::execute_man(&arguments, Arguments::command()),
         Command::Trial(arguments) => validate::execute_trial(&arguments),
         Command::TryPlugin(arguments) => build::execute_try_plugin(&arguments),
     };

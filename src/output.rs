@@ -28,7 +28,13 @@ pub fn note(text: &str) {
 
 /// Prints an error, on stderr.
 pub fn error(error: &dyn std::fmt::Display) {
-    note(&format!("error: {error}"));
+    note(&format!("{} {error}", console::style("error:").for_stderr().red().bold()));
+}
+
+/// `words`, green where they tell of something `good`, else red. Plain where stdout is no terminal, and under `NO_COLOR`.
+pub fn verdict(words: &str, good: bool) -> String {
+    let words = console::style(words);
+    if good { words.green() } else { words.red() }.to_string()
 }
 
 /// A progress bar on stderr that shows after a second, and only on a terminal.
@@ -127,13 +133,12 @@ impl Drop for Progress {
 /// the right.
 pub fn table(rows: &[Vec<String>], right: &[bool]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width =
-        |c: usize| rows.iter().filter_map(|row| row.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|row| row.get(c)).map(|s| shown(s)).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let line = |row: &Vec<String>| {
         let cells = row.iter().enumerate().map(|(c, cell)| {
-            let width = widths[c];
-            if right.get(c) == Some(&true) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+            let room = " ".repeat(widths[c] - shown(cell));
+            if right.get(c) == Some(&true) { format!("{room}{cell}") } else { format!("{cell}{room}") }
         });
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
@@ -143,6 +148,11 @@ pub fn table(rows: &[Vec<String>], right: &[bool]) -> String {
         lines.insert(1, rule);
     }
     lines.join("\n")
+}
+
+/// Number of columns of a terminal that `cell` takes.
+fn shown(cell: &str) -> usize {
+    console::measure_text_width(cell)
 }
 
 /// A number for people: six significant digits, powers of ten only where they help.

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::error::Error;
+use crate::whole;
 
 /// A recorded signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,9 +108,7 @@ impl Recording {
     ///
     /// The file cannot be made or written.
     pub fn save_csv(&self, path: &Path) -> Result<(), Error> {
-        std::fs::File::create(path)
-            .and_then(|file| self.write_csv(io::BufWriter::with_capacity(1 << 16, file)))
-            .map_err(|e| Error::io("write", path, e))
+        whole::write_with(path, |out| self.write_csv(out))
     }
 }
 

@@ -1110,3 +1110,30 @@ fn a_policy_shows_the_way_through_a_gap() {
         }
     }
 }
+
+#[test]
+fn at_the_edge_the_input_does_not_chatter() {
+    const BOUND: f64 = 5.0;
+    // A small set without a margin of its own, and a wish that never lets go.
+    let goal = QuadraticDisc::new([5.0, 0.0], 0.2).expect("valid disc");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", PointMass, goal, BarrierSettings::within(4.0))
+        .and_then(|b| b.bounds(&[-BOUND; 2], &[BOUND; 2]))
+        .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+    let (mut x, mut u, mut last, mut moved) = ([0.0, 0.0, -1.0, 0.0], [0.0; 2], [0.0; 2], 0.0);
+    for k in 0..(10.0 / PERIOD) as usize {
+        let t = k as f64 * PERIOD;
+        let assurance = *filter.step(t, &x, &[3.5, 0.0], &mut u).expect("right dimensions");
+        assert!(assurance.is_assured(), "at {t}: {assurance:?}");
+        if t > 5.0 {
+            moved += (u[0] - last[0]).abs();
+        }
+        last = u;
+        x = Vehicle::PointMass.move_by(x, u, PERIOD);
+    }
+    // It comes to rest, once; it moved 14 times as far while the wish was followed to the margin of plans.
+    assert!(moved < 2.0 * BOUND, "{moved}");
+}

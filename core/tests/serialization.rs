@@ -156,6 +156,7 @@ prop_compose! {
             pull: n[5],
             gain: n[6],
             margin: n[7],
+            least_margin: n[10],
             period: n[8],
             fallback: flags[0],
             arrival: options[1],

@@ -440,6 +440,7 @@ structure!(FixedTimeState {
     pull: f64,
     gain: f64,
     margin: f64,
+    least_margin: f64,
     period: f64,
     fallback: bool,
     arrival: Option<f64>,

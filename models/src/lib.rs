@@ -40,8 +40,10 @@
 //! | module | owns |
 //! |---|---|
 //! | `error` | the part that is wrong, and why |
+//! | `names` | the name that was meant |
 //! | `syntax` | text to tree |
 //! | `affine` | whether inputs enter linearly |
+//! | `units` | whether the units can be right |
 //! | `tape` | trees to one tape: constants folded, equal operations merged |
 //! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
@@ -56,14 +58,18 @@ pub mod evaluated;
 mod functions;
 mod model;
 mod motion;
+mod names;
 mod series;
 mod syntax;
 mod tape;
+mod units;
 
 pub use error::Error;
 pub use functions::Functions;
 pub use model::{Barrier, Model};
+pub use names::nearest;
 pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved};
+pub use units::{Unit, unit_of};
 
 /// Most states of a model.
 pub const MAX_STATES: usize = 32;

@@ -136,8 +136,48 @@ pub(crate) fn parse(text: &str) -> Result<Tree, String> {
             _ => None,
         });
         let wanted = wanted.unwrap_or("an operator or the end");
-        format!("at character {position} of {text:?} {found}, must be {wanted}")
+        let hint = hint(&text[..e.offset().min(text.len())], &text[e.offset().min(text.len())..]);
+        format!("at character {position} of {text:?} {found}, must be {wanted}{hint}")
     })
+}
+
+/// What is written otherwise here than in another language, or with another character.
+const HABITS: [(&str, &str); 16] = [
+    ("=", "an expression has no =; a barrier is what is to be >= 0, a derivative the right-hand side alone"),
+    ("<", "an expression has no comparison; a barrier is what is to be >= 0, as b - a for a <= b"),
+    (">", "an expression has no comparison; a barrier is what is to be >= 0, as a - b for a >= b"),
+    ("&", "both a >= 0 and b >= 0 is min(a, b), or two barriers"),
+    ("|", "an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
+    ("'", "a derivative has no sign of its own; name the state that it is"),
+    (".", "a name has no dots: sqrt, not np.sqrt"),
+    ("[", "only ( and ) group"),
+    ("{", "only ( and ) group"),
+    ("\u{2212}", "the minus sign is -"),
+    ("\u{2013}", "the minus sign is -"),
+    ("\u{b7}", "a product is written *"),
+    ("\u{22c5}", "a product is written *"),
+    ("\u{d7}", "a product is written *"),
+    ("\u{b2}", "a square is written ^2"),
+    ("\u{b3}", "a cube is written ^3"),
+];
+
+/// What to write instead, where an expression goes on with `rest` after `before`.
+fn hint(before: &str, rest: &str) -> String {
+    let (before, next) = (before.trim_end(), rest.chars().next());
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let ends = before.chars().next_back();
+    let advice = match next {
+        Some('*') if ends == Some('*') => Some("a power is written ^"),
+        Some(',') if is_digit(ends) && is_digit(rest.chars().nth(1)) => Some("a decimal point is ."),
+        Some(c) if is_in_name(c) || c == '(' => {
+            let product = ends.is_some_and(|c| is_in_name(c) || c == ')');
+            product.then_some("a product is written with *")
+        }
+        _ => HABITS.iter().find(|habit| rest.starts_with(habit.0)).map(|habit| habit.1),
+    };
+    let is_letter = next.is_some_and(|c| c.is_alphabetic() && !c.is_ascii());
+    let advice = advice.or(is_letter.then_some("names have ASCII letters only"));
+    advice.map_or_else(String::new, |advice| format!("; {advice}"))
 }
 
 /// Refuses what could make the parser, or a walk over its tree, recurse deeply.
@@ -296,13 +336,25 @@ mod tests {
     #[test]
     fn defects_are_told_with_their_position() {
         for (text, wanted) in [
-            ("v * * 2", "at character 5 of \"v * * 2\" is '*', must be a number, a name, a sign or \"(\""),
+            (
+                "v * * 2",
+                "at character 5 of \"v * * 2\" is '*', must be a number, a name, a sign or \"(\"; a power is written ^",
+            ),
             ("", "at character 1 of \"\" is its end, must be a number, a name, a sign or \"(\""),
-            ("2 x", "at character 3 of \"2 x\" is 'x', must be an operator or the end"),
-            ("2x", "at character 2 of \"2x\" is 'x', must be an operator or the end"),
+            (
+                "2 x",
+                "at character 3 of \"2 x\" is 'x', must be an operator or the end; a product is written with *",
+            ),
+            (
+                "2x",
+                "at character 2 of \"2x\" is 'x', must be an operator or the end; a product is written with *",
+            ),
             ("(a + b", "at character 7 of \"(a + b\" is its end, must be an operator or \")\""),
             ("a + b)", "at character 6 of \"a + b)\" is ')', must be an operator or the end"),
-            ("sin(a b)", "at character 7 of \"sin(a b)\" is 'b', must be an operator, \",\" or \")\""),
+            (
+                "sin(a b)",
+                "at character 7 of \"sin(a b)\" is 'b', must be an operator, \",\" or \")\"; a product is written with *",
+            ),
             ("sin()", "at character 5 of \"sin()\" is ')', must be a number, a name, a sign or \"(\""),
             (
                 "a + (b *)",
@@ -311,11 +363,59 @@ mod tests {
             ("a, b", "at character 2 of \"a, b\" is ',', must be an operator or the end"),
             (
                 "\u{e4} + $",
-                "at character 1 of \"\u{e4} + $\" is '\u{e4}', must be a number, a name, a sign or \"(\"",
+                "at character 1 of \"\u{e4} + $\" is '\u{e4}', must be a number, a name, a sign or \"(\"; names have \
+                 ASCII letters only",
             ),
             ("a $ b", "at character 3 of \"a $ b\" is '$', must be an operator or the end"),
         ] {
             assert_eq!(parse(text).expect_err(text), wanted);
+        }
+    }
+
+    /// What other languages, and pens, write otherwise.
+    #[test]
+    fn habits_are_answered() {
+        for (text, wanted) in [
+            ("v**2", "; a power is written ^"),
+            (
+                "x = 3",
+                "; an expression has no =; a barrier is what is to be >= 0, a derivative the right-hand side alone",
+            ),
+            (
+                "x == 3",
+                "; an expression has no =; a barrier is what is to be >= 0, a derivative the right-hand side alone",
+            ),
+            (
+                "x <= 3",
+                "; an expression has no comparison; a barrier is what is to be >= 0, as b - a for a <= b",
+            ),
+            (
+                "x > 3",
+                "; an expression has no comparison; a barrier is what is to be >= 0, as a - b for a >= b",
+            ),
+            ("x && y", "; both a >= 0 and b >= 0 is min(a, b), or two barriers"),
+            ("|x|", "; an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
+            ("x' + 1", "; a derivative has no sign of its own; name the state that it is"),
+            ("np.sqrt(x)", "; a name has no dots: sqrt, not np.sqrt"),
+            ("[x + 1]*2", "; only ( and ) group"),
+            ("2x", "; a product is written with *"),
+            ("(a + b)(c + d)", "; a product is written with *"),
+            ("sin x", "; a product is written with *"),
+            ("a \u{2212} b", "; the minus sign is -"),
+            ("a\u{b7}b", "; a product is written *"),
+            ("x\u{b2}", "; a square is written ^2"),
+            ("0,5 * x", "; a decimal point is ."),
+            ("\u{3b8} + 1", "; names have ASCII letters only"),
+            ("x, y", ""),
+            ("x #", ""),
+        ] {
+            let message = parse(text).expect_err(text);
+            let hint = message.split_once("must be").expect("what is wanted").1.split_once(';');
+            assert_eq!(
+                hint.map_or_else(String::new, |(_, hint)| format!(";{hint}")),
+                wanted,
+                "{text}: {message}"
+            );
         }
     }
 

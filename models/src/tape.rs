@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use punctual_core::scalar::Scalar;
 
 use crate::MAX_OPERATIONS;
+use crate::names::nearest;
 use crate::syntax::{FUNCTIONS, Function, Node, Operator, PI, TIME, Tree};
 
 /// The place of a value on the tape: a variable, or the result of an operation.
@@ -366,16 +367,4 @@ pub(crate) fn unknown(name: &str, known: &[&str], allows_time: bool) -> String {
     }
     let listed = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
     format!("names {name}, which is unknown{}; the names are {listed}", nearest(name, known))
-}
-
-/// ", did you mean …?" where a name is near.
-fn nearest(name: &str, known: &[&str]) -> String {
-    let distance = |other: &str| strsim::damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase());
-    let near = known.iter().map(|other| (distance(other), *other)).min();
-    match near {
-        Some((distance, other)) if distance <= (name.chars().count() / 2).max(1) => {
-            format!(" (did you mean {other}?)")
-        }
-        _ => String::new(),
-    }
 }

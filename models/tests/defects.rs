@@ -38,7 +38,7 @@ fn expressions() {
     }
     for (text, wanted) in [
         ("p - a", "expression: names a, an input, which it does not depend on"),
-        ("p - q", "expression: names q, which is unknown (did you mean p?); the names are p, v, mass"),
+        ("p - q", "expression: names q, which is unknown; the names are p, v, mass"),
     ] {
         assert_eq!(barrier(text).err().expect(text).to_string(), wanted);
     }

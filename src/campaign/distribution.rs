@@ -246,8 +246,8 @@ mod tests {
                 "vary.x.values[1]: is inf, must be finite and >= -1",
             ),
             ("distribution = \"seed\"", "vary.x.distribution: is \"seed\", which is for variables that"),
-            ("distribution = \"cauchy\"", "unknown variant `cauchy`"),
-            ("mean = 0", "missing field `distribution`"),
+            ("distribution = \"cauchy\"", "is \"cauchy\", must be "),
+            ("mean = 0", "distribution: missing, it must be given"),
         ];
         for (text, expected) in defects {
             let message = checked(text, Range { min: Some(-1.0), max: Some(9.0) }).unwrap_err();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use punctual_fmu::configuration::{Configuration, ConfigurationError, RESOURCE, Range, read_toml};
+use punctual_fmu::configuration::{Configuration, ConfigurationError, FileKind, RESOURCE, Range, read_toml};
 use punctual_fmu::product::Product;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
@@ -13,10 +13,11 @@ use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{InProcess, Own, Simulation, System, links, port};
+use crate::coupling::{self, InProcess, Own, Simulation, System, check_fed, links, port};
 use crate::error::Error;
 use crate::host::{Causality, Fmu, ScalarType};
 use crate::package;
+use crate::text;
 
 /// A campaign file as it is written.
 #[derive(Clone, Debug, Deserialize)]
@@ -158,21 +159,35 @@ impl Campaign {
     ///
     /// A file that cannot be read; a key or value that cannot be used; an FMU of another program.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = read(path)?;
-        let file: File = read_toml(&text).map_err(|e| Error::from(e).in_file(path))?;
+        let source_text = text::read(path)?;
+        let file: File = read_toml(&source_text)
+            .map_err(|e| Error::from(FileKind::Campaign.instead(&source_text).unwrap_or(e)).in_file(path))?;
         let system_path = match &file.system {
             SystemSource::File(name) => path.with_file_name(name),
             SystemSource::Inline(_) => path.to_owned(),
         };
         let (system, system_text) = match file.system {
             SystemSource::File(_) => {
-                let text = read(&system_path)?;
+                let text = text::read(&system_path)?;
+                if coupling::is_configuration(&text) {
+                    let own = |e: Error| e.in_file(&system_path);
+                    let configuration = package::read_configuration(&system_path)?;
+                    let (system, configurations) = coupling::alone(configuration).map_err(own)?;
+                    let configurations =
+                        configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
+                    let system = Some(system);
+                    return Self::of(
+                        Source { file: source_text, system, configurations },
+                        path,
+                        &system_path,
+                    );
+                }
                 let system = System::parse(&text).map_err(|e| e.in_file(&system_path))?;
                 (system, Some(text))
             }
             SystemSource::Inline(system) => (*system, None),
         };
-        let configuration = |(i, component): (usize, &crate::coupling::Component)| {
+        let configuration = |(i, component): (usize, &coupling::Component)| {
             let name = system_path.with_file_name(&component.fmu);
             let prefix = if system_text.is_none() { "system." } else { "" };
             configuration(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
@@ -180,7 +195,7 @@ impl Campaign {
         let configurations =
             system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
         let configurations = configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
-        Self::of(Source { file: text, system: system_text, configurations }, path, &system_path)
+        Self::of(Source { file: source_text, system: system_text, configurations }, path, &system_path)
     }
 
     /// Checks a campaign whose texts are given; errors name `path` or `system_path`.
@@ -218,7 +233,7 @@ impl Campaign {
         let refer: Vec<_> = models.iter().map(|model| &model.description).collect();
         let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
         // The varied variables.
-        let mut varied = Vec::new();
+        let (mut varied, mut given) = (Vec::new(), Vec::new());
         for (name, section) in &file.vary {
             let field = format!("vary.{name:?}");
             let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
@@ -237,6 +252,7 @@ impl Campaign {
             }
             let (min, max) = variable.kind.range();
             let range = Range { min, max };
+            given.push(port);
             varied.push(Varied {
                 name: name.clone(),
                 unit: variable.kind.unit().map(str::to_owned),
@@ -246,6 +262,7 @@ impl Campaign {
                 distribution: section.checked(&field, range).map_err(in_file)?,
             });
         }
+        check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
         Ok(Self { source, system, models, varied, sampler, runs, success })
@@ -309,10 +326,6 @@ impl Campaign {
             simulation.set_start(varied.component, varied.reference, *value);
         }
     }
-}
-
-fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))
 }
 
 /// Reads the configuration of the component at `path`; an FMU carries its own.

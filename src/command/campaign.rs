@@ -3,17 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
 use crate::campaign::{self, Campaign, Measures, Options, Rate, Summary};
-use crate::error::Error;
+use crate::error::{Error, INTERRUPTED};
 use crate::output::{self, Counter, number};
-
-/// Exit code after Ctrl-C, as shells have it.
-const INTERRUPTED: u8 = 130;
 
 /// Lines of a list that are printed at once.
 const AT_ONCE: usize = 1000;
@@ -99,15 +94,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let output = arguments.output.clone();
     let output = output.unwrap_or_else(|| arguments.campaign.with_extension("parquet"));
-    let stop = Arc::new(AtomicBool::new(false));
-    let handle = Arc::clone(&stop);
     // A second Ctrl-C ends the program at once, since the kept rows are safe.
-    let handler = move || {
-        if handle.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
-    };
-    ctrlc::set_handler(handler).map_err(|e| Error::broken("Ctrl-C", format!("cannot be caught: {e}")))?;
+    let stop = super::interruption()?;
     // Run.
     let options = Options { output: output.clone(), threads: arguments.threads };
     let counter = Counter::new("runs", 0, campaign.runs());

@@ -212,7 +212,8 @@ impl LoopInput {
 impl LoopReport {
     /// A line that tells whether the promises were kept.
     pub(super) fn head(&self) -> String {
-        let verdict = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
+        let words = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
+        let verdict = output::verdict(words, self.kept);
         let (step, end) = (number(self.step), number(self.end));
         let who = if self.by_rows { " of the rows alone" } else { "" };
         format!("closed loop{who} with {}, steps of {step} s to t = {end} s: {verdict}", self.u_ref)
@@ -224,7 +225,7 @@ impl LoopReport {
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), number);
         rows.extend(self.barriers.iter().map(|b| {
-            let promise = b.promise.words().to_owned();
+            let promise = super::run::shown(b.promise);
             let times = [b.arrival, b.late, b.left, b.least_h].map(shown);
             let [arrival, late, left, least] = times;
             let unmet = b.unmet.to_string();

@@ -14,6 +14,7 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::output::Progress;
 use crate::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
+use crate::whole;
 
 /// Points of a plan, about.
 const POINTS: f64 = 400.0;
@@ -149,7 +150,7 @@ pub(super) fn starts(
     let [drawn, listed] = ["svg", "csv"].map(|ending| folder.join(format!("{}-map.{ending}", c.name)));
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     plot::map(&picture, &drawn)?;
-    std::fs::write(&listed, table).map_err(|e| Error::io("write", &listed, e))?;
+    whole::write(&listed, table)?;
     Ok(MapReport { promised, of: cells.len(), files: [drawn, listed].iter().map(shown).collect() })
 }
 

@@ -12,5 +12,24 @@ pub mod new;
 pub mod replay;
 pub mod reproduce;
 pub mod run;
+pub mod shell;
 pub mod validate;
 mod witness;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::{Error, INTERRUPTED};
+
+/// What is set at the first Ctrl-C; the second one ends the program at once.
+fn interruption() -> Result<Arc<AtomicBool>, Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let handle = Arc::clone(&stop);
+    let handler = move || {
+        if handle.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(INTERRUPTED));
+        }
+    };
+    ctrlc::set_handler(handler).map_err(|e| Error::broken("Ctrl-C", format!("cannot be caught: {e}")))?;
+    Ok(stop)
+}

@@ -6,10 +6,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::{Configuration, read_toml};
 use serde::Serialize;
 
-use crate::coupling::{self, Kept, Model, Order, Outcome, Picture, Promise, Simulation, System};
+use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
@@ -18,6 +17,8 @@ use crate::package;
 use crate::pictures;
 use crate::recording::{self, Recording};
 use crate::report;
+use crate::text;
+use crate::whole;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -179,27 +180,18 @@ struct Opened {
 
 /// Opens a system file, or the file of a filter.
 fn open(arguments: &Arguments) -> Result<Opened, Error> {
-    #[derive(serde::Deserialize)]
-    struct Head {
-        kind: Option<serde::de::IgnoredAny>,
-    }
     let (path, out) = (&arguments.system, arguments.out.clone());
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
-    if !read_toml::<Head>(&text).is_ok_and(|head| head.kind.is_some()) {
+    let text = text::read(path)?;
+    if !coupling::is_configuration(&text) {
         let system = System::parse(&text)?;
         let (simulation, models) = Simulation::new(&system, path.parent().unwrap_or(Path::new("")))?;
+        models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
         return Ok(Opened { system, models, simulation, out });
     }
-    let (system, models) = match package::read_configuration(path)? {
-        Configuration::Filter(filter) => coupling::alone(path, filter)?,
-        other => {
-            let message = format!(
-                "is {:?}; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
-                other.kind()
-            );
-            return Err(Error::configuration("kind", message));
-        }
-    };
+    let (text, configurations) = coupling::alone(package::read_configuration(path)?)?;
+    let system = System::parse(&text)?;
+    let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned()));
+    let models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
     let simulation = Simulation::of(&system, &models)?;
     let out = Some(out.unwrap_or_else(|| stem(path).into()));
     Ok(Opened { system, models, simulation, out })
@@ -218,6 +210,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
 
+    simulation.stop_by(super::interruption()?);
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
     let columns = simulation.columns().to_vec();
@@ -249,7 +242,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
             let page = folder.join(format!("{}.html", stem(path)));
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
             let text = report::document(&name, &system, &models, &outcome, &notes);
-            std::fs::write(&page, text).map_err(|e| Error::io("write", &page, e))?;
+            whole::write(&page, text)?;
             files.push(page.display().to_string());
         }
     }
@@ -375,6 +368,14 @@ pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = Str
     })
 }
 
+/// A verdict, coloured for a terminal.
+pub(super) fn shown(promise: Kept) -> String {
+    match promise {
+        Kept::Open => promise.words().to_owned(),
+        _ => output::verdict(promise.words(), promise == Kept::Kept),
+    }
+}
+
 /// A row for each promise and an empty line; nothing where there is no promise.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
@@ -396,7 +397,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
     rows.extend(promises.iter().map(|p| {
         vec![
             p.barrier.clone(),
-            p.promise.words().to_owned(),
+            shown(p.promise),
             time(p.arrival),
             time(p.late),
             time(p.left),

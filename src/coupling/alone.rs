@@ -1,39 +1,53 @@
 //! A filter's file as a system: the filter, the plant that its model is, and the nominal controller that stands in it.
 
-use std::path::Path;
+use punctual_fmu::configuration::{Configuration, read_toml};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
-use punctual_fmu::configuration::{Configuration, FilterConfiguration};
-
-use super::model::{Model, Own};
-use super::system::System;
 use crate::error::Error;
 
-/// The system of the filter in the file at `path`, and what its components are made of.
+/// Whether this is the text of a filter, plant or controller, and not of a system.
+pub fn is_configuration(text: &str) -> bool {
+    #[derive(Deserialize)]
+    struct Head {
+        kind: Option<IgnoredAny>,
+    }
+    read_toml::<Head>(text).is_ok_and(|head| head.kind.is_some())
+}
+
+/// The text of the system of a filter, and the configurations of its components, in order.
 ///
 /// # Errors
 ///
-/// A plant that cannot be simulated, a start or controller that does not fit it.
-pub fn alone(path: &Path, filter: FilterConfiguration) -> Result<(System, Vec<Model>), Error> {
+/// A configuration that is no filter, a plant that cannot be simulated, a start or controller that does not fit it.
+pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>), Error> {
+    let Configuration::Filter(filter) = configuration else {
+        let message = format!(
+            "is {:?}; must be \"filter\", which runs with its own model, or a system file, which couples components",
+            configuration.kind()
+        );
+        return Err(Error::configuration("kind", message));
+    };
     let (plant, controller) = filter.alone()?;
+    // What a barrier follows stays where it starts: nothing here moves it.
+    let start: Vec<_> =
+        filter.barrier_inputs().iter().map(|input| format!("{:?} = {:?}", input.name, input.start)).collect();
     let experiment = filter.experiment;
-    let mut names = vec!["filter", "plant"];
     let mut configurations = vec![Configuration::Filter(filter), Configuration::Plant(plant)];
-    if let Some(controller) = controller {
-        names.push("controller");
-        configurations.push(Configuration::Controller(controller));
-    }
+    configurations.extend(controller.map(Configuration::Controller));
     let mut text = format!(
         "[experiment]\nstart_time = {:?}\nstop_time = {:?}\nstep = {:?}\n",
         experiment.start_time, experiment.stop_time, experiment.step_size
     );
+    let names: Vec<_> = configurations.iter().map(Configuration::kind).collect();
     for (i, name) in names.iter().enumerate() {
         text += &format!("[[component]]\nname = \"{name}\"\nfmu = \"{name}\"\n");
+        if i == 0 {
+            text += &format!("start = {{ {} }}\n", start.join(", "));
+        }
         for other in &names[..i] {
             text += &format!("[[connect_by_name]]\ncomponents = [\"{other}\", \"{name}\"]\n");
         }
     }
-    let models = configurations
-        .into_iter()
-        .map(|configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned())));
-    Ok((System::parse(&text)?, models.collect::<Result<_, _>>()?))
+    Ok((text, configurations))
 }

@@ -14,6 +14,8 @@
 //! step, all is read.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::grid::Grid;
@@ -65,6 +67,8 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// Notes that hold for every run.
     standing_notes: usize,
     used: bool,
+    /// Set by somebody else to end a run.
+    stop: Option<Arc<AtomicBool>>,
 }
 
 /// Result of a run.
@@ -107,7 +111,7 @@ impl Simulation<Box<dyn Participant>> {
     /// # Errors
     ///
     /// An FMU that cannot be opened, loaded or instantiated; a configuration that cannot be used; a connection, start value,
-    /// recorded signal or picture that does not fit them (with the field of the system file).
+    /// recorded signal or picture that does not fit them (with the field of the system file); an input that nothing feeds.
     pub fn new(system: &System, base: &Path) -> Result<(Self, Vec<Model>), Error> {
         let mut models: Vec<Model> = Vec::new();
         for (i, component) in system.components().iter().enumerate() {
@@ -131,6 +135,7 @@ impl Simulation<Box<dyn Participant>> {
     /// As for [`Simulation::new`]; or not one model for each component.
     pub fn of(system: &System, models: &[Model]) -> Result<Self, Error> {
         let descriptions: Vec<_> = models.iter().map(Model::description).collect();
+        promises::check_fed(system, &descriptions, &network::links(system, &descriptions)?, &[])?;
         Self::assembled(system, &descriptions, |c| {
             let name = &system.components()[c].name;
             models[c].instance(name).map_err(|e| e.in_component(name))
@@ -210,9 +215,10 @@ impl<P: Participant> Simulation<P> {
             notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
             standing_notes: 0,
             used: false,
+            stop: None,
         };
         simulation.note_shortened_step(descriptions);
-        simulation.notes.extend(promises::unfed(system, descriptions, &links));
+        simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
     }
@@ -224,6 +230,18 @@ impl<P: Participant> Simulation<P> {
         match given {
             Some(start) => *start = Start::Real(reference, value),
             None => starts.push(Start::Real(reference, value)),
+        }
+    }
+
+    /// Ends a run at the next step once `stop` is set; what was recorded until then is kept.
+    pub fn stop_by(&mut self, stop: Arc<AtomicBool>) {
+        self.stop = Some(stop);
+    }
+
+    fn check_stop(&self, time: f64) -> Result<(), Error> {
+        match &self.stop {
+            Some(stop) if stop.load(Ordering::Relaxed) => Err(Error::interrupted(time)),
+            _ => Ok(()),
         }
     }
 
@@ -284,6 +302,7 @@ impl<P: Participant> Simulation<P> {
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
+            self.check_stop(time)?;
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
                 self.set_inputs(c)?;
@@ -321,6 +340,7 @@ impl<P: Participant> Simulation<P> {
         }
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
+            self.check_stop(time)?;
             for c in 0..self.members.len() {
                 self.set_inputs(c)?;
             }
@@ -355,7 +375,7 @@ impl<P: Participant> Simulation<P> {
                 });
                 given.unwrap_or(own)
             });
-            watched.reset(deadline);
+            self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
         // Set start values, and go to initialization mode.
         let used = std::mem::replace(&mut self.used, true);

@@ -14,14 +14,14 @@ mod ports;
 mod promises;
 mod system;
 
-pub use alone::alone;
+pub use alone::{alone, is_configuration};
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use master::{Outcome, Simulation, Statistics};
 pub use model::{Model, Own};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;
-pub use promises::{Kept, Promise};
+pub use promises::{Kept, Promise, check_fed};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,

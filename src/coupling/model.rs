@@ -10,7 +10,7 @@ use punctual_fmu::product::Product;
 use super::{InProcess, Participant};
 use crate::error::Error;
 use crate::host::{Description, Fmu, Slave};
-use crate::{output, package};
+use crate::package;
 
 /// A configuration with what an FMU of it would say.
 pub struct Own {
@@ -74,9 +74,7 @@ impl Model {
         if let Some(fmu) = opened {
             return Ok(Self::Fmu(fmu));
         }
-        let fmu = Fmu::open(path)?;
-        tell_stale(&fmu);
-        Ok(Self::Fmu(Rc::new(fmu)))
+        Ok(Self::Fmu(Rc::new(Fmu::open(path)?)))
     }
 
     /// The file that it is from.
@@ -95,26 +93,27 @@ impl Model {
         }
     }
 
+    /// What to tell of an FMU of this program that is not what the configuration beside it would become.
+    pub fn stale(&self) -> Option<String> {
+        let Self::Fmu(fmu) = self else { return None };
+        let inside = fmu.resource(RESOURCE)?;
+        // A file that cannot be used is not what the FMU was made of, or is of something else.
+        let beside = fmu.path().with_extension("toml");
+        let text = std::fs::read_to_string(&beside).ok()?;
+        let outside = Configuration::parse(&text).and_then(|c| c.canonical()).ok()?;
+        let (fmu, beside) = (fmu.path().display(), beside.display());
+        (inside != outside).then(|| {
+            format!(
+                "note: {fmu} is not made of {beside} as that is now; build it anew, or name the .toml file in the system"
+            )
+        })
+    }
+
     /// An instance called `name`.
     pub(super) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
         Ok(match self {
             Self::Fmu(fmu) => Box::new(Slave::instantiate(Rc::clone(fmu), name)?),
             Self::Own(own, _) => Box::new(own.instance(name)?),
         })
-    }
-}
-
-/// Tells where an FMU of this program is not what the configuration beside it would become.
-fn tell_stale(fmu: &Fmu) {
-    let beside = fmu.path().with_extension("toml");
-    let Some(inside) = fmu.resource(RESOURCE).filter(|_| beside.is_file()) else { return };
-    // One that cannot be used is not what the FMU was made of, or is of something else.
-    let Ok(text) = std::fs::read_to_string(&beside) else { return };
-    let Ok(outside) = Configuration::parse(&text).and_then(|c| c.canonical()) else { return };
-    if inside != outside {
-        let (fmu, beside) = (fmu.path().display(), beside.display());
-        output::note(&format!(
-            "note: {fmu} is not made of {beside} as that is now; build it anew, or name the .toml file in the system"
-        ));
     }
 }

@@ -13,7 +13,8 @@ use serde::Serialize;
 use super::layout::Layout;
 use super::network::{self, Link, Port};
 use super::system::{Order, System};
-use crate::host::{Causality, Description};
+use crate::error::Error;
+use crate::host::{Causality, Description, ScalarType};
 
 /// The outputs of a barrier that are read.
 const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
@@ -200,39 +201,81 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
     found
 }
 
-/// Notes on the inputs of a filter that nothing feeds: measured states, and u_ref where none of it is fed. An
-/// input with a start value in the system file is meant to be constant.
-pub(super) fn unfed(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (component, (owner, description)) in system.components().iter().zip(descriptions).enumerate() {
-        let outputs = |ending| description.variables.iter().any(|v| v.name.ends_with(ending));
-        if !outputs(".unmet_steps") || description.index_of("status").is_none() {
-            continue;
-        }
-        let loose = |prefix: &str| -> (Vec<&str>, usize) {
-            let all = description.variables.iter().enumerate();
-            let all = all.filter(|(_, v)| v.causality == Causality::Input && v.name.starts_with(prefix));
-            let mut count = 0;
-            let mut loose = Vec::new();
-            for (variable, v) in all {
-                count += 1;
-                let port = Port { component, variable };
-                let fed = links.iter().any(|link| link.to == port) || owner.start.contains_key(&v.name);
-                loose.extend((!fed).then_some(v.name.as_str()));
-            }
-            (loose, count)
+/// Whether the FMU is a filter.
+fn is_filter(description: &Description) -> bool {
+    let promises = description.variables.iter().any(|v| v.name.ends_with(".unmet_steps"));
+    promises && description.index_of("status").is_some()
+}
+
+/// The beginning of the names of the wanted inputs of a filter.
+const WANTED: &str = "u_ref.";
+
+/// The Real inputs of `component` that have neither a connection nor a start value in the system file.
+fn loose<'a>(
+    system: &System,
+    component: usize,
+    description: &'a Description,
+    links: &[Link],
+) -> Vec<(Port, &'a str)> {
+    let starts = &system.components()[component].start;
+    let all = description.variables.iter().enumerate();
+    let all =
+        all.filter(|(_, v)| v.causality == Causality::Input && v.kind.scalar_type() == ScalarType::Real);
+    let ports = all.map(|(variable, v)| (Port { component, variable }, v.name.as_str()));
+    ports.filter(|(port, name)| !starts.contains_key(*name) && links.iter().all(|l| l.to != *port)).collect()
+}
+
+/// Refuses Real inputs that nothing feeds: they would stay at the FMU's start value without a word. The wanted
+/// inputs of a filter may, and inputs in `given`, which have their values from elsewhere.
+///
+/// # Errors
+///
+/// Such inputs, by the component.
+pub fn check_fed(
+    system: &System,
+    descriptions: &[&Description],
+    links: &[Link],
+    given: &[Port],
+) -> Result<(), Error> {
+    /// Most names in a message.
+    const NAMES: usize = 8;
+    for (component, description) in descriptions.iter().enumerate() {
+        let mut loose = loose(system, component, description, links);
+        let filter = is_filter(description);
+        loose.retain(|(port, name)| !(given.contains(port) || filter && name.starts_with(WANTED)));
+        let Some((_, first)) = loose.first() else { continue };
+        let names: Vec<_> = loose.iter().take(NAMES).map(|(_, name)| *name).collect();
+        let more = match loose.len() - names.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
         };
-        let name = &owner.name;
-        let (states, _) = loose("x.");
-        if !states.is_empty() {
-            notes.push(format!("{name}: nothing feeds {}, which stay at their start", states.join(", ")));
-        }
-        let (wanted, count) = loose("u_ref.");
-        if !wanted.is_empty() && wanted.len() == count {
+        let message = format!(
+            "nothing feeds {}{more} of {}: connect what moves (`[[connection]]`, or `[[connect_by_name]]` for equal \
+             names), and give what stays the same its value here, as `start = {{ {first:?} = 0.0 }}`",
+            names.join(", "),
+            system.components()[component].name,
+        );
+        return Err(Error::configuration(format!("component[{component}]"), message));
+    }
+    Ok(())
+}
+
+/// Notes on filters none of whose wanted inputs is fed. One with a start value in the system file is meant to be
+/// constant.
+pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (component, description) in descriptions.iter().enumerate().filter(|(_, d)| is_filter(d)) {
+        let wanted = |name: &str| name.starts_with(WANTED);
+        let inputs = description.variables.iter().filter(|v| v.causality == Causality::Input);
+        let count = inputs.filter(|v| wanted(&v.name)).count();
+        let loose = loose(system, component, description, links);
+        let loose: Vec<_> = loose.into_iter().map(|(_, name)| name).filter(|name| wanted(name)).collect();
+        if !loose.is_empty() && loose.len() == count {
             notes.push(format!(
-                "{name}: nothing feeds {}: the wanted input is 0 at all times, and nothing damps the motion along the set; \
+                "{}: nothing feeds {}: the wanted input is 0 at all times, and nothing damps the motion along the set; \
                  connect a controller, such as damping, or give a start value",
-                wanted.join(", ")
+                system.components()[component].name,
+                loose.join(", ")
             ));
         }
     }
@@ -259,9 +302,15 @@ impl Watched {
         })
     }
 
-    /// Forgets the run before; `deadline` in s after the first step is that of the next.
-    pub(super) fn reset(&mut self, deadline: Option<f64>) {
+    /// Forgets the run before; `deadline` in s after the first step is that of the next. Returns a note on a
+    /// deadline that comes before the end of the first `step` (s).
+    pub(super) fn reset(&mut self, deadline: Option<f64>, step: f64) -> Option<String> {
         self.run = Run::new(deadline, self.course);
+        let deadline = deadline.filter(|deadline| *deadline < step)?;
+        Some(format!(
+            "{}: the deadline of {deadline} s is shorter than the step of {step} s: nothing is measured until it is over",
+            self.name
+        ))
     }
 
     /// Takes the `values` of the communication point at `time` (s).

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use punctual_fmu::configuration::{ConfigurationError, read_toml};
+use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
 use crate::error::Error;
+use crate::text;
 
 /// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
 /// so its numbers are in range and its component names are unique.
@@ -118,7 +119,7 @@ impl<'de> Deserialize<'de> for StartValue {
             }
             fn visit_map<A: MapAccess<'de>>(self, _: A) -> Result<StartValue, A::Error> {
                 Err(serde::de::Error::custom(
-                    "expected a number or true or false; a name with dots needs quotes: \"x0.x_p\" = 1.0",
+                    "is a table, must be a number or true or false; a name with dots needs quotes: \"x0.x_p\" = 1.0",
                 ))
             }
         }
@@ -295,7 +296,7 @@ impl System {
     /// Text that is not TOML, unknown or missing keys, values of the wrong type or out of range,
     /// component names that are empty, have a dot or are used twice: each with the field.
     pub fn parse(text: &str) -> Result<Self, Error> {
-        let system: Self = read_toml(text)?;
+        let system: Self = read_toml(text).map_err(|e| FileKind::System.instead(text).unwrap_or(e))?;
         system.check()?;
         Ok(system)
     }
@@ -306,8 +307,7 @@ impl System {
     ///
     /// A file that cannot be read, or as for [`System::parse`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
-        Self::parse(&text).map_err(|e| e.in_file(path))
+        Self::parse(&text::read(path)?).map_err(|e| e.in_file(path))
     }
 
     /// The same system, run to `stop_time` in steps of `step` (s), where these are given.
@@ -504,15 +504,19 @@ signals = ["a.y"]
                 "experiment.stop_time: is 0 s; must be after start_time = 0 s",
             ),
             ("stop_time = 2.0", "stop_time = nan", "experiment.stop_time: is NaN; must be finite"),
-            ("stop_time = 2.0", "", "missing field `stop_time`"),
+            ("stop_time = 2.0", "", "experiment.stop_time: missing, it must be given"),
             ("step = 0.5", "step = -0.5", "experiment.step: is -0.5 s; must be > 0"),
             (
                 "step = 0.5",
                 "step = 1e-30",
                 "experiment.step: is 0.000000000000000000000000000001 s, which makes",
             ),
-            ("step = 0.5", "step = 0.5\nsteps = 1", "unknown field `steps`"),
-            ("step = 0.5", "step = 0.5\norder = \"random\"", "unknown variant `random`"),
+            ("step = 0.5", "step = 0.5\nsteps = 1", "experiment.steps: is no key here (did you mean step?)"),
+            (
+                "step = 0.5",
+                "step = 0.5\norder = \"random\"",
+                "experiment.order: is \"random\", must be \"gauss-seidel\" or \"jacobi\"",
+            ),
             ("name = \"b\"", "name = \"a\"", "component[1].name: \"a\" is also the name of component[0]"),
             ("name = \"b\"", "name = \"\"", "component[1].name: is empty"),
             ("name = \"b\"", "name = \"b.c\"", "component[1].name: is \"b.c\"; must not contain a dot"),
@@ -522,7 +526,7 @@ signals = ["a.y"]
             (
                 "on = true",
                 "on = \"true\"",
-                "invalid type: string \"true\", expected a number or true or false",
+                "component[0].start.on: is \"true\", must be a number or true or false",
             ),
             ("to = \"b.u\"", "to = \"b.u\"\nfactor = nan", "connection[0].factor: is NaN; must be finite"),
             ("every = 2", "every = 0", "record.every: is 0; must be ≥ 1"),
@@ -533,7 +537,7 @@ signals = ["a.y"]
                 "signals = [\"a.y\"]\nname = \"../x\"",
                 "plot[1].name: is \"../x\"; must be part",
             ),
-            ("kind = \"time\"", "kind = \"pie\"", "unknown variant `pie`"),
+            ("kind = \"time\"", "kind = \"pie\"", "is \"pie\", must be \"path\" or \"time\""),
         ];
         for (valid, broken, expected) in defects {
             assert!(VALID.contains(valid), "{valid}");

@@ -76,6 +76,11 @@ impl Archive {
         }
         let size = metadata.len();
         limit("the file has", size, "bytes", MAX_FILE_BYTES).map_err(problem)?;
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+            let message =
+                "a TOML file is none; `punctual build` makes an FMU from one, `punctual check` checks it";
+            return Err(problem(FmuProblem::Archive(message.into())));
+        }
         announced_entries(&mut file).map_err(problem)?;
         let mut zip =
             ZipArchive::new(BufReader::new(file)).map_err(|e| problem(FmuProblem::Archive(chain(&e))))?;

@@ -1,6 +1,6 @@
 //! `documentation/index.html` of an FMU: its purpose, its coupling, its variables.
 
-use punctual_fmu::configuration::Configuration;
+use punctual_fmu::configuration::{Configuration, SamplingName};
 use punctual_fmu::product::Product;
 use punctual_modeldescription::{ModelDescription, Real, VariableKind};
 
@@ -11,7 +11,7 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
     for v in &description.variables {
         let (unit, start, range) = match &v.kind {
             VariableKind::Real(Real { start, min, max, unit, .. }) => {
-                let text = |value: &Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+                let text = |value: &Option<f64>| value.map(shown).unwrap_or_default();
                 let range = match (min, max) {
                     (None, None) => String::new(),
                     _ => format!("{} … {}", text(min), text(max)),
@@ -53,10 +53,15 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
         Configuration::Plant(_) => PLANT,
         Configuration::Controller(_) => CONTROLLER,
     };
-    let given = match &product.configuration {
-        Configuration::Filter(c) if c.external().is_some() => EXTERNAL,
-        _ => "",
-    };
+    let mut given = String::new();
+    if let Configuration::Filter(c) = &product.configuration {
+        given += match c.sampling {
+            SamplingName::Pointwise => POINTWISE,
+            SamplingName::Measured | SamplingName::StepSize => PREDICTED,
+        };
+        given += if c.is_assured() { ASSURED } else { ROWS };
+        given += if c.external().is_some() { EXTERNAL } else { "" };
+    }
     let step = product.configuration.experiment().step_size;
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}</title>\n<style>{STYLE}</style></head>\n\
@@ -79,9 +84,20 @@ const FILTER: &str = "<p>Connect the measured state to <code>x.*</code>, the wan
 An output read after inputs were set belongs to those inputs at that communication point; after a step without new \
 inputs it stays the sample taken at the step's start, which is the input to hold over the step. A master that \
 exchanges all values before stepping (Jacobi) therefore delays <code>u.*</code> by one step.</p>\n\
-<p><code>status</code> says what <code>u.*</code> means; only <code>unchanged</code> and <code>filtered</code> satisfy \
-every constraint. The promise is one of continuous time: between samples the input is held, and the margin has to \
-cover what that costs.</p>";
+<p><code>status</code> says what <code>u.*</code> means; only <code>unchanged</code>, <code>filtered</code> and \
+<code>backup</code> satisfy every constraint.</p>";
+
+const POINTWISE: &str = "\n<p>The promise is one of continuous time: between samples the input is held, and the margin has \
+to cover what that costs.</p>";
+
+const PREDICTED: &str = "\n<p>Between samples the input is held. The filter predicts the state over that time, and adds to \
+the margin what the hold still costs.</p>";
+
+const ASSURED: &str = "\n<p>The filter promises only what a plan within the bounds keeps, whatever <code>u_ref.*</code> is. \
+<code>assurance</code> says whether it has one.</p>";
+
+const ROWS: &str = "\n<p>No plan is followed: <code>on_course</code> says that the conditions of the promise have held so \
+far, not that an input will exist later.</p>";
 
 const EXTERNAL: &str = "\n<p>An external barrier has no model: set its inputs at every communication point. <code>lf0</code> \
 is h, <code>lf1</code> and on are its time derivatives, the last of them where every input of the plant is 0, and \
@@ -93,6 +109,12 @@ step is divided into equal Runge-Kutta steps of at most <code>inner_step</code>.
 const CONTROLLER: &str = "<p>Connect the measured state to <code>x.*</code> and <code>u_ref.*</code> to the filter. \
 It promises nothing; that is what the filter is for. A state that is not finite gives <code>u_ref.*</code> that are not a \
 number, which the filter reports as <code>invalid_input</code>.</p>";
+
+/// A number with all its digits, with a power of ten where they are many.
+fn shown(value: f64) -> String {
+    let text = value.to_string();
+    if text.len() > 20 { format!("{value:e}") } else { text }
+}
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

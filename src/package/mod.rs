@@ -18,6 +18,7 @@ use punctual_modeldescription::{Archive, Timestamp};
 
 use crate::error::Error;
 use crate::host::{Fmu, PLATFORM, Slave};
+use crate::whole;
 
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
@@ -88,7 +89,7 @@ pub fn build(configuration: Configuration, library: Option<&Path>, file: &Path) 
     let bytes = archive(&product, library::read(library)?)?
         .to_bytes()
         .map_err(|e| Error::configuration("", e.to_string()))?;
-    std::fs::write(file, bytes).map_err(|e| Error::io("write", file, e))?;
+    whole::write(file, bytes)?;
     tried(&product, file).inspect_err(|_| {
         // If this fails too, the first error is the one to tell.
         let _ = std::fs::remove_file(file);

@@ -9,6 +9,7 @@ use punctual_fmu::{PluginFolder, plugin_file_name};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
+use crate::text;
 
 /// The hidden command of the child.
 pub const COMMAND: &str = "try-plugin";
@@ -51,7 +52,7 @@ impl PluginLoader for Tried<'_> {
 
 /// Reads the configuration at `path` with plug-ins that `loader` finds.
 pub(super) fn read(path: &Path, loader: &dyn PluginLoader) -> Result<Configuration, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+    let text = text::read(path)?;
     Configuration::parse_with(&text, loader).map_err(|e| Error::from(e).in_file(path))
 }
 

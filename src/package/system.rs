@@ -12,6 +12,7 @@ use punctual_modeldescription::{
 use crate::coupling::{self, Link, Port, StartValue, System};
 use crate::error::Error;
 use crate::host::{Description, Fmu, Variable, VariableKind};
+use crate::whole;
 
 /// The parameter set with the start values, in the archive.
 const START_VALUES: &str = "resources/start_values.ssv";
@@ -41,7 +42,7 @@ pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
     let name = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy());
     let (archive, packed) = archive(&system, &name, base).map_err(|e| e.in_file(path))?;
     let bytes = archive.to_bytes().map_err(|e| super::broken(&e))?;
-    std::fs::write(file, bytes).map_err(|e| Error::io("write", file, e))?;
+    whole::write(file, bytes)?;
     Ok(packed)
 }
 

@@ -6,6 +6,7 @@ use svg::node::element::{Circle, ClipPath, Definitions, Group, Polygon, Polyline
 use svg::{Document, Node};
 
 use crate::error::Error;
+use crate::whole;
 
 /// Families in order of preference; the viewer has one of them.
 const FONT: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
@@ -149,7 +150,7 @@ impl Canvas {
 
     /// Writes the sheet to `file`.
     pub(super) fn save(self, file: &Path) -> Result<(), Error> {
-        std::fs::write(file, self.document()).map_err(|e| Error::io("write", file, e))
+        whole::write(file, self.document())
     }
 
     /// The SVG document.

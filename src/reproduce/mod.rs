@@ -25,6 +25,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::plot::{self, Chart};
+use crate::whole;
 pub use cases::{Setup, Vehicle};
 pub use table::{Cell, Table};
 
@@ -127,5 +128,5 @@ pub fn save(report: &Report, folder: &Path) -> Result<(), Error> {
 }
 
 pub(crate) fn write(path: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(path, text).map_err(|e| Error::io("write", path, e))
+    whole::write(path, text)
 }

@@ -279,7 +279,7 @@ fn what_cannot_be_run_alone_is_told() {
         (
             "x0 = { theta",
             "x0 = { tetha",
-            "car.toml: x0.tetha: unknown state, must be one of x_p, y_p, theta, v",
+            "car.toml: x0.tetha: unknown state (did you mean theta?), must be one of x_p, y_p, theta, v",
         ),
         (
             "omega = \"0.5 * cos(t)\"",
@@ -289,7 +289,7 @@ fn what_cannot_be_run_alone_is_told() {
         (
             "-0.3 * v",
             "-0.3 * w",
-            "car.toml: u_ref.a: names w, which is unknown (did you mean v?); the names are x_p, y_p, theta, v",
+            "car.toml: u_ref.a: names w, which is unknown; the names are x_p, y_p, theta, v",
         ),
         ("x0 = {", "simulated.model = \"point\"\nx0 = {", "car.toml: simulated.model"),
     ] {
@@ -306,6 +306,50 @@ fn what_cannot_be_run_alone_is_told() {
     workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
     workshop.punctual(["run", "plant.toml"]).fails(
         2,
-        "plant.toml: kind: is \"plant\"; `punctual run` takes a system file, or the file of a filter, which runs with its own model",
+        "plant.toml: kind: is \"plant\"; must be \"filter\", which runs with its own model, or a system file, which couples components",
     );
+}
+
+#[test]
+fn a_campaign_takes_a_file_alone() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 8.0"));
+    workshop.write(
+        "many.toml",
+        "system = \"car.toml\"\n[campaign]\nruns = 4\n[vary]\n\"plant.x0.theta\" = { distribution = \"uniform\", min = -1.0, max = 1.0 }\n",
+    );
+    workshop.punctual(["campaign", "many.toml", "--require", "success"]).success();
+    workshop.punctual(["replay", "many.parquet", "--run", "2"]).success();
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_its_rows() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 1e5"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_punctual"))
+        .args(["run", "car.toml", "--out", "out"])
+        .current_dir(workshop.path(""))
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary under test");
+    // The folder is made before the first step; the handler is there by then, or soon.
+    let begin = Instant::now();
+    while !workshop.path("out").exists() && begin.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
+    assert_eq!(child.wait().expect("a child").code(), Some(130));
+    let mut told = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut told).expect("UTF-8");
+    assert!(
+        told.starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
+        "{told}"
+    );
+    assert!(Table::parse(&workshop.text("out/car.csv")).len() > 1);
 }

@@ -23,16 +23,8 @@ fn build_text(text: impl AsRef<[u8]>) -> Done {
 
 #[test]
 fn an_unknown_key() {
-    build("unicycle-filter", "margin", "margn").fails(
-        2,
-        "my.toml: barrier[0].margn: at line 13, column 1\n   |\n\
-         13 | margn = 0.02         # m: what the held input may cost between samples\n   | ^^^^^\n\
-         unknown field `margn`, expected one of `name`, `shape`, `centre`, `velocity`, `centre_input`, `radius`, `smoothing`, \
-         `half_axes`, `half_sides`, `angle`, `normal`, `state`, `bound`, `expression`, `output`, `unit`, `relative_degree`, \
-         `deadline`, `method`, `profile`, `when_infeasible`, `rate`, `rates`, `stay_rate`, `margin`, `recovery`, \
-         `disturbance`, `priority`, `penalty`, `begin`, \
-         `after`, `end`, `until_arrival`",
-    );
+    build("unicycle-filter", "margin", "margn")
+        .fails(2, "my.toml: barrier[0].margn: is no key here (did you mean margin?) (line 13)");
 }
 
 #[test]
@@ -56,10 +48,9 @@ fn a_start_value_that_is_not_a_number() {
 fn an_unknown_model() {
     build("unicycle-plant", "model = \"unicycle\"", "model = \"bike\"").fails(
         2,
-        "my.toml: plant.model: at line 6, column 9\n  |\n6 | model = \"bike\"\n  |         ^^^^^^\n\
-         unknown variant `bike`, expected one of `point_mass`, `unicycle`, `bicycle`, \
-         `bicycle_small_slip`, `bicycle_small_slip_rate`, `bicycle_kinematic`, \
-         `bicycle_kinematic_angle`, `bicycle_kinematic_slip`",
+        "my.toml: plant.model: is \"bike\", must be \"point_mass\", \"unicycle\", \"bicycle\", \"bicycle_small_slip\", \
+         \"bicycle_small_slip_rate\", \"bicycle_kinematic\", \"bicycle_kinematic_angle\" or \
+         \"bicycle_kinematic_slip\" (line 6)",
     );
 }
 

@@ -334,14 +334,14 @@ fn each_defect_is_told_with_its_field() {
     let fails = |from: &str, to: &str, field: &str, part: &str| {
         campaign(from, to).fails_like(2, &format!("c.toml: {field}: "), &[part]);
     };
-    fails("runs = 10", "", "campaign", "missing field `runs`");
+    fails("runs = 10", "", "campaign.runs", "missing, it must be given");
     fails("runs = 10", "runs = 0", "campaign.runs", "is 0, must be from 1 to 9007199254740992");
-    fails("seed = 7", "seed = -7", "campaign.seed", "invalid value: integer `-7`");
-    fails("seed = 7", "sead = 7", "campaign.sead", "unknown field `sead`");
-    fails("\"random\"", "\"halton\"", "campaign.sampling", "unknown variant `halton`");
+    fails("seed = 7", "seed = -7", "campaign.seed", "is -7, must be a whole number >= 0");
+    fails("seed = 7", "sead = 7", "campaign.sead", "is no key here (did you mean seed?)");
+    fails("\"random\"", "\"halton\"", "campaign.sampling", "is \"halton\", must be \"random\", ");
     fails("seed = 7", "step = nan", "campaign.step", "is NaN; must be finite");
     fails("seed = 7", "stop_time = -1.0", "campaign.stop_time", "is -1 s; must be after start_time = 0 s");
-    fails("\"system.toml\"", "3", "system", "integer `3`, expected the name of a system file or a table");
+    fails("\"system.toml\"", "3", "system", "is 3, must be the name of a system file or a table like one");
     let x = "vary.\"plant.x0.x_p\"";
     fails("max = 20", "max = nan", &format!("{x}.max"), "is NaN, must be finite");
     let varied = |name: &str, part: &str| {

@@ -11,8 +11,21 @@ fn help_of_the_program() {
 #[test]
 fn help_of_every_command() {
     let workshop = Workshop::new();
-    let commands =
-        ["build", "campaign", "check", "demo", "inspect", "merge", "replay", "reproduce", "run", "validate"];
+    let commands = [
+        "build",
+        "campaign",
+        "check",
+        "completions",
+        "demo",
+        "inspect",
+        "man",
+        "merge",
+        "new",
+        "replay",
+        "reproduce",
+        "run",
+        "validate",
+    ];
     for command in commands {
         assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
     }
@@ -44,4 +57,19 @@ fn a_missing_argument_is_named() {
 #[test]
 fn an_unknown_command_is_named() {
     Workshop::new().punctual(["biuld"]).fails_like(2, "unrecognized subcommand 'biuld'\n", &["'build'"]);
+}
+
+#[test]
+fn shells_and_man_know_every_command() {
+    let workshop = Workshop::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = workshop.punctual(["completions", shell]).success();
+        assert!(script.contains("campaign") && script.contains("u-ref"), "{shell}: {script}");
+    }
+    workshop.punctual(["man", "pages"]).success();
+    for page in ["punctual", "punctual-check", "punctual-run"] {
+        let text = workshop.text(&format!("pages/{page}.1"));
+        assert!(text.starts_with(".ie") && text.contains(".SH NAME"), "{page}: {text}");
+    }
+    assert!(!workshop.path("pages/punctual-trial.1").exists(), "a hidden command has a page");
 }

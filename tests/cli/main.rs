@@ -18,6 +18,7 @@ mod inspecting;
 mod judging;
 mod merging;
 mod misbehaving;
+mod mistakes;
 mod models;
 mod packing;
 mod plugins;

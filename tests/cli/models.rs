@@ -115,7 +115,8 @@ fn a_measurement_is_off_by_its_bound_at_most() {
     workshop.write("plant.toml", plant);
     workshop.punctual(["build", "plant.toml", "-o", "plant.fmu"]).success();
     let alone = "experiment = { stop_time = 8.0, step = 0.01 }\n\
-                 [[component]]\nname = \"plant\"\nfmu = \"plant.fmu\"\n";
+                 [[component]]\nname = \"plant\"\nfmu = \"plant.fmu\"\n\
+                 start = { \"u.jerk\" = 0.0 }\n";
     workshop.write("alone.toml", alone);
     workshop.punctual(["run", "alone.toml", "--out", "out"]).success();
     let table = Table::parse(&workshop.text("out/alone.csv"));
@@ -137,7 +138,8 @@ fn the_arm_keeps_its_energy() {
     workshop.write("arm-plant.toml", example("arm-plant.toml"));
     workshop.punctual(["build", "arm-plant.toml", "-o", "arm-plant.fmu"]).success();
     let alone = "experiment = { stop_time = 4.0, step = 0.01 }\n[[component]]\nname = \"plant\"\n\
-                 fmu = \"arm-plant.fmu\"\nstart = { \"x0.w_1\" = 1.0, \"x0.w_2\" = -3.0 }\n";
+                 fmu = \"arm-plant.fmu\"\nstart = { \"x0.w_1\" = 1.0, \"x0.w_2\" = -3.0, \
+                 \"u.tau_1\" = 0.0, \"u.tau_2\" = 0.0 }\n";
     workshop.write("alone.toml", alone);
     workshop.punctual(["run", "alone.toml", "--out", "out"]).success();
     let table = Table::parse(&workshop.text("out/alone.csv"));

@@ -282,7 +282,8 @@ fn an_fmu_with_another_library_is_refused() {
     workshop.write("f.toml", FILTER);
     workshop.write(
         "s.toml",
-        "experiment = { stop_time = 1.0, step = 0.1 }\n[[component]]\nname = \"f\"\nfmu = \"f.fmu\"\n",
+        "experiment = { stop_time = 1.0, step = 0.1 }\n[[component]]\nname = \"f\"\nfmu = \"f.fmu\"\n\
+         start = { \"x.x\" = 0.0, \"x.v\" = 0.0 }\n",
     );
     fixture(&workshop, &["OWN_SINE"]);
     let other = workshop.bytes(&plugin_file_name("fixture"));
@@ -369,8 +370,8 @@ fn outside_the_domain_nothing_crashes() {
     }
     workshop.write("p.toml", "kind = \"plant\"\nplant.plugin = \"fixture\"\nx0.v = 1.0\n");
     workshop.punctual(["build", "p.toml", "-o", "p.fmu"]).success();
-    let system =
-        "experiment = { stop_time = 4.0, step = 0.1 }\n[[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n";
+    let system = "experiment = { stop_time = 4.0, step = 0.1 }\n[[component]]\nname = \"p\"\nfmu = \"p.fmu\"\n\
+         start = { \"u.u\" = 0.0 }\n";
     workshop.write("s.toml", system);
     let done = workshop.punctual(["run", "s.toml", "--out", "out"]);
     let told = ["error: fmi2DoStep of p (p.fmu) at t = 1.1 s returned fmi2Error", "x.x becomes NaN"];

@@ -5,7 +5,7 @@ use crate::misbehaving::{self, description};
 use crate::table::Table;
 use crate::workshop::{Done, Workshop};
 
-const SYSTEM: &str = "[experiment]\nstop_time = 1.0\nstep = 0.1\n[[component]]\nname = \"good\"\nfmu = \"good.fmu\"\n\
+const SYSTEM: &str = "[experiment]\nstop_time = 1.0\nstep = 0.1\n[[component]]\nname = \"good\"\nfmu = \"good.fmu\"\nstart = { u = 0.0 }\n\
                       [[component]]\nname = \"bad\"\nfmu = \"bad.fmu\"\n[[connection]]\nfrom = \"good.y\"\nto = \"bad.u\"\n";
 
 /// A sound FMU that feeds one with a defect.

@@ -352,7 +352,7 @@ impl FixedTime {
             false => FixedTimeSettings::DEFAULT_KEEP_RATE,
         });
         let keeps = self.hands_over() && (h[0] >= 0.0 || deadline == f64::INFINITY);
-        let (h, margin) = (&h[..self.n], settings.margin);
+        let (h, margin) = (&h[..self.n], settings.margin.max(state.least_margin));
         let at = Anchoring { h, deadline, period, margin, default_rate, stay_rate, keeps };
         let Anchored { margin, rate, fallback, applies } = self.approach.condition().anchor(&at);
         *state = FixedTimeState {
@@ -369,6 +369,7 @@ impl FixedTime {
             pull: 0.0,
             gain: 0.0,
             margin,
+            least_margin: state.least_margin,
             period,
             fallback,
             arrival: None,

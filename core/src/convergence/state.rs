@@ -46,6 +46,9 @@ pub struct FixedTimeState {
     /// μ in the unit of h, chosen at the anchor: the settings' margin and the expected cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
+    /// What μ is at least, in the unit of h, ≥ 0, whatever the settings say: so that a plan finds room behind the constraint.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub least_margin: f64,
     /// The sampling period in s that was accounted for at the anchor, 0 for none.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: f64,

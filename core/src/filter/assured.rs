@@ -12,6 +12,7 @@ use super::{
     SafetyFilter, SampleDerivative, Status, Strictness, Workspace,
 };
 use crate::MAX_INPUTS;
+use crate::convergence::FixedTimeState;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
@@ -23,6 +24,8 @@ use crate::scalar::all_finite;
 /// more than a part of the largest h there is: a small set that is far away has no room for it.
 const MARGIN: f64 = 1e-4;
 const ROOM: f64 = 0.05;
+/// Margin of the rows behind which plans are, in units of theirs.
+const AMPLE: f64 = 2.0;
 /// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
 /// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
@@ -869,22 +872,29 @@ impl AssuredFilter {
         }
     }
 
-    /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield.
+    /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
+    /// than plans do, so that one stands behind their answer at the edge of a set too.
     fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
         let SafetyFilter { slots, state, workspace, .. } = self.rows.filter_mut();
         let Workspace { next, report, .. } = workspace;
-        let states = next.barriers.iter_mut().zip(&state.barriers);
-        for ((slot, (state, before)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
+        let states = next.barriers.iter_mut().zip(&state.barriers).zip(&self.next.promises);
+        for ((slot, ((state, before), promise)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
             let settings = slot.promise.settings();
-            let Some(deadline) = settings.deadline else { continue };
-            if factor > 1.0 && settings.infeasible == Infeasible::Soonest && slot.now.in_force && b.h < 0.0 {
-                let stack = &slot.now.derivatives.drift[..slot.degree()];
-                slot.promise.anchor(state, t, stack, factor * deadline, hold);
+            let later = factor > 1.0 && settings.infeasible == Infeasible::Soonest && b.h < 0.0;
+            state.least_margin = promise.map_or(0.0, |promise| AMPLE * promise.margin);
+            if !slot.now.in_force || !(later || state.least_margin > settings.margin) {
+                continue;
+            }
+            let FixedTimeState { deadline, arrival, on_course, gain, unmet, .. } = *state;
+            let deadline = if later { factor * slot.promise.deadline() } else { deadline };
+            slot.promise.anchor(state, t, &slot.now.derivatives.drift[..slot.degree()], deadline, hold);
+            (state.arrival, state.on_course, state.gain, state.unmet) = (arrival, on_course, gain, unmet);
+            if later {
                 // Once, whatever the rows had made of it.
                 state.postponed = before.postponed + 1;
-                b.remember(state);
                 (b.time_left, b.deadline_unreachable) = (state.deadline, false);
             }
+            b.remember(state);
         }
     }
 
@@ -938,9 +948,12 @@ impl AssuredFilter {
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
         let plan = &self.next.plan;
         let was_committed = self.commitment.standing == Standing::Assured;
-        // Gentle, and with the margin that is aimed at.
+        // Gentle, and with the margin that the rows aim at.
         let comfortable = |witness: &Witness| {
-            let margin = |at: &Tightest| self.filter().slots[at.barrier].promise.settings().margin;
+            let margin = |at: &Tightest| {
+                let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
+                self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
+            };
             witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {

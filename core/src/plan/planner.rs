@@ -405,7 +405,7 @@ impl<'a> Planner<'a> {
         let (mut x, mut u) = (x.to_vec(), vec![0.0; model.inputs()]);
         let mean = |hold: &[f64]| {
             let length = hold[1] - hold[0];
-            let parts = (length / self.period).min(ASKED).max(1.0) as u32;
+            let parts = (length / self.period).clamp(1.0, ASKED) as u32;
             let part = length / f64::from(parts);
             let mut mean = vec![0.0; u.len()];
             for k in 0..parts {

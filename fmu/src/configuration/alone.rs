@@ -32,7 +32,7 @@ impl FilterConfiguration {
     /// A start, controller or disturbance that does not fit the plant; a plant that cannot be simulated, such as one of which
     /// only the inputs are known.
     pub fn alone(&self) -> Result<(PlantConfiguration, Option<ControllerConfiguration>), ConfigurationError> {
-        let RunSection { x0, u_ref, simulated, integration, disturbance } = self.run.clone();
+        let RunSection { x0, u_ref, simulated, integration, disturbance } = (*self.run).clone();
         let plant = simulated.map_or_else(|| self.outside(), Ok)?;
         let controller = u_ref.map(|u_ref| {
             let controller = ControllerConfiguration {

@@ -16,7 +16,7 @@ use super::key::{
     Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, TextByName, Word},
 };
 use super::model::RawModel;
-use super::names::{Named, check_identifier, is_reserved, taken};
+use super::names::{Named, check_identifier, check_known, is_reserved, taken};
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
@@ -143,7 +143,7 @@ pub struct FilterConfiguration {
     pub experiment: ExperimentSection,
     /// What a run of this file alone has besides. It is no part of the FMU.
     #[serde(skip)]
-    pub run: RunSection,
+    pub run: Box<RunSection>,
 }
 
 fn is_zero(value: &f64) -> bool {
@@ -341,7 +341,7 @@ impl FilterConfiguration {
             bounds: raw.bounds,
             measurement_errors: raw.measurement_errors,
             experiment: raw.experiment,
-            run: RunSection {
+            run: Box::new(RunSection {
                 x0: raw.x0,
                 u_ref: raw.u_ref,
                 simulated: raw
@@ -351,17 +351,12 @@ impl FilterConfiguration {
                     .map_err(|e| within("simulated", &e))?,
                 integration: raw.integration,
                 disturbance: raw.disturbance,
-            },
+            }),
         };
         configuration.check_sampling()?;
         configuration.complete_bounds()?;
         let states = configuration.measured_states();
-        let errors = &configuration.measurement_errors;
-        if let Some(unknown) = errors.keys().find(|k| states.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
-            let message = format!("unknown measured state, must be one of {}", names.join(", "));
-            return Err(ConfigurationError::new(format!("measurement_errors.{unknown}"), message));
-        }
+        check_known("measurement_errors", &configuration.measurement_errors, "measured state", &states)?;
         // Check every number by itself.
         configuration.experiment.check()?;
         for parameter in configuration.parameters() {
@@ -378,7 +373,7 @@ impl FilterConfiguration {
         configuration.unassured = configuration.why_unassured();
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
-        if configuration.run != RunSection::default() {
+        if *configuration.run != RunSection::default() {
             configuration.alone()?;
         }
         Ok(configuration)
@@ -387,11 +382,7 @@ impl FilterConfiguration {
     /// States the bounds of every input.
     fn complete_bounds(&mut self) -> Result<(), ConfigurationError> {
         let inputs = self.plant.inputs();
-        if let Some(unknown) = self.bounds.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = inputs.iter().map(|s| s.name.as_str()).collect();
-            let message = format!("unknown input, must be one of {}", names.join(", "));
-            return Err(ConfigurationError::new(format!("bounds.{unknown}"), message));
-        }
+        check_known("bounds", &self.bounds, "input", &inputs)?;
         for input in inputs {
             let own = [input.min.unwrap_or(-UNBOUNDED), input.max.unwrap_or(UNBOUNDED)];
             let [min, max] = self.bounds.entry(input.name).or_insert(own);

@@ -9,7 +9,9 @@ mod alone;
 mod barrier;
 mod controller;
 mod external;
+mod file_kind;
 mod filter;
+mod found;
 mod integrator;
 mod key;
 mod model;
@@ -28,6 +30,7 @@ pub use barrier::{
 };
 pub use controller::{Controller, ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
+pub use file_kind::FileKind;
 pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
 pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
@@ -91,17 +94,11 @@ impl Configuration {
         #[derive(Deserialize)]
         struct Head {
             kind: Option<Kind>,
-            component: Option<serde::de::IgnoredAny>,
         }
-        let head = read_toml::<Head>(text)?;
-        let Some(kind) = head.kind else {
-            let message = match head.component {
-                Some(_) => {
-                    "missing: this is a system file, which `punctual run` takes, and `punctual build` with an output that ends in .ssp"
-                }
-                None => "missing, must be \"filter\", \"plant\" or \"controller\"",
-            };
-            return Err(ConfigurationError::new("kind", message));
+        let Some(kind) = read_toml::<Head>(text)?.kind else {
+            return Err(FileKind::One.instead(text).unwrap_or_else(|| {
+                ConfigurationError::new("kind", "missing, must be \"filter\", \"plant\" or \"controller\"")
+            }));
         };
         Ok(match kind {
             Kind::Filter => Self::Filter(FilterConfiguration::parse(read_toml(text)?, loader)?),

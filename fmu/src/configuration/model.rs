@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
 use punctual_core::scalar::Scalar;
-use punctual_models::{Functions, Model};
+use punctual_models::{Functions, Model, Unit, unit_of};
 use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
@@ -14,10 +14,11 @@ use super::key::{
     Unit::Of,
     Value::{Name, Number, Tables, Text, TextByName, TextOrByName, Word},
 };
-use super::names::{Named, check_identifier, is_reserved, taken};
+use super::names::{Named, check_identifier, check_known, is_reserved, taken};
 use super::plugin::{PluginDigest, PluginLoader, PluginSection};
 use super::reference::{self, RawReference};
-use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit};
+use super::unit::measured;
+use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit, over_seconds};
 
 /// A state or input of a model: an entry of `plant.states` or `plant.inputs`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -87,21 +88,17 @@ impl From<&Signal> for VariableSection {
 
 /// `[plant]` of a filter or plant as it stands in a file: the keys of every kind of plant.
 #[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "struct PlantSection")]
+#[serde(deny_unknown_fields)]
 pub(super) struct RawModel {
     pub(super) model: Option<ModelName>,
     pub(super) plugin: Option<String>,
     pub(super) plugin_digest: Option<PluginDigest>,
     l_r: Option<f64>,
     l_f: Option<f64>,
-    #[serde(default)]
-    pub(super) states: Vec<VariableSection>,
-    #[serde(default)]
-    pub(super) inputs: Vec<VariableSection>,
-    #[serde(default)]
-    pub(super) parameters: Vec<ParameterSection>,
-    #[serde(default)]
-    pub(super) derivatives: BTreeMap<String, String>,
+    pub(super) states: Option<Vec<VariableSection>>,
+    pub(super) inputs: Option<Vec<VariableSection>>,
+    pub(super) parameters: Option<Vec<ParameterSection>>,
+    pub(super) derivatives: Option<BTreeMap<String, String>>,
 }
 
 /// `[plant]` of a filter or plant.
@@ -182,7 +179,7 @@ pub(super) static PLANT: Section = Section {
 };
 
 const NAME: Key = Key::new("name", Name, None, "unique");
-const UNIT: Key = Key::new("unit", Text, Some("`1`"), "such as `m/s2` or `kg.m2/s`");
+const UNIT: Key = Key::new("unit", Text, Some("`1`"), "such as `m/s2`, `kg.m2/s` or `km/h`");
 const DESCRIPTION: Key = Key::new("description", Text, Some("none"), "for a human");
 
 /// An entry of `states` or `inputs`.
@@ -235,10 +232,10 @@ impl PlantSection {
         // The kind of plant decides which keys belong to it.
         let given = [
             ("plugin", raw.plugin.is_some()),
-            ("states", !raw.states.is_empty()),
-            ("inputs", !raw.inputs.is_empty()),
-            ("parameters", !raw.parameters.is_empty()),
-            ("derivatives", !raw.derivatives.is_empty()),
+            ("states", raw.states.is_some()),
+            ("inputs", raw.inputs.is_some()),
+            ("parameters", raw.parameters.is_some()),
+            ("derivatives", raw.derivatives.is_some()),
         ];
         if raw.plugin_digest.is_some() && raw.plugin.is_none() {
             return refuse("plugin_digest", "given without `plugin`".into());
@@ -269,29 +266,68 @@ impl PlantSection {
         }
         // Expressions, or inputs alone: check the names and ranges.
         let RawModel { states, inputs, parameters, derivatives, .. } = raw;
+        let is_external = states.is_none() && parameters.is_none() && derivatives.is_none();
+        let (states, inputs) = (states.unwrap_or_default(), inputs.unwrap_or_default());
+        let (parameters, derivatives) = (parameters.unwrap_or_default(), derivatives.unwrap_or_default());
         for (group, variables) in [("states", &states), ("inputs", &inputs)] {
             for (i, variable) in variables.iter().enumerate() {
                 let path = format!("plant.{group}[{i}]");
                 check_variable(&path, &variable.name, &variable.unit, variable.range())?;
             }
         }
-        if states.is_empty() && parameters.is_empty() && derivatives.is_empty() {
+        if is_external {
             check_external_inputs(&inputs)?;
             return Ok(Self::External { inputs });
         }
         // Every state has one expression, and every expression can be used.
         check_parameters(&parameters)?;
-        if let Some(unknown) = derivatives.keys().find(|k| states.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
-            let message = format!("unknown state, must be one of {}", names.join(", "));
-            return refuse(&format!("derivatives.{unknown}"), message);
-        }
+        check_known("plant.derivatives", &derivatives, "state", &states)?;
         if let Some(state) = states.iter().find(|s| !derivatives.contains_key(&s.name)) {
             return refuse(&format!("derivatives.{}", state.name), "missing, every state needs one".into());
         }
         let plant = Self::Expressions(ExpressionSection { states, inputs, parameters, derivatives });
         plant.expressions()?;
+        plant.check_units()?;
         Ok(plant)
+    }
+
+    /// Refuses derivatives whose units certainly are not those of their states per second.
+    fn check_units(&self) -> Result<(), ConfigurationError> {
+        for (state, text) in self.states().iter().zip(self.derivatives()) {
+            let name = &state.name;
+            let refuse =
+                |message: String| ConfigurationError::new(format!("plant.derivatives.{name}"), message);
+            let wanted = measured(&state.unit).and_then(|_| measured(&over_seconds(&state.unit, 1)));
+            let (Some(found), Some(wanted)) = (self.unit_of(text).map_err(refuse)?, wanted) else { continue };
+            if found.is(&wanted) {
+                continue;
+            }
+            let why = if found.is_like(&wanted) {
+                let factor = found.per(&wanted);
+                format!("; numbers are taken as they are, so that this is wrong by the factor {factor:.6}")
+            } else {
+                String::new()
+            };
+            let unit = &state.unit;
+            return Err(refuse(format!(
+                "is {text:?}, which is in {found}; the derivative of {name}, which is in {unit}, must be in {wanted}{why}"
+            )));
+        }
+        Ok(())
+    }
+
+    /// The unit of an expression of states, inputs, constants and time, where it is known.
+    ///
+    /// # Errors
+    ///
+    /// Units that certainly do not fit together, in words.
+    pub(super) fn unit_of(&self, text: &str) -> Result<Option<Unit>, String> {
+        let constants = self.reference().into_iter().flat_map(ReferenceSection::constants);
+        let constants = constants.map(|(name, _)| (name.to_owned(), reference::LENGTH_UNIT.to_owned()));
+        let variables = self.states().into_iter().chain(self.inputs()).map(|v| (v.name, v.unit));
+        let own = self.own_parameters().iter().map(|p| (p.name.clone(), p.unit.clone()));
+        let units: BTreeMap<_, _> = variables.chain(constants).chain(own).collect();
+        unit_of(text, &|name| units.get(name).and_then(|unit| measured(unit)))
     }
 
     /// The reference plant, if it is one.
@@ -427,10 +463,7 @@ impl PlantSection {
         let inputs = self.inputs();
         let refuse =
             |input: &str, message: String| Err(ConfigurationError::new(format!("{field}.{input}"), message));
-        if let Some(unknown) = given.keys().find(|k| inputs.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = inputs.iter().map(|s| s.name.as_str()).collect();
-            return refuse(unknown, format!("unknown input, must be one of {}", names.join(", ")));
-        }
+        check_known(field, given, "input", &inputs)?;
         let mut expressions = Vec::with_capacity(inputs.len());
         for VariableSection { name, .. } in &inputs {
             let Some(text) = given.get(name) else {

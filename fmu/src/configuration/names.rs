@@ -1,8 +1,11 @@
 //! Names that a configuration gives: their form, and those that are taken.
 
-use punctual_modeldescription::is_c_identifier;
+use std::collections::BTreeMap;
 
-use super::ConfigurationError;
+use punctual_modeldescription::is_c_identifier;
+use punctual_models::nearest;
+
+use super::{ConfigurationError, VariableSection};
 
 /// Longest name that can stand in variable names and file names.
 const LONGEST: usize = 64;
@@ -51,6 +54,20 @@ const RESERVED: [(&str, &[Named]); 13] = {
 /// Whether the FMU has a variable that forbids to call `who` by `name`.
 pub(super) fn is_reserved(name: &str, who: Named) -> bool {
     RESERVED.iter().any(|(reserved, whose)| *reserved == name && whose.contains(&who))
+}
+
+/// Refuses the first of the `given` keys of `table` that names no `what` among the `known` variables.
+pub(super) fn check_known<T>(
+    table: &str,
+    given: &BTreeMap<String, T>,
+    what: &str,
+    known: &[VariableSection],
+) -> Result<(), ConfigurationError> {
+    let names: Vec<_> = known.iter().map(|variable| variable.name.as_str()).collect();
+    let Some(unknown) = given.keys().find(|key| !names.contains(&key.as_str())) else { return Ok(()) };
+    let near = nearest(unknown, &names);
+    let message = format!("unknown {what}{near}, must be one of {}", names.join(", "));
+    Err(ConfigurationError::new(format!("{table}.{unknown}"), message))
 }
 
 /// The refusal of a name that is already taken, by the path of its field.

@@ -11,7 +11,7 @@ use super::key::{
     Value::{Name, Number, NumberByName, Table, Word},
 };
 use super::model::RawModel;
-use super::names::check_identifier;
+use super::names::{check_identifier, check_known};
 use super::{
     ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
     Range, model,
@@ -141,11 +141,7 @@ impl DisturbanceSection {
             ("inputs", &self.inputs, plant.inputs(), "input"),
             ("measurements", &self.measurements, plant.states(), "state"),
         ] {
-            if let Some(unknown) = given.keys().find(|k| known.iter().all(|s| s.name != **k)) {
-                let names: Vec<_> = known.iter().map(|s| s.name.as_str()).collect();
-                let message = format!("unknown {what}, must be one of {}", names.join(", "));
-                return Err(ConfigurationError::new(format!("disturbance.{field}.{unknown}"), message));
-            }
+            check_known(&format!("disturbance.{field}"), given, what, &known)?;
         }
         Ok(())
     }
@@ -210,11 +206,7 @@ impl PlantConfiguration {
     pub(super) fn completed(mut self) -> Result<Self, ConfigurationError> {
         let Self { plant, disturbance, x0, experiment, .. } = &mut self;
         let states = plant.states();
-        if let Some(unknown) = x0.keys().find(|k| states.iter().all(|s| s.name != **k)) {
-            let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
-            let message = format!("unknown state, must be one of {}", names.join(", "));
-            return Err(ConfigurationError::new(format!("x0.{unknown}"), message));
-        }
+        check_known("x0", x0, "state", &states)?;
         if let Some(disturbance) = disturbance {
             disturbance.check(plant)?;
         }

@@ -155,7 +155,7 @@ impl PluginSection {
         loader: &dyn PluginLoader,
     ) -> Result<Self, ConfigurationError> {
         let refuse = |message: String| Err(ConfigurationError::new("plant.plugin", message));
-        if !raw.derivatives.is_empty() {
+        if raw.derivatives.is_some() {
             let message = "given beside `plugin`, which has its own";
             return Err(ConfigurationError::new("plant.derivatives", message));
         }
@@ -171,7 +171,7 @@ impl PluginSection {
             plugin_digest,
             states: merged("states", raw.states, &plugin.states)?,
             inputs: merged("inputs", raw.inputs, &plugin.inputs)?,
-            parameters: merged_parameters(&raw.parameters, &plugin.parameters)?,
+            parameters: merged_parameters(&raw.parameters.unwrap_or_default(), &plugin.parameters)?,
             loaded: Loaded(Arc::new(plugin)),
         };
         check_parameters(&section.parameters)?;
@@ -220,18 +220,17 @@ fn fill<T: PartialEq>(own: &mut T, unsaid: &T, theirs: T) {
     }
 }
 
-/// What `own`, which is empty or has the names of `theirs` in their order, says, and else `theirs`.
+/// What `own`, which has the names of `theirs` in their order, says, and else `theirs`.
 fn merged(
     group: &str,
-    mut own: Vec<VariableSection>,
+    own: Option<Vec<VariableSection>>,
     theirs: &[VariableSection],
 ) -> Result<Vec<VariableSection>, ConfigurationError> {
-    if own.is_empty() {
-        return Ok(theirs.to_vec());
-    }
+    let Some(mut own) = own else { return Ok(theirs.to_vec()) };
     let names = |list: &[VariableSection]| list.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
     if own.len() != theirs.len() || own.iter().zip(theirs).any(|(a, b)| a.name != b.name) {
-        let message = format!("are {}, but those of the plug-in are {}", names(&own), names(theirs));
+        let own = if own.is_empty() { "none".to_owned() } else { names(&own) };
+        let message = format!("are {own}, but those of the plug-in are {}", names(theirs));
         return Err(ConfigurationError::new(format!("plant.{group}"), message));
     }
     for (i, (own, theirs)) in own.iter_mut().zip(theirs).enumerate() {

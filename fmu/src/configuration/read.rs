@@ -4,6 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use toml::de::DeTable;
+
+use super::found;
 
 /// Most characters of a line of an error, far more than any allowed name or number needs.
 const LONGEST_LINE: usize = 600;
@@ -59,17 +62,33 @@ fn shortened(text: &str) -> String {
 /// # Errors
 ///
 /// Text that is not TOML (with line and column), an unknown or missing key, a value of the wrong
-/// type: each with the path of the field.
+/// type, a list with too many entries: each with the path of the field and the line.
 pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, ConfigurationError> {
-    let de = toml::Deserializer::parse(text)
-        .map_err(|e| ConfigurationError::new("", e.to_string().trim_end().to_owned()))?;
-    serde_path_to_error::deserialize(de).map_err(|e| {
-        let path = e.path().to_string();
-        let path = if path == "." { String::new() } else { path };
-        // The file is TOML as such; the message goes on with the defect at that place.
-        let text = e.inner().to_string().replacen("TOML parse error at ", "at ", 1);
-        ConfigurationError::new(path, text.trim_end())
+    let table = DeTable::parse(text).map_err(|e| {
+        let hint = e.span().map_or("", |place| hint(text, place.start));
+        ConfigurationError::new("", format!("{}{hint}", e.to_string().trim_end()))
+    })?;
+    found::read(table.get_ref()).map_err(|refusal| {
+        let line = refusal.place.map_or_else(String::new, |place| {
+            let before = text.get(..place.start).unwrap_or_default();
+            format!(" (line {})", before.matches('\n').count() + 1)
+        });
+        ConfigurationError::new(refusal.path, refusal.message + &line)
     })
+}
+
+/// What to write instead, where the text cannot be read from the byte `at` on.
+fn hint(text: &str, at: usize) -> &'static str {
+    let (before, rest) = text.split_at_checked(at).unwrap_or_default();
+    if rest.starts_with("True") || rest.starts_with("False") {
+        "; TOML writes true and false in small letters"
+    } else if rest.starts_with(',') && before.ends_with(|c: char| c.is_ascii_digit()) {
+        "; a decimal point is ."
+    } else if before.is_empty() && rest.starts_with('{') {
+        "; this looks like JSON, must be TOML"
+    } else {
+        ""
+    }
 }
 
 /// A value as TOML text.

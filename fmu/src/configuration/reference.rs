@@ -96,7 +96,9 @@ pub(super) const L_F: Key = Key::new(
     Some("10"),
     "`bicycle_kinematic`, `bicycle_kinematic_angle`: from the centre of mass to the front axle",
 );
-const LENGTH_VALUE: Value = Value::Number(Unit::Is("m"), Range::POSITIVE);
+const LENGTH_VALUE: Value = Value::Number(Unit::Is(LENGTH_UNIT), Range::POSITIVE);
+/// The unit of the constants.
+pub(super) const LENGTH_UNIT: &str = "m";
 
 /// What a reference plant has of `[plant]` in a file.
 pub(super) struct RawReference {
@@ -169,7 +171,7 @@ impl ReferenceSection {
     ) -> Vec<Parameter<C>> {
         let row = |field: &str, what: &str, access: fn(&mut Self) -> &mut f64| {
             let names = (field.to_owned(), format!("plant.{field}"));
-            Parameter::new(names, "m", Range::POSITIVE, what, move |c: &mut C| section(c).map(access))
+            Parameter::new(names, LENGTH_UNIT, Range::POSITIVE, what, move |c: &mut C| section(c).map(access))
         };
         let mut rows = Vec::new();
         if self.model.has_l_r() {

@@ -86,7 +86,7 @@ defects! {
     measurement_error_of_no_state: FILTER, "bounds =" => "measurement_errors = { w = 0.1 }\nbounds =",
         "measurement_errors.w: unknown measured state, must be one of x_p, y_p, theta, v";
     measurement_error_of_an_integrated_state: STEERED, "bounds =" => "measurement_errors = { beta = 0.1 }\nbounds =",
-        "measurement_errors.beta: unknown measured state, must be one of x_p, y_p, theta, v";
+        "measurement_errors.beta: unknown measured state (did you mean theta?), must be one of x_p, y_p, theta, v";
     measurement_error_of_a_pointwise_row: FILTER,
         "bounds =" => "sampling = \"pointwise\"\nmeasurement_errors = { v = 0.1 }\nbounds =",
         "measurement_errors: needs the prediction over the period, the sampling is pointwise";
@@ -254,30 +254,245 @@ fn no_barrier() {
     assert_eq!(error, "barrier: is empty, must have at least 1");
 }
 
-/// Messages that serde or TOML words must name the field and the culprit.
+/// Unknown and missing keys, unknown words and lists of another length, each with its whole message.
 #[test]
 fn unknown_and_missing_keys_and_wrong_types() {
     for (valid, from, to, wanted) in [
-        (FILTER, "radius = 2.0", "radius = 2.0\nradus = 1.0", ["barrier[0]", "unknown field `radus`"]),
-        (FILTER, "[[barrier]]", "[experiment]\nstep = 1.0\n[[barrier]]", ["experiment", "`step_size`"]),
-        (FILTER, "kind = \"filter\"", "kind = \"filter\"\nkey = 1", ["unknown field `key`", "`bounds`"]),
-        (FILTER, "radius = 2.0", "", ["barrier[0].radius", "missing, disc needs it"]),
-        (FILTER, "radius = 2.0", "radius = \"2\"", ["barrier[0].radius", "expected f64"]),
-        (FILTER, "[45.0, 44.0]", "[45.0]", ["barrier[0].centre", "length 2"]),
-        (FILTER, "\"unicycle\"", "\"bike\"", ["plant.model", "`bicycle`"]),
-        (FILTER, "radius = 2.0", "radius = 2.0\nshape = \"box\"", ["barrier[0].shape", "`quadratic_disc`"]),
-        (FILTER, "radius = 2.0", "radius = 2.0\nmethod = \"x\"", ["barrier[0].method", "`repeated_root`"]),
-        (FILTER, "\"filter\"", "\"filters\"", ["kind", "`plant`"]),
-        (FILTER, "radius = 2.0", "radius = = 2.0", ["line 8", "radius"]),
-        (PLANT, "inner_step", "inner", ["integration", "`inner_step`"]),
-        (HEADING, "\"heading\"", "\"pursuit\"", ["controller", "`waypoints`"]),
-        (HEADING, "[4.0, 3.0]", "[4.0]", ["goal", "length 2"]),
-        (WAYPOINTS, "points = [[4", "pionts = [[4", ["pionts", "unknown field"]),
-        (PLANT, "kind", "knd", ["kind: missing, must be \"filter\", \"plant\" or \"controller\"", ""]),
+        (
+            FILTER,
+            "radius = 2.0",
+            "radius = 2.0\nradus = 1.0",
+            "barrier[0].radus: is no key here (did you mean radius?) (line 9)",
+        ),
+        (
+            FILTER,
+            "[[barrier]]",
+            "[experiment]\nstep = 1.0\n[[barrier]]",
+            "experiment.step: is no key here (did you mean step_size?) (line 6)",
+        ),
+        (
+            FILTER,
+            "[[barrier]]",
+            "[experiment]\nwhen = 1.0\n[[barrier]]",
+            "experiment.when: is no key here; the keys are start_time, stop_time, step_size (line 6)",
+        ),
+        (FILTER, "radius = 2.0", "", "barrier[0].radius: missing, disc needs it"),
+        (FILTER, "name = \"goal\"", "", "barrier[0].name: missing, it must be given (line 5)"),
+        (FILTER, "plant = { model = \"unicycle\" }", "", "plant: missing, it must be given"),
+        (FILTER, "radius = 2.0", "radius = \"2\"", "barrier[0].radius: is \"2\", must be a number (line 8)"),
+        (FILTER, "[45.0, 44.0]", "[45.0]", "barrier[0].centre: has 1 entry, must have 2 (line 7)"),
+        (
+            FILTER,
+            "[45.0, 44.0]",
+            "[45.0, 44.0, 7.0]",
+            "barrier[0].centre: has 3 entries, must have 2 (line 7)",
+        ),
+        (
+            FILTER,
+            "[45.0, 44.0]",
+            "[45.0, \"44\"]",
+            "barrier[0].centre[2]: is \"44\", must be a number (line 7)",
+        ),
+        (
+            FILTER,
+            "[45.0, 44.0]",
+            "45.0",
+            "barrier[0].centre: is 45.0, must be a list with 2 entries (line 7)",
+        ),
+        (FILTER, "[-9.0, 8.0]", "[-9.0, 8.0, 7.0]", "bounds.a: has 3 entries, must have 2 (line 4)"),
+        (FILTER, "[-9.0, 8.0]", "8.0", "bounds.a: is 8.0, must be a list with 2 entries (line 4)"),
+        (
+            FILTER,
+            "deadline = 10.0",
+            "deadline = 1e999",
+            "barrier[0].deadline: is 1e999, must be at most 1.7976931348623157e308 in size (line 9)",
+        ),
+        (
+            FILTER,
+            "deadline = 10.0",
+            "deadline = 99999999999999999999",
+            "barrier[0].deadline: is 99999999999999999999, which is too large for a whole number; write it with a decimal point \
+             (line 9)",
+        ),
+        (
+            FILTER,
+            "deadline = 10.0",
+            "deadline = 10.0\npriority = -1",
+            "barrier[0].priority: is -1, must be a whole number >= 0 (line 10)",
+        ),
+        (
+            FILTER,
+            "deadline = 10.0",
+            "deadline = 10.0\npriority = 1.5",
+            "barrier[0].priority: is 1.5, must be a whole number >= 0 (line 10)",
+        ),
+        (
+            FILTER,
+            "deadline = 10.0",
+            "deadline = 2026-01-31",
+            "barrier[0].deadline: is a date or time, must be a number (line 9)",
+        ),
+        (
+            FILTER,
+            "\"unicycle\"",
+            "\"unicicle\"",
+            "plant.model: is \"unicicle\", must be \"point_mass\", \"unicycle\", \"bicycle\", \"bicycle_small_slip\", \
+             \"bicycle_small_slip_rate\", \"bicycle_kinematic\", \"bicycle_kinematic_angle\" or \
+             \"bicycle_kinematic_slip\" (did you mean unicycle?) (line 3)",
+        ),
+        (
+            FILTER,
+            "radius = 2.0",
+            "radius = 2.0\nmethod = \"x\"",
+            "barrier[0].method: is \"x\", must be \"reference_profile\" or \"repeated_root\" (line 9)",
+        ),
+        (
+            FILTER,
+            "\"filter\"",
+            "\"Filter\"",
+            "kind: is \"Filter\", must be \"filter\", \"plant\" or \"controller\" (did you mean filter?) (line 2)",
+        ),
+        (
+            FILTER,
+            "[[barrier]]",
+            "[barrier]",
+            "barrier: is a table, must be a list; a list of tables is written [[barrier]] (line 5)",
+        ),
+        (
+            PLANT,
+            "[integration]",
+            "[[integration]]",
+            "integration: is a list, must be a table; one table is written [integration] (line 5)",
+        ),
+        (
+            PLANT,
+            "inner_step = 0.01",
+            "inner_stpe = 0.01",
+            "integration.inner_stpe: is no key here (did you mean inner_step?) (line 6)",
+        ),
+        (
+            HEADING,
+            "\"heading\"",
+            "\"headng\"",
+            "controller: is \"headng\", must be \"damping\", \"heading\", \"waypoints\" or \"expressions\" (did you mean heading?) (line 3)",
+        ),
+        (HEADING, "[4.0, 3.0]", "[4.0]", "goal: has 1 entry, must have 2 (line 4)"),
+        (
+            WAYPOINTS,
+            "points = [[4.0, 3.0]",
+            "points = [[4.0, 3.0, 1.0]",
+            "points[0]: has 3 entries, must have 2 (line 4)",
+        ),
+        (WAYPOINTS, "points = [[4", "pionts = [[4", "pionts: is no key here (did you mean points?) (line 4)"),
+        (PLANT, "kind", "knd", "kind: missing, must be \"filter\", \"plant\" or \"controller\""),
     ] {
-        let message = refusal(valid, from, to);
-        assert!(wanted.iter().all(|w| message.contains(w)), "{to:?} gives {message:?}, wanted {wanted:?}");
+        assert_eq!(refusal(valid, from, to), wanted, "{to:?}");
     }
+    let message = refusal(FILTER, "radius = 2.0", "radius = = 2.0");
+    assert!(["line 8", "radius"].iter().all(|part| message.contains(part)), "{message:?}");
+}
+
+/// Words of Rust and of its libraries, which mean nothing to the writer of a file.
+const FOREIGN_WORDS: [&str; 26] = [
+    "array",
+    "bool",
+    "char",
+    "deserialize",
+    "enum",
+    "expected",
+    "f32",
+    "f64",
+    "field",
+    "float",
+    "floating",
+    "i64",
+    "integer",
+    "invalid",
+    "map",
+    "None",
+    "sequence",
+    "serde",
+    "Some",
+    "str",
+    "string",
+    "struct",
+    "u32",
+    "u64",
+    "usize",
+    "variant",
+];
+
+/// A value of the wrong type for each key of each table is refused by its path, in plain words.
+#[test]
+fn every_key_refuses_other_types_in_plain_words() {
+    let model = "kind = \"plant\"\n[plant]\nstates = [{ name = \"x\" }]\ninputs = [{ name = \"u\" }]\n\
+                 parameters = [{ name = \"p\", start = 1.0 }]\nderivatives = { x = \"p*u\" }\n";
+    let full = format!("{PLANT}[disturbance]\n[experiment]\n");
+    let values: toml::Table = "text = \"a b\"\nnumber = 2.5\nwhole = -3\nflag = true\nempty = []\ntexts = [\"a b\"]\n\
+                               numbers = [1.5, 2.5]\npairs = [[1.5, 2.5]]\ntables = [{ zz = 1 }]\ntable = { zz = [\"a\"] }\ndate = 2026-01-31\n"
+        .parse()
+        .unwrap();
+    let mut refused = 0;
+    for (text, place, table) in [
+        (FILTER, "filter", &[][..]),
+        (FILTER, "barrier", &["barrier"]),
+        (PLANT, "model", &["plant"]),
+        (model, "variable", &["plant", "states"]),
+        (model, "variable", &["plant", "inputs"]),
+        (model, "parameter", &["plant", "parameters"]),
+        (STEERED, "integrator", &["integrator"]),
+        (PLANT, "plant", &[]),
+        (PLANT, "integration", &["integration"]),
+        (&full, "disturbance", &["disturbance"]),
+        (HEADING, "controller", &[]),
+        (&full, "experiment", &["experiment"]),
+    ] {
+        Configuration::parse(text).unwrap_or_else(|e| panic!("{e} in {text}"));
+        let section = SECTIONS.iter().find(|section| section.name == place).expect("its section");
+        for key in (section.keys)() {
+            for (kind, value) in &values {
+                let fits = match key.value {
+                    Value::Number(..) => &["number", "whole"][..],
+                    Value::Count(..) => &["whole"],
+                    Value::Pair(..) => &["numbers"],
+                    Value::Numbers(..) => &["numbers", "empty"],
+                    Value::Pairs(..) => &["pairs", "empty"],
+                    Value::Flag => &["flag"],
+                    Value::Text | Value::Name | Value::Word(_) => &["text"],
+                    Value::TextOrByName => &["text", "table"],
+                    Value::NumberByName(..) | Value::PairByName(_) | Value::TextByName | Value::Table(_) => {
+                        &["table"]
+                    }
+                    Value::Tables(_) => &["tables", "empty"],
+                };
+                // What has the right type is the business of the checks of values.
+                if fits.contains(&kind.as_str()) {
+                    continue;
+                }
+                let mut file: toml::Table = text.parse().unwrap();
+                let mut at = &mut file;
+                for step in table {
+                    at = match &mut at[*step] {
+                        toml::Value::Array(list) => list[0].as_table_mut().expect("a table"),
+                        value => value.as_table_mut().expect("a table"),
+                    };
+                }
+                at.insert(key.name.to_owned(), value.clone());
+                let text = file.to_string();
+                let Err(error) = Configuration::parse(&text) else {
+                    panic!("{place}.{} takes {value}", key.name)
+                };
+                let (field, message) = (error.field(), error.message());
+                assert!(field.contains(key.name), "{place}.{}: {error}", key.name);
+                assert!(["must", "has", "no key"].iter().any(|word| message.contains(word)), "{error}");
+                let foreign =
+                    message.split(|c: char| !c.is_alphanumeric()).find(|word| FOREIGN_WORDS.contains(word));
+                assert_eq!(foreign, None, "{place}.{}: {error}", key.name);
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 500, "{refused}");
 }
 
 /// A controller of expressions.
@@ -518,7 +733,7 @@ const SHAPE_VALUES: [(&str, &str); 14] = [
     ("normal", "[1.0, 0.0]"),
     ("state", "\"v\""),
     ("bound", "1.0"),
-    ("expression", "\"v\""),
+    ("expression", "\"x_p\""),
     ("relative_degree", "1"),
     ("smoothing", "0.5"),
     ("velocity", "[1.0, 0.0]"),
@@ -594,14 +809,14 @@ fn the_numbers_of_shapes_are_parameters() {
 #[test]
 fn the_words_of_the_tables_are_those_of_the_parser() {
     let words =
-        |text: &str| -> BTreeSet<String> { text.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+        |text: &str| -> BTreeSet<String> { text.split('"').skip(1).step_by(2).map(str::to_owned).collect() };
     let mut compared = 0;
     let section = SECTIONS.iter().find(|section| section.name == "barrier").expect("its section");
     for key in (section.keys)() {
         let Value::Word(listed) = key.value else { continue };
         let text = FILTER.replace("radius = 2.0", &format!("radius = 2.0\n{} = \"none of them\"", key.name));
         let error = Configuration::parse(&text).unwrap_err().to_string();
-        let (_, expected) = error.split_once("expected ").unwrap_or_else(|| panic!("{}: {error}", key.name));
+        let (_, expected) = error.split_once("must be ").unwrap_or_else(|| panic!("{}: {error}", key.name));
         assert_eq!(
             words(expected),
             listed.iter().map(|w| (*w).to_owned()).collect(),

@@ -1,6 +1,7 @@
 //! Units by name: products of powers of base units, as `m/s2` or `kg.m2/s`.
 
 use punctual_modeldescription::BaseUnit;
+use punctual_models::Unit;
 
 use super::ConfigurationError;
 
@@ -19,7 +20,8 @@ pub fn base_unit(name: &str) -> Option<BaseUnit> {
                 "" => 1,
                 digits => digits.parse().ok().filter(|n| (1..=LARGEST).contains(n))?,
             };
-            let mut times = |exponents: [i32; 8]| {
+            let mut times = |(_, exponents, factor): &(&str, [i32; 8], f64)| {
+                base.factor *= factor.powi(sign * exponent);
                 let own = [
                     &mut base.kg,
                     &mut base.m,
@@ -36,11 +38,18 @@ pub fn base_unit(name: &str) -> Option<BaseUnit> {
             };
             match symbol {
                 "" if factor == "1" => {}
-                _ => times(SYMBOLS.iter().find(|s| s.0 == symbol)?.1),
+                _ => times(SYMBOLS.iter().find(|s| s.0 == symbol)?),
             }
         }
     }
     Some(base)
+}
+
+/// What the unit of a variable measures; `None` for `1`, which may be no more than unsaid.
+pub(super) fn measured(name: &str) -> Option<Unit> {
+    let base = base_unit(name).filter(|_| name != "1")?;
+    let exponents = [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd];
+    Some(Unit::new(name, exponents, base.factor))
 }
 
 /// The unit of a derivative of order `degree` ≥ 1: `m` over s², `m/s` over s.
@@ -100,23 +109,30 @@ pub fn quantity(unit: &str) -> Option<String> {
     Some(name.to_owned())
 }
 
-/// Symbols with their exponents of kg, m, s, A, K, mol, cd and rad.
-const SYMBOLS: [(&str, [i32; 8]); 15] = [
-    ("kg", [1, 0, 0, 0, 0, 0, 0, 0]),
-    ("m", [0, 1, 0, 0, 0, 0, 0, 0]),
-    ("s", [0, 0, 1, 0, 0, 0, 0, 0]),
-    ("A", [0, 0, 0, 1, 0, 0, 0, 0]),
-    ("K", [0, 0, 0, 0, 1, 0, 0, 0]),
-    ("mol", [0, 0, 0, 0, 0, 1, 0, 0]),
-    ("cd", [0, 0, 0, 0, 0, 0, 1, 0]),
-    ("rad", [0, 0, 0, 0, 0, 0, 0, 1]),
-    ("Hz", [0, 0, -1, 0, 0, 0, 0, 0]),
-    ("N", [1, 1, -2, 0, 0, 0, 0, 0]),
-    ("Pa", [1, -1, -2, 0, 0, 0, 0, 0]),
-    ("J", [1, 2, -2, 0, 0, 0, 0, 0]),
-    ("W", [1, 2, -3, 0, 0, 0, 0, 0]),
-    ("C", [0, 0, 1, 1, 0, 0, 0, 0]),
-    ("V", [1, 2, -3, -1, 0, 0, 0, 0]),
+/// Symbols with their exponents of kg, m, s, A, K, mol, cd and rad, and the factor to these.
+const SYMBOLS: [(&str, [i32; 8], f64); 22] = [
+    ("kg", [1, 0, 0, 0, 0, 0, 0, 0], 1.0),
+    ("m", [0, 1, 0, 0, 0, 0, 0, 0], 1.0),
+    ("s", [0, 0, 1, 0, 0, 0, 0, 0], 1.0),
+    ("A", [0, 0, 0, 1, 0, 0, 0, 0], 1.0),
+    ("K", [0, 0, 0, 0, 1, 0, 0, 0], 1.0),
+    ("mol", [0, 0, 0, 0, 0, 1, 0, 0], 1.0),
+    ("cd", [0, 0, 0, 0, 0, 0, 1, 0], 1.0),
+    ("rad", [0, 0, 0, 0, 0, 0, 0, 1], 1.0),
+    ("Hz", [0, 0, -1, 0, 0, 0, 0, 0], 1.0),
+    ("N", [1, 1, -2, 0, 0, 0, 0, 0], 1.0),
+    ("Pa", [1, -1, -2, 0, 0, 0, 0, 0], 1.0),
+    ("J", [1, 2, -2, 0, 0, 0, 0, 0], 1.0),
+    ("W", [1, 2, -3, 0, 0, 0, 0, 0], 1.0),
+    ("C", [0, 0, 1, 1, 0, 0, 0, 0], 1.0),
+    ("V", [1, 2, -3, -1, 0, 0, 0, 0], 1.0),
+    ("km", [0, 1, 0, 0, 0, 0, 0, 0], 1e3),
+    ("cm", [0, 1, 0, 0, 0, 0, 0, 0], 1e-2),
+    ("mm", [0, 1, 0, 0, 0, 0, 0, 0], 1e-3),
+    ("ms", [0, 0, 1, 0, 0, 0, 0, 0], 1e-3),
+    ("min", [0, 0, 1, 0, 0, 0, 0, 0], 60.0),
+    ("h", [0, 0, 1, 0, 0, 0, 0, 0], 3600.0),
+    ("deg", [0, 0, 0, 0, 0, 0, 0, 1], std::f64::consts::PI / 180.0),
 ];
 
 /// Refuses a unit that cannot be read, by the path of its field.
@@ -165,6 +181,16 @@ mod tests {
                 (found.m, found.s, found.rad),
                 (above.m - below.m, above.s - below.s, above.rad - below.rad)
             );
+        }
+    }
+
+    #[test]
+    fn units_of_other_scales_have_a_factor() {
+        for (name, wanted) in
+            [("km/h", 1.0 / 3.6), ("deg/s2", 0.017_453_292_519_9), ("cm2", 1e-4), ("m/ms2", 1e6), ("N", 1.0)]
+        {
+            let base = base_unit(name).expect(name);
+            assert!((base.factor / wanted - 1.0).abs() < 1e-9, "{name}: {}", base.factor);
         }
     }
 

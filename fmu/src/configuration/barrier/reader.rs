@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, VariantAccess, Visitor};
 
+use super::super::unit::measured;
 use super::super::{ConfigurationError, PlantSection, check_unit};
 use super::Automatic;
 use super::raw::RawBarrier;
@@ -20,7 +21,7 @@ impl<'de> Deserialize<'de> for Kind {
         impl<'de> Visitor<'de> for Word {
             type Value = Kind;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("enum ShapeName")
+                f.write_str("the name of a shape")
             }
             fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<Kind, A::Error> {
                 let (name, nothing) = data.variant::<String>()?;
@@ -119,6 +120,23 @@ impl Reader<'_> {
         let unit = self.raw.unit.as_deref().unwrap_or(default);
         check_unit(&format!("{}.unit", self.path), unit)?;
         Ok(unit.to_owned())
+    }
+
+    /// Refuses an expression of h whose unit certainly is not the one given, or none.
+    pub(super) fn check_unit_of(&self, expression: &str) -> Result<(), ConfigurationError> {
+        // One that cannot be read is refused with the filter.
+        if self.plant.expressions()?.barrier(expression).is_err() {
+            return Ok(());
+        }
+        let found = self.plant.unit_of(expression).or_else(|message| self.refuse("expression", message))?;
+        let given = self.raw.unit.as_deref().and_then(measured);
+        match (found, given) {
+            (Some(found), Some(given)) if !found.is(&given) => self.refuse(
+                "unit",
+                format!("is {given:?}, but {expression:?} is in {found}", given = given.to_string()),
+            ),
+            _ => Ok(()),
+        }
     }
 
     /// The name of a barrier of the plug-in, and its unit.

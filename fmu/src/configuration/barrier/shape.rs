@@ -198,7 +198,9 @@ pub static SHAPES: [ShapeRow; 14] = [
         optional: &["unit"],
         read: |r| {
             let expression = r.need("expression", r.raw.expression.clone())?;
-            Ok(Shape::Expression { expression, unit: r.unit("1")? })
+            let unit = r.unit("1")?;
+            r.check_unit_of(&expression)?;
+            Ok(Shape::Expression { expression, unit })
         },
     },
     ShapeRow {

@@ -54,12 +54,12 @@ fn defects() {
         (
             "unit = \"m\"\ndeadline",
             "unit = \"mile\"\ndeadline",
-            "barrier[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, m, s, A, K, mol, cd, rad, Hz, N, Pa, J, W, C, V, or \"1\"",
+            "barrier[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, m, s, A, K, mol, cd, rad, Hz, N, Pa, J, W, C, V, km, cm, mm, ms, min, h, deg, or \"1\"",
         ),
         (
             "unit = \"m/s3\"",
             "unit = \"g\"",
-            "plant.inputs[0].unit: is \"g\", must be like \"kg.m2/s\", made of kg, m, s, A, K, mol, cd, rad, Hz, N, Pa, J, W, C, V, or \"1\"",
+            "plant.inputs[0].unit: is \"g\", must be like \"kg.m2/s\", made of kg, m, s, A, K, mol, cd, rad, Hz, N, Pa, J, W, C, V, km, cm, mm, ms, min, h, deg, or \"1\"",
         ),
         (
             "start = 60.0, min",
@@ -96,6 +96,41 @@ fn defects() {
             "name = \"merge\"",
             "name = \"d\"",
             "barrier[0].name: is \"d\", which is already the name of something else",
+        ),
+        (
+            "unit = \"m\"\ndeadline",
+            "unit = \"s\"\ndeadline",
+            "barrier[0].unit: is \"s\", but \"p - d\" is in m",
+        ),
+        (
+            "unit = \"m\"\ndeadline",
+            "unit = \"km\"\ndeadline",
+            "barrier[0].unit: is \"km\", but \"p - d\" is in m",
+        ),
+        (
+            "\"p - d\"",
+            "\"p - v\"",
+            "barrier[0].expression: is \"p - v\", in which \"p\" is in m and \"v\" in m/s; what is added or compared must be in one unit; a factor between them may be a parameter with its unit",
+        ),
+        (
+            "v = \"acc\"",
+            "v = \"p\"",
+            "plant.derivatives.v: is \"p\", which is in m; the derivative of v, which is in m/s, must be in m/s2",
+        ),
+        (
+            "v = \"acc\"",
+            "v = \"acc * sin(p)\"",
+            "plant.derivatives.v: is \"acc * sin(p)\", in which sin takes \"p\", which is in m; it takes an angle in rad or a number without unit",
+        ),
+        (
+            "{ name = \"v\", unit = \"m/s\"",
+            "{ name = \"v\", unit = \"km/h\"",
+            "plant.derivatives.p: is \"v\", which is in km/h; the derivative of p, which is in m, must be in m/s; numbers are taken as they are, so that this is wrong by the factor 0.277778",
+        ),
+        (
+            "states = [\n",
+            "model = \"unicycle\"\nstates = [\n",
+            "plant.states: given beside `model`; unicycle has its own",
         ),
         (
             "[plant]\n",
@@ -135,6 +170,15 @@ fn defects() {
         none,
         "plant.model: missing; either name a model or give `states`, `inputs` and `derivatives`"
     );
+    for table in ["states = []", "inputs = []", "parameters = []", "derivatives = {}"] {
+        let text = format!("kind = \"plant\"\n[plant]\nmodel = \"unicycle\"\n{table}\n");
+        let key = table.split(' ').next().expect("a key");
+        let error = Configuration::parse(&text).expect_err(table).to_string();
+        assert_eq!(error, format!("plant.{key}: given beside `model`; unicycle has its own"));
+    }
+    let empty = "kind = \"plant\"\n[plant]\nstates = []\ninputs = [{ name = \"u\" }]\n";
+    let error = Configuration::parse(empty).expect_err("no states").to_string();
+    assert_eq!(error, "plant.states: has 0 entries, must have 1 to 32");
     let mixed = CAR
         .replace("v = \"acc\"", "v = \"acc + q\"")
         .replace("inputs = [", "inputs = [{ name = \"q\", unit = \"m/s2\" }, ");

@@ -1,0 +1,37 @@
+//! Files of text, and what is said of other files in their place.
+
+use std::io;
+use std::path::Path;
+
+use crate::error::Error;
+
+/// How files begin that are no text, or are in another encoding; and what is said of them.
+const OTHERS: [(&[u8], &str); 3] = [
+    (
+        b"PK\x03\x04",
+        "it is an archive, such as an FMU, and no text; `punctual inspect` and `punctual validate` take FMUs",
+    ),
+    (b"\xff\xfe", "it is in UTF-16, must be in UTF-8; editors save it so"),
+    (b"\xfe\xff", "it is in UTF-16, must be in UTF-8; editors save it so"),
+];
+
+/// The text of the file at `path`.
+///
+/// # Errors
+///
+/// A file that cannot be read, a folder, or a file that is no text in UTF-8: with what it is.
+pub fn read(path: &Path) -> Result<String, Error> {
+    let refuse = |message: String| Error::io("read", path, io::Error::other(message));
+    if path.is_dir() {
+        return Err(refuse("it is a folder, must be a file".to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
+    if let Some((_, what)) = OTHERS.iter().find(|(begin, _)| bytes.starts_with(begin)) {
+        return Err(refuse((*what).to_owned()));
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
+        refuse(format!("line {line} is no text in UTF-8, as all of it must be; editors save it so"))
+    })
+}
