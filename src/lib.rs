@@ -13,10 +13,12 @@
 //! recording            the rows of a run; CSV
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
+//! page                 a page of HTML with charts
 //! pictures             from a system file's plots and a recording to pictures
 //! package              from a configuration to an .fmu file, from a system to an .ssp file, FMUs merged
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! output               the one place that prints
+//! report               a run as a page, with an animation
 //! reproduce            the study: the paper's tables and figures beside ours and the literature's; the demonstration
 //! command              one thin function per subcommand
 //! ```
@@ -31,9 +33,11 @@ pub mod host;
 pub mod isolation;
 pub mod output;
 pub mod package;
+pub mod page;
 pub mod pictures;
 pub mod plot;
 pub mod recording;
+pub mod report;
 pub mod reproduce;
 pub mod text;
 pub mod validate;

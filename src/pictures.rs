@@ -21,13 +21,13 @@ const PLANES: [[&str; 2]; 4] = [["x_p", "y_p"], ["x", "y"], ["px", "py"], ["p_x"
 /// The pictures of a system that asks for none: the paths where there is a plane, h with its lower bound for every filter,
 /// every input with its limits. Of the signals in `recorded` alone.
 pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Picture> {
-    let components: Vec<_> = system.components().iter().zip(models).map(|(c, m)| Part(c, m)).collect();
+    let components = parts(system, models);
     let is_recorded = |signal: &String| recorded.iter().any(|column| column.name == *signal);
     let mut pictures: Vec<Picture> =
         plane(&components, &is_recorded).into_iter().map(Picture::Path).collect();
     for part in &components {
         let all = |names: Vec<String>| Some(names).filter(|names| names.iter().all(is_recorded));
-        for (name, unit, barriers) in part.barriers() {
+        for Group { name, unit, barriers } in part.barriers() {
             let signals =
                 |field: &str| barriers.iter().map(|b| part.signal(&format!("{b}.{field}"))).collect();
             let (Some(signals), Some(dashed)) = (all(signals("h")), all(signals("profile"))) else {
@@ -47,7 +47,6 @@ pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Pict
         }
         for input in part.inputs() {
             let (u, wanted) = (part.signal(&format!("u.{input}")), part.signal(&format!("u_ref.{input}")));
-            let limits = ["u_min", "u_max"].map(|side| part.number(&format!("{side}.{input}")));
             let Some(signals) = all(vec![u]) else { continue };
             pictures.push(Picture::Time(TimePicture {
                 name: Some(part.file(&format!("u-{input}"))),
@@ -56,7 +55,7 @@ pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Pict
                 dashed: all(vec![wanted]).unwrap_or_default(),
                 ylabel: None,
                 deadline: None,
-                bounds: limits.into_iter().flatten().filter(|limit| limit.abs() < UNBOUNDED).collect(),
+                bounds: part.limits(input).into_iter().flatten().collect(),
                 scale: Variant::Linear,
             }));
         }
@@ -65,31 +64,52 @@ pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Pict
 }
 
 /// A component and what it is made of.
-struct Part<'a>(&'a Component, &'a Model);
+pub struct Part<'a> {
+    /// Its entry in the system file.
+    pub component: &'a Component,
+    /// What it is made of.
+    pub model: &'a Model,
+}
+
+/// Barriers of one filter with h in one unit.
+pub struct Group {
+    /// The name of their picture.
+    pub name: String,
+    /// The unit of h.
+    pub unit: String,
+    /// Their names.
+    pub barriers: Vec<String>,
+}
+
+/// The parts of `system`, whose components are made of `models`.
+pub fn parts<'a>(system: &'a System, models: &'a [Model]) -> Vec<Part<'a>> {
+    system.components().iter().zip(models).map(|(component, model)| Part { component, model }).collect()
+}
 
 impl Part<'_> {
-    fn signal(&self, variable: &str) -> String {
-        format!("{}.{variable}", self.0.name)
+    /// The name of its `variable` in a recording.
+    pub fn signal(&self, variable: &str) -> String {
+        format!("{}.{variable}", self.component.name)
     }
 
     /// The name of a picture of this component alone, `what` it shows.
     fn file(&self, what: &str) -> String {
-        match self.0.name.as_str() {
+        match self.component.name.as_str() {
             "filter" => what.to_owned(),
             name => format!("{}-{what}", name.replace(['/', '\\', '\0'], "_")),
         }
     }
 
     /// The start value of a Real variable.
-    fn number(&self, variable: &str) -> Option<f64> {
-        let description = self.1.description();
+    pub fn number(&self, variable: &str) -> Option<f64> {
+        let description = self.model.description();
         let start = description.variables[description.index_of(variable)?].kind.start_number();
-        self.0.start.get(variable).map_or(start, StartValue::number)
+        self.component.start.get(variable).map_or(start, StartValue::number)
     }
 
     /// The filter, where it is one of this program.
-    fn filter(&self) -> Option<FilterConfiguration> {
-        match self.1 {
+    pub fn filter(&self) -> Option<FilterConfiguration> {
+        match self.model {
             Model::Own(own, _) => Some(own.configuration.clone()),
             Model::Fmu(fmu) => fmu.resource(RESOURCE).and_then(|text| Configuration::parse(&text).ok()),
         }
@@ -99,22 +119,22 @@ impl Part<'_> {
         })
     }
 
-    /// The barriers with h in one unit, by the name of their picture.
-    fn barriers(&self) -> Vec<(String, String, Vec<String>)> {
-        let mut groups: Vec<(String, String, Vec<String>)> = Vec::new();
-        for variable in &self.1.description().variables {
+    /// Its barriers, by the unit of h.
+    pub fn barriers(&self) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        for variable in &self.model.description().variables {
             let Some(barrier) = variable.name.strip_suffix(".profile") else { continue };
             let unit = variable.kind.unit().unwrap_or("1");
-            match groups.iter_mut().find(|(_, of, _)| of == unit) {
-                Some((.., barriers)) => barriers.push(barrier.to_owned()),
+            match groups.iter_mut().find(|group| group.unit == unit) {
+                Some(group) => group.barriers.push(barrier.to_owned()),
                 None => {
                     let number =
                         if groups.is_empty() { String::new() } else { format!("-{}", groups.len() + 1) };
-                    groups.push((
-                        self.file(&format!("h{number}")),
-                        unit.to_owned(),
-                        vec![barrier.to_owned()],
-                    ));
+                    groups.push(Group {
+                        name: self.file(&format!("h{number}")),
+                        unit: unit.to_owned(),
+                        barriers: vec![barrier.to_owned()],
+                    });
                 }
             }
         }
@@ -122,9 +142,27 @@ impl Part<'_> {
     }
 
     /// The inputs that it hands out.
-    fn inputs(&self) -> Vec<&str> {
-        let outputs = self.1.description().variables.iter().filter(|v| v.causality == Causality::Output);
+    pub fn inputs(&self) -> Vec<&str> {
+        let outputs = self.model.description().variables.iter().filter(|v| v.causality == Causality::Output);
         outputs.filter_map(|v| v.name.strip_prefix("u.")).collect()
+    }
+
+    /// The lower and the upper limit of an input, where it has one.
+    pub fn limits(&self, input: &str) -> [Option<f64>; 2] {
+        ["u_min", "u_max"]
+            .map(|side| self.number(&format!("{side}.{input}")).filter(|limit| limit.abs() < UNBOUNDED))
+    }
+
+    /// The names of two of its outputs that are where it is in a plane, without their component.
+    pub fn places(&self) -> impl Iterator<Item = [String; 2]> {
+        let description = self.model.description();
+        let moves = |name: &String| {
+            description
+                .index_of(name)
+                .is_some_and(|i| description.variables[i].causality == Causality::Output)
+        };
+        let places = PLANES.iter().map(|axes| axes.map(|axis| format!("x.{axis}")));
+        places.filter(move |place| place.iter().all(moves))
     }
 
     /// The discs of its barriers that stay where they are.
@@ -148,7 +186,7 @@ impl Part<'_> {
 
     /// The barrier with the first deadline.
     fn goal(&self) -> Option<String> {
-        let variables = &self.1.description().variables;
+        let variables = &self.model.description().variables;
         variables.iter().find_map(|v| v.name.strip_suffix(".deadline")).map(str::to_owned)
     }
 }
@@ -158,15 +196,8 @@ fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<Pa
     let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
     let arrival = arrival.filter(is_recorded);
     let mut paths = parts.iter().flat_map(|part| {
-        PLANES.iter().filter_map(|axes| {
-            let [x, y] = axes.map(|axis| part.signal(&format!("x.{axis}")));
-            let moves = |signal: &str| {
-                let description = part.1.description();
-                let found = signal.split_once('.').and_then(|(_, name)| description.index_of(name));
-                found.is_some_and(|i| description.variables[i].causality == Causality::Output)
-            };
-            (moves(&x) && moves(&y) && is_recorded(&x) && is_recorded(&y)).then_some((x, y))
-        })
+        let places = part.places().map(|place| place.map(|name| part.signal(&name)));
+        places.filter(|place| place.iter().all(is_recorded)).map(|[x, y]| (x, y))
     });
     let (x, y) = paths.next()?;
     let more: Vec<_> = paths.map(|(x, y)| PathEntry { x, y, label: None, arrival: None }).collect();

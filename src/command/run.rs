@@ -16,7 +16,9 @@ use crate::output::{self, Progress};
 use crate::package;
 use crate::pictures;
 use crate::recording::{self, Recording};
+use crate::report;
 use crate::text;
+use crate::whole;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -28,6 +30,9 @@ pub struct Arguments {
     /// folder named as the file]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write a page for a browser into that folder too: verdicts, and the run as an animation with charts
+    #[arg(long)]
+    report: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -132,6 +137,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let Some(folder) = &arguments.out {
         words.extend(["--out".into(), folder.into()]);
     }
+    words.extend(arguments.report.then(|| "--report".into()));
     words.extend(arguments.json.then(|| "--json".into()));
     if let Some(required) = arguments.require {
         words.extend(["--require".into(), required.word().into()]);
@@ -196,6 +202,10 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
 fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error> {
     let path = &arguments.system;
     let Opened { system, models, mut simulation, out } = open(arguments).map_err(|e| e.in_file(path))?;
+    if arguments.report && out.is_none() {
+        let message = "needs a folder for its page; add --out DIR";
+        return Err(Error::configuration("--report", message));
+    }
     if let Some(folder) = &out {
         // The folder is made before the run, which may be long.
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
@@ -220,17 +230,24 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         }
         return Err(failure);
     }
-    let files = match &out {
-        Some(folder) => {
-            let usual = match system.pictures() {
-                [] => pictures::usual(&system, &models, outcome.recording.columns()),
-                asked => asked.to_vec(),
-            };
-            write_files(&usual, &stem(path), folder, &outcome.recording)?
+    let mut notes = outcome.notes.clone();
+    notes.extend(nothing_promised(&outcome.promises));
+    let mut files = Vec::new();
+    if let Some(folder) = &out {
+        let usual = match system.pictures() {
+            [] => pictures::usual(&system, &models, outcome.recording.columns()),
+            asked => asked.to_vec(),
+        };
+        files = write_files(&usual, &stem(path), folder, &outcome.recording)?;
+        if arguments.report {
+            let page = folder.join(format!("{}.html", stem(path)));
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            let text = report::document(&name, &system, &models, &outcome, &notes);
+            whole::write(&page, text)?;
+            files.push(page.display().to_string());
         }
-        None => Vec::new(),
-    };
-    let report = report(path, &system, &models, outcome, files);
+    }
+    let report = summary(path, &system, &models, outcome, files, notes);
     for note in &report.notes {
         output::note(&format!("note: {note}"));
     }
@@ -273,7 +290,14 @@ pub(super) fn write_files(
     Ok(files.iter().map(|file| file.display().to_string()).collect())
 }
 
-fn report(path: &Path, system: &System, models: &[Model], outcome: Outcome, files: Vec<String>) -> Report {
+fn summary(
+    path: &Path,
+    system: &System,
+    models: &[Model],
+    outcome: Outcome,
+    files: Vec<String>,
+    notes: Vec<String>,
+) -> Report {
     let recording = &outcome.recording;
     let signal = |index: usize| {
         let column = &recording.columns()[index];
@@ -283,8 +307,6 @@ fn report(path: &Path, system: &System, models: &[Model], outcome: Outcome, file
         let last = recording.column(index).last().unwrap_or(f64::NAN);
         SignalReport { name: column.name.clone(), unit: column.unit.clone(), min, max, last }
     };
-    let mut notes = outcome.notes;
-    notes.extend(nothing_promised(&outcome.promises));
     Report {
         system: path.display().to_string(),
         order: system.experiment().order,

@@ -111,7 +111,7 @@ impl Curve {
 }
 
 /// `value` to seven significant digits: far more than a picture shows.
-fn seven_digits(value: f64) -> f64 {
+pub fn seven_digits(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 

@@ -5,7 +5,7 @@
 /// is given by its `channels` (equally long; x and y of a path, or only the values of a time series). It is cut
 /// into runs of equal length. Each run keeps its first point, its last, and in each channel the least and the
 /// greatest value. It also keeps its first point that is not finite, which breaks the line.
-pub(super) fn decimate(channels: &[&[f64]], limit: usize) -> Vec<usize> {
+pub fn decimate(channels: &[&[f64]], limit: usize) -> Vec<usize> {
     let length = channels.iter().map(|c| c.len()).min().unwrap_or(0);
     if length <= limit.max(2) {
         return (0..length).collect();

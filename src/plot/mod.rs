@@ -17,7 +17,9 @@ use serde::Serialize;
 
 use crate::error::Error;
 use canvas::Canvas;
-pub use chart::{Chart, Curve, Scaling};
+pub use chart::{Chart, Curve, Scaling, seven_digits};
+pub use decimate::decimate;
+pub use scale::extent;
 
 /// Colours told apart by colour-blind readers too (Okabe and Ito 2008, without the yellow that
 /// vanishes on white), for series in this order.
@@ -35,7 +37,7 @@ pub const PALETTE: [[u8; 3]; 7] = [
 const ALONE: &str = "plot";
 
 /// Points of a series that are drawn, about; more are thinned out without losing extremes.
-const POINTS: usize = 2000;
+pub const POINTS: usize = 2000;
 
 /// Paths in a plane, with equal axes.
 #[derive(Clone, Debug, Default)]

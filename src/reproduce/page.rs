@@ -1,14 +1,9 @@
-//! The report as one page of HTML: tables, and pictures that can be zoomed and read off. It loads nothing from a
-//! network.
+//! The report as one page of HTML: tables, and pictures that can be zoomed and read off.
 
-use super::table::escape;
 use super::{Figure, Report, Table};
 use crate::error::Error;
+use crate::page::{Page, escape};
 use crate::plot;
-
-/// Draws the charts. It is written by hand, so that a page needs no library.
-const SCRIPT: &str = include_str!("page.js");
-const STYLE: &str = include_str!("page.css");
 
 /// The page.
 ///
@@ -25,22 +20,18 @@ pub fn document(report: &Report) -> Result<String, Error> {
         .chain(report.figures.iter().map(|f| (f.key.as_str(), f.chart.title.as_str())))
         .map(|(key, title)| format!("<li><a href=\"#{key}\">{}</a></li>\n", escape(title)))
         .collect();
-    // A script must not contain an end tag: `</` can stand in JSON within strings only.
-    let charts: Vec<_> = report.figures.iter().map(|f| (&f.key, &f.chart)).collect();
-    let charts = serde_json::to_string(&charts).unwrap_or_else(|_| "[]".to_owned()).replace("</", "<\\/");
-    let palette = serde_json::to_string(&plot::PALETTE).unwrap_or_default();
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>Punctual: the paper, reproduced</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n\
-         <h1>The paper, reproduced</h1>\n\
+    let body = format!(
+        "<h1>The paper, reproduced</h1>\n\
          <p>Janani S K and S. Kolathaya, <em>Fixed time convergence guarantees for Higher Order Control Barrier \
          Functions</em>, arXiv:2507.13888: its tables and figures, our runs of its method, our method, and the \
          constraints of the literature. Disc of radius 2 m at (45, 45) m.</p>\n\
          <nav><ul>\n{contents}</ul></nav>\n<h2>Tables</h2>\n{tables}<h2>Figures</h2>\n\
          <p class=\"hint\">Point at a curve to read it off; drag to zoom (two fingers on a phone), double-click to see all again.</p>\n\
-         {figures}</main>\n<script>\nconst palette = {palette};\nconst charts = {charts};\n{SCRIPT}</script>\n</body>\n</html>\n"
-    ))
+         {figures}"
+    );
+    let charts: Vec<_> = report.figures.iter().map(|f| (&f.key, &f.chart)).collect();
+    let title = "Punctual: the paper, reproduced";
+    Ok(Page { title, body: &body, charts, style: "", script: "" }.document())
 }
 
 fn section(table: &Table) -> String {

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use crate::output;
+use crate::page::escape;
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,11 +150,6 @@ impl Table {
         let body: String = self.rows.iter().map(row).collect();
         format!("<table><thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>\n")
     }
-}
-
-/// Escapes text for HTML.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

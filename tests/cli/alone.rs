@@ -3,6 +3,8 @@
 
 use std::fs;
 
+use serde_json::Value;
+
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -68,6 +70,136 @@ fn a_new_file_for_an_fmu_runs_with_one() {
     let text = text.replace("plant.position", "plant.x.position").replace("plant.speed", "plant.x.speed");
     workshop.write("cart.toml", text.replace("plant.force", "plant.u.force"));
     workshop.punctual(["run", "cart.toml", "--out", "out", "--require", "kept"]).success();
+}
+
+/// The JSON after `const <name> = ` in a page.
+#[track_caller]
+fn data(page: &str, name: &str) -> Value {
+    let (_, rest) = page.split_once(&format!("const {name} = ")).unwrap_or_else(|| panic!("no {name}"));
+    let line = rest.lines().next().and_then(|line| line.strip_suffix(';')).expect("a line of data");
+    serde_json::from_str(line).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// The page without its scripts and styles, as a tree.
+#[track_caller]
+fn body(page: &str) -> roxmltree::Document<'_> {
+    let (from, to) = (page.find("<main>").expect("a body"), page.find("</main>").expect("its end"));
+    roxmltree::Document::parse(&page[from..to + "</main>".len()]).expect("well-formed HTML")
+}
+
+/// The texts of the cells of a table, row after row.
+fn cells(tree: &roxmltree::Document<'_>) -> Vec<Vec<String>> {
+    let rows = tree.descendants().filter(|node| node.has_tag_name("tr"));
+    let text =
+        |node: roxmltree::Node<'_, '_>| node.descendants().filter_map(|n| n.text()).next().map(str::to_owned);
+    rows.map(|row| row.children().filter(|cell| cell.is_element()).filter_map(text).collect()).collect()
+}
+
+#[test]
+fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 8.0"));
+    let printed = workshop.punctual(["run", "car.toml", "--report", "--json"]).success();
+    let printed: Value = serde_json::from_str(&printed).expect("JSON");
+    let files: Vec<_> =
+        printed["files"].as_array().expect("files").iter().filter_map(Value::as_str).collect();
+    assert_eq!(files.last(), Some(&"car/car.html"), "{files:?}");
+    let page = workshop.text("car/car.html");
+    // The name of SVG elements is no address that is asked.
+    assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"), "an address");
+    // The verdicts are those that are printed.
+    let tree = body(&page);
+    let rows = cells(&tree);
+    for promise in printed["promises"].as_array().expect("promises") {
+        let name = promise["barrier"].as_str().and_then(|name| name.strip_prefix("filter.")).expect("a name");
+        let row = rows.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name} in {rows:?}"));
+        assert_eq!((promise["promise"].as_str(), row[1].as_str()), (Some("kept"), "kept"));
+        assert_eq!(row[2], "guaranteed");
+    }
+    let brake = rows.iter().find(|row| row[0] == "a").expect("the input");
+    assert_eq!(brake[4..6], ["-4", "4"]);
+    // Every chart has a place, and every barrier its curve, with the extremes of the recording.
+    let charts = data(&page, "charts");
+    let charts = charts.as_array().expect("charts");
+    let is_place = |key: &Value| tree.descendants().any(|node| node.attribute("data-chart") == key.as_str());
+    assert!(charts.iter().all(|chart| is_place(&chart[0])));
+    let curves = || charts.iter().flat_map(|chart| chart[1]["curves"].as_array().expect("curves"));
+    let table = Table::parse(&workshop.text("car/car.csv"));
+    for barrier in ["goal", "tree"] {
+        let h = curves().find(|curve| curve["label"] == barrier).expect("a curve");
+        let drawn =
+            h["y"].as_array().expect("values").iter().filter_map(Value::as_f64).fold(f64::INFINITY, f64::min);
+        let least = table.column(&format!("filter.{barrier}.h")).into_iter().fold(f64::INFINITY, f64::min);
+        // Seven digits of each value are kept.
+        assert!((drawn - least).abs() <= 1e-6 * least.abs(), "{barrier}: {drawn}, not {least}");
+    }
+    let scene = data(&page, "scene");
+    let names: Vec<_> = scene["outlines"].as_array().expect("outlines").iter().map(|o| &o["label"]).collect();
+    assert_eq!(names, ["goal", "tree"]);
+    let words: Vec<_> =
+        scene["strips"][0][1]["words"].as_array().expect("words").iter().map(|w| &w[0]).collect();
+    assert!(words.contains(&&Value::from("filtered")), "{words:?}");
+}
+
+/// Shapes of every kind, one that moves, and names that are no names.
+#[test]
+fn a_report_draws_what_has_an_outline_and_escapes_names() {
+    let workshop = Workshop::new();
+    let barrier = |name: &str, keys: &str| format!("[[barrier]]\nname = \"{name}\"\n{keys}\n");
+    let filter = CAR.replace("centre = [8.0, 4.0]", "centre = [8.0, 4.0]\nvelocity = [0.25, 0.0]")
+        + &barrier(
+            "hall",
+            "shape = \"rectangle\"\ncentre = [0.0, 0.0]\nhalf_sides = [40.0, 20.0]\nangle = 0.5",
+        )
+        + &barrier("pond", "shape = \"elliptic_obstacle\"\ncentre = [-9.0, 9.0]\nhalf_axes = [3.0, 1.0]")
+        + &barrier("wall", "shape = \"half_plane\"\ncentre = [0.0, -15.0]\nnormal = [0.0, 2.0]")
+        + &barrier("slow", "shape = \"speed_limit\"\nbound = 9.0");
+    workshop.write("filter.toml", filter);
+    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\nx0.v = 1.0\n");
+    let name = "<!--<script>alert(1)</script>";
+    let system = format!(
+        "[experiment]\nstop_time = 2.0\nstep = 0.02\n[[component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
+         [[component]]\nname = {name:?}\nfmu = \"plant.toml\"\n[[connect_by_name]]\ncomponents = [\"filter\", {name:?}]\n"
+    );
+    workshop.write("system.toml", system);
+    workshop
+        .punctual(["run", "system.toml", "--report"])
+        .fails(2, "--report: needs a folder for its page; add --out DIR");
+    workshop.punctual(["run", "system.toml", "--report", "--out", "out"]).success();
+    let page = workshop.text("out/system.html");
+    assert_eq!((page.matches("<script").count(), page.matches("<!--").count()), (1, 0));
+    let tree = body(&page);
+    assert!(tree.descendants().any(|node| node.text() == Some(name)), "the name as it is");
+    let scene = data(&page, "scene");
+    assert_eq!(scene["vehicles"][0]["label"], name);
+    let outline = |name: &str| {
+        let found = scene["outlines"].as_array().expect("outlines").iter().find(|o| o["label"] == name);
+        found.unwrap_or_else(|| panic!("no {name}")).clone()
+    };
+    let numbers = |list: &Value| -> Vec<f64> {
+        list.as_array().expect("numbers").iter().filter_map(Value::as_f64).collect()
+    };
+    // A disc moves 0.25 m/s · 2 s; at each corner of the others h is 0.
+    assert_eq!(numbers(&outline("goal")["centre"][1]), [8.0, 8.5]);
+    let corners = |name: &str| -> Vec<[f64; 2]> {
+        let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
+        outline(name)["corners"].as_array().expect("corners").iter().map(corner).collect()
+    };
+    // Seven digits of each coordinate are kept.
+    for [x, y] in corners("pond") {
+        assert!(((x / 3.0).powi(2) + y.powi(2) - 1.0).abs() < 1e-5, "{x}, {y}");
+    }
+    let (sin, cos) = 0.5_f64.sin_cos();
+    for [x, y] in corners("hall") {
+        let (along, across) = (cos * x + sin * y, cos * y - sin * x);
+        assert!(((along / 40.0).powi(4) + (across / 20.0).powi(4) - 1.0).abs() < 1e-5, "{x}, {y}");
+    }
+    let above = corners("wall");
+    assert!(
+        above.iter().all(|c| c[1] >= 0.0) && above.iter().filter(|c| c[1] == 0.0).count() == 2,
+        "{above:?}"
+    );
+    assert_eq!(scene["outlines"].as_array().map(Vec::len), Some(5), "a speed limit has none");
 }
 
 #[test]

@@ -1,13 +1,9 @@
 """The page of `punctual reproduce` in a real browser: it draws, reads off, zooms, and fits a phone."""
 
-import os
 import re
-import shutil
-import subprocess
 
 import pytest
-
-BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
+from browser import opened
 
 # Uses the page as a hand would, and leaves what it saw as attributes of the document.
 PROBE = """
@@ -41,22 +37,13 @@ seen.shown = String(svg.querySelectorAll("g path").length);
 
 @pytest.mark.parametrize("width", [1200, 390])
 def test_the_page_works_in_a_browser(study, width, tmp_path):
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
-        missing = pytest.fail if "CI" in os.environ else pytest.skip
-        missing(f"no browser to open the page with: none of {', '.join(BROWSERS)} is installed")
     text = (study[0] / "report.html").read_text()
     charts = len(re.findall(r'class="chart"', text))
     assert charts >= 18
-    page = tmp_path / "page.html"
-    page.write_text(text.replace("</body>", PROBE + "</body>"))
-    arguments = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}"]
-    arguments += [f"--window-size={width},900", "--virtual-time-budget=5000", "--dump-dom", page.as_uri()]
-    done = subprocess.run([browser, *arguments], capture_output=True, text=True, timeout=120, check=True)
-    attributes = dict(re.findall(r'data-([a-z]+)="([^"]*)"', done.stdout.split(">", 2)[1]))
+    attributes, document, _ = opened(text, PROBE, width, tmp_path)
     # Every chart is drawn by the script.
     assert attributes["ready"] == "yes"
-    assert len(re.findall(r'data-drawn="[1-9]', done.stdout)) == charts
+    assert len(re.findall(r'data-drawn="[1-9]', document)) == charts
     # Wide tables scroll in themselves: the page does not.
     assert int(attributes["overflow"]) <= 0
     assert re.search(r"x_p \(m\) = .*, y_p \(m\) = ", attributes["read"])

@@ -1,6 +1,7 @@
 "use strict";
 // Charts from data, in SVG: pointing reads a curve off, dragging zooms, a double click shows all again.
-(() => {
+// `views` has each chart by its key, for what a page draws over it.
+const views = (() => {
   const NS = "http://www.w3.org/2000/svg";
   const make = (tag, attributes, parent) => {
     const node = document.createElementNS(NS, tag);
@@ -8,7 +9,10 @@
     if (parent) parent.appendChild(node);
     return node;
   };
-  const colour = (i) => `rgb(${palette[i % palette.length].join(",")})`;
+  const views = new Map();
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  // On a dark page the colours are lighter.
+  const colour = (i) => `rgb(${palette[i % palette.length].map((c) => (dark.matches ? Math.round(c + (255 - c) * 0.35) : c)).join(",")})`;
   const finite = (v) => typeof v === "number" && Number.isFinite(v);
 
   // An axis maps values to a line on which it is linear, and back.
@@ -70,6 +74,8 @@
         all(chart.y, sy, shown.flatMap((c) => c.py), chart.horizontals, 1)];
     };
     let view = home();
+    // What a page needs to draw over the chart, and what it does after each drawing.
+    const seen = { after: [], curves, X: (v) => X(sx.to(v)), Y: (v) => Y(sy.to(v)) };
     holder.textContent = "";
     holder.classList.add("live");
     const svg = make("svg", { role: "img", "aria-label": chart.title }, holder);
@@ -98,7 +104,7 @@
       // In pixels of the screen, so that text has its size on a phone too.
       const width = Math.max(280, holder.clientWidth || 800), small = width < 560;
       const height = Math.round(chart.equal ? Math.min(width * 0.8, 620) : Math.max(260, Math.min(width * 0.55, 440)));
-      area = { left: small ? 56 : 74, top: 44, width: 0, height: 0 };
+      area = { left: small ? 56 : 74, top: chart.title || chart.verticals.length ? 44 : 12, width: 0, height: 0 };
       area.width = width - area.left - 12;
       area.height = height - area.top - 48;
       view = fitted(view);
@@ -106,21 +112,21 @@
       svg.textContent = "";
       unit = area.width / (view[0][1] - view[0][0]);
       const text = (x, y, s, more) => {
-        const node = make("text", { x, y, "font-size": small ? 11 : 12, fill: "#262626", ...more }, svg);
+        const node = make("text", { x, y, "font-size": small ? 11 : 12, fill: "var(--ink)", ...more }, svg);
         node.textContent = s;
         return node;
       };
       text(area.left + area.width / 2, 18, chart.title, { "text-anchor": "middle", "font-size": small ? 13 : 15 });
       const right = area.left + area.width, bottom = area.top + area.height;
       for (const [p, label] of ticks(chart.x, view[0], small ? 5 : 9)) {
-        make("line", { x1: X(p), x2: X(p), y1: area.top, y2: bottom, stroke: "#e4e4e4" }, svg);
+        make("line", { x1: X(p), x2: X(p), y1: area.top, y2: bottom, stroke: "var(--line)" }, svg);
         text(X(p), bottom + 16, label, { "text-anchor": "middle" });
       }
       for (const [p, label] of ticks(chart.y, view[1], small ? 5 : 7)) {
-        make("line", { x1: area.left, x2: right, y1: Y(p), y2: Y(p), stroke: "#e4e4e4" }, svg);
+        make("line", { x1: area.left, x2: right, y1: Y(p), y2: Y(p), stroke: "var(--line)" }, svg);
         text(area.left - 6, Y(p) + 4, label, { "text-anchor": "end" });
       }
-      make("rect", { x: area.left, y: area.top, width: area.width, height: area.height, fill: "none", stroke: "#5a5a5a" }, svg);
+      make("rect", { x: area.left, y: area.top, width: area.width, height: area.height, fill: "none", stroke: "var(--soft)" }, svg);
       text(area.left + area.width / 2, height - 8, chart.x.label, { "text-anchor": "middle" });
       const turned = { "text-anchor": "middle", transform: `rotate(-90 12 ${area.top + area.height / 2})` };
       text(12, area.top + area.height / 2 + 4, chart.y.label, turned);
@@ -134,14 +140,14 @@
       for (const m of chart.verticals) {
         const x = X(sx.to(m.at));
         if (!(x >= area.left && x <= right)) continue;
-        make("line", { x1: x, x2: x, y1: area.top, y2: bottom, stroke: "#6e6e6e", "stroke-dasharray": "3 3" }, inner);
-        text(x, area.top - 6, m.label, { "text-anchor": "middle", fill: "#6e6e6e" });
+        make("line", { x1: x, x2: x, y1: area.top, y2: bottom, stroke: "var(--soft)", "stroke-dasharray": "3 3" }, inner);
+        text(x, area.top - 6, m.label, { "text-anchor": "middle", fill: "var(--soft)" });
       }
       for (const m of chart.horizontals) {
         const y = Y(sy.to(m.at));
         if (!(y >= area.top && y <= bottom)) continue;
-        make("line", { x1: area.left, x2: right, y1: y, y2: y, stroke: "#6e6e6e", "stroke-dasharray": "3 3" }, inner);
-        text(right - 4, y - 5, m.label, { "text-anchor": "end", fill: "#6e6e6e" });
+        make("line", { x1: area.left, x2: right, y1: y, y2: y, stroke: "var(--soft)", "stroke-dasharray": "3 3" }, inner);
+        text(right - 4, y - 5, m.label, { "text-anchor": "end", fill: "var(--soft)" });
       }
       const far = 4 * Math.max(width, height);
       const near = (v) => Math.max(-far, Math.min(far, v));
@@ -156,7 +162,7 @@
           pen = true;
           last = y;
         }
-        make("path", { d, fill: "none", stroke: colour(c.colour), "stroke-width": 2, "stroke-linejoin": "round",
+        make("path", { d, class: "curve", fill: "none", stroke: colour(c.colour), "stroke-width": 2, "stroke-linejoin": "round",
           ...(c.style === "dashed" ? { "stroke-dasharray": "7 4" } : {}) }, inner);
         if (c.dots) for (let i = 0; i < c.px.length; i++) {
           if (Number.isFinite(c.py[i])) make("circle", { cx: X(c.px[i]), cy: Y(c.py[i]), r: 3, fill: colour(c.colour) }, inner);
@@ -164,12 +170,14 @@
         c.ends.forEach((end, i) => {
           if (!end) return;
           const [x, y] = [X(sx.to(end[0])), Y(sy.to(end[1]))];
-          if (i === 0) make("circle", { cx: x, cy: y, r: 4.5, fill: "#fff", stroke: colour(c.colour), "stroke-width": 2 }, inner);
-          else make("path", { d: `M${x} ${y - 7}L${x + 7} ${y}L${x} ${y + 7}L${x - 7} ${y}Z`, fill: colour(c.colour), stroke: "#fff" }, inner);
+          if (i === 0) make("circle", { cx: x, cy: y, r: 4.5, fill: "var(--page)", stroke: colour(c.colour), "stroke-width": 2 }, inner);
+          else make("path", { d: `M${x} ${y - 7}L${x + 7} ${y}L${x} ${y + 7}L${x - 7} ${y}Z`, fill: colour(c.colour), stroke: "var(--page)" }, inner);
         });
       }
       svg.cursor = make("g", { "pointer-events": "none" }, svg);
       svg.cursor.setAttribute("class", "cursor");
+      Object.assign(seen, { inner, area });
+      for (const draw of seen.after) draw();
     };
 
     const where = (event) => {
@@ -190,7 +198,7 @@
         }
       }
       if (!best || best.away > 60) return;
-      make("circle", { cx: best.x, cy: best.y, r: 5, fill: "none", stroke: "#262626", "stroke-width": 2 }, svg.cursor);
+      make("circle", { cx: best.x, cy: best.y, r: 5, fill: "none", stroke: "var(--ink)", "stroke-width": 2 }, svg.cursor);
       output.textContent = `${best.c.label ? best.c.label + ": " : ""}${chart.x.label} = ${short(best.c.x[best.i])}, ` +
         `${chart.y.label} = ${short(best.c.y[best.i])}`;
     };
@@ -279,7 +287,9 @@
     }
     render();
     addEventListener("resize", render);
+    dark.addEventListener("change", render);
     holder.dataset.drawn = String(curves.length);
+    views.set(holder.dataset.chart, Object.assign(seen, { svg, at: (event) => place(...where(event)) }));
   };
 
   for (const [key, chart] of charts) {
@@ -287,4 +297,5 @@
     if (holder) draw(holder, chart);
   }
   document.documentElement.dataset.ready = "yes";
+  return Object.assign(views, { make, colour, short });
 })();
