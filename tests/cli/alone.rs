@@ -311,6 +311,20 @@ fn what_cannot_be_run_alone_is_told() {
 }
 
 #[test]
+fn two_vehicles_in_one_model_avoid_each_other() {
+    let workshop = Workshop::new();
+    workshop
+        .write("two.toml", fs::read(examples().join("../models/two-unicycles.toml")).expect("the example"));
+    workshop.punctual(["run", "two.toml", "--require", "on_time_and_inside"]).success();
+    let table = Table::parse(&workshop.text("two/two.csv"));
+    assert!(table.column("filter.clear.guaranteed").iter().all(|g| *g == 1.0));
+    let [xa, ya, xb, yb] = ["xa", "ya", "xb", "yb"].map(|state| table.column(&format!("plant.x.{state}")));
+    let near = |k: usize| (xa[k] - xb[k]).hypot(ya[k] - yb[k]);
+    let nearest = (0..xa.len()).map(near).fold(f64::INFINITY, f64::min);
+    assert!(nearest >= 3.0, "{nearest} m");
+}
+
+#[test]
 fn a_campaign_takes_a_file_alone() {
     let workshop = Workshop::new();
     workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 8.0"));
