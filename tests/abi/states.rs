@@ -51,11 +51,11 @@ fn stepped(fmu: &Fmu) -> Slave<'_> {
 #[test]
 fn the_layout_is_what_is_documented() {
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926, "the check value of CRC-32");
-    for (configuration, size) in [(FILTER, 645), (PLANT, 202)] {
+    for (configuration, size) in [(FILTER, 653), (PLANT, 202)] {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
-        assert_eq!(bytes[VERSION..GUID], 5_u32.to_le_bytes());
+        assert_eq!(bytes[VERSION..GUID], 6_u32.to_le_bytes());
         assert_eq!(&bytes[GUID..LENGTH], fmu.guid().as_bytes());
         assert_eq!(bytes[LENGTH..MODE], (bytes.len() as u64).to_le_bytes());
         assert_eq!(bytes[MODE], 2, "step mode");
