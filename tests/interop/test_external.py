@@ -20,7 +20,8 @@ sampling = "pointwise"
 [plant]
 states = [{ name = "p", unit = "m" }, { name = "v", unit = "m/s" }]
 inputs = [{ name = "a", unit = "m/s2" }]
-derivatives = { p = "v", v = "a - v^3" }
+parameters = [{ name = "c", start = 1.0, unit = "s/m2" }]
+derivatives = { p = "v", v = "a - c * v^3" }
 """
 GIVEN = """kind = "filter"
 [plant]
