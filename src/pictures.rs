@@ -5,12 +5,13 @@ use std::path::Path;
 use punctual_fmu::configuration::{BarrierSection, Configuration, FilterConfiguration, RESOURCE, UNBOUNDED};
 
 use crate::coupling::{
-    Component, DiscEntry, Model, PathEntry, PathPicture, Picture, StartValue, System, TimePicture, Variant,
+    Component, DiscEntry, Model, Outcome, PathEntry, PathPicture, Picture, StartValue, System, TimePicture,
+    Variant,
 };
 use crate::error::Error;
 use crate::host::Causality;
 use crate::plot::{self, Disc, Mark, PathPlot, Scale, Series, Style, TimePlot};
-use crate::recording::{Column, Recording};
+use crate::recording::Recording;
 
 /// Percentiles between which [`Variant::Clipped`] shows values.
 const BULK: (f64, f64) = (1.0, 99.0);
@@ -19,8 +20,9 @@ const BULK: (f64, f64) = (1.0, 99.0);
 const PLANES: [[&str; 2]; 4] = [["x_p", "y_p"], ["x", "y"], ["px", "py"], ["p_x", "p_y"]];
 
 /// The pictures of a system that asks for none: the paths where there is a plane, h with its lower bound for every filter,
-/// every input with its limits. Of the signals in `recorded` alone.
-pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Picture> {
+/// every input with its limits. Of the signals recorded alone.
+pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Picture> {
+    let recorded = outcome.recording.columns();
     let components = parts(system, models);
     let is_recorded = |signal: &String| recorded.iter().any(|column| column.name == *signal);
     let mut pictures: Vec<Picture> =
@@ -33,7 +35,8 @@ pub fn usual(system: &System, models: &[Model], recorded: &[Column]) -> Vec<Pict
             let (Some(signals), Some(dashed)) = (all(signals("h")), all(signals("profile"))) else {
                 continue;
             };
-            let mut deadlines = barriers.iter().filter_map(|b| part.number(&format!("{b}.deadline")));
+            let promise = |b: &String| outcome.promises.iter().find(|p| p.barrier == part.signal(b));
+            let mut deadlines = barriers.iter().filter_map(|b| promise(b)?.deadline);
             pictures.push(Picture::Time(TimePicture {
                 name: Some(name),
                 title: None,

@@ -50,6 +50,27 @@ impl Vehicle {
         std::array::from_fn(|i| x[i] + dt / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
     }
 
+    /// A filter in the making, with the set `goal`, and `clear` if it is there.
+    fn sets(
+        self,
+        goal: (DistanceDisc, BarrierSettings),
+        clear: Option<(Outside<DistanceDisc>, BarrierSettings)>,
+    ) -> Result<FilterBuilder, punctual_core::Error> {
+        macro_rules! along {
+            ($plant:expr) => {{
+                let builder = SafetyFilter::builder(4, 2).barrier("goal", $plant, goal.0, goal.1)?;
+                match clear {
+                    Some((clear, settings)) => builder.barrier("clear", $plant, clear, settings),
+                    None => Ok(builder),
+                }
+            }};
+        }
+        match self {
+            Self::PointMass => along!(PointMass),
+            Self::Unicycle => along!(Unicycle),
+        }
+    }
+
     fn filter(self, deadline: f64, bounds: [f64; 2]) -> SafetyFilter {
         self.filter_of(deadline, bounds, (true, Sampling::Period(PERIOD)))
     }
@@ -67,16 +88,7 @@ impl Vehicle {
         let stay_rate = (!is_beside).then_some(1.0);
         let within = BarrierSettings { margin: 0.01, stay_rate, ..BarrierSettings::within(deadline) };
         let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
-        let builder = SafetyFilter::builder(4, 2);
-        let builder = match self {
-            Self::PointMass => builder
-                .barrier("goal", PointMass, goal, within)
-                .and_then(|b| if is_beside { b.barrier("clear", PointMass, clear, keeping) } else { Ok(b) }),
-            Self::Unicycle => builder
-                .barrier("goal", Unicycle, goal, within)
-                .and_then(|b| if is_beside { b.barrier("clear", Unicycle, clear, keeping) } else { Ok(b) }),
-        };
-        builder
+        self.sets((goal, within), is_beside.then_some((clear, keeping)))
             .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
             .and_then(|b| b.sampling(sampling))
             .and_then(FilterBuilder::build)
@@ -197,6 +209,7 @@ fn the_soonest_deadline_is_taken_and_kept() {
                 // 20 m there and to a stop take 4.5 s at 4 m/s2; the disc's edge is nearer.
                 deadline = goal.time_left;
                 assert!((3.0..5.5).contains(&deadline), "{deadline}");
+                assert!(goal.on_course, "{goal:?}");
             }
             assert!((goal.time_left - (deadline - t).max(0.0)).abs() < 1e-9, "{t}: {goal:?}");
             x = Vehicle::PointMass.move_by(x, u, PERIOD);
@@ -702,16 +715,8 @@ fn obstacles_that_move_are_kept_away_from() {
         let clear = Outside(disc.expect("valid disc"));
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
         let (within, keeping) = (BarrierSettings::within(deadline), BarrierSettings::keeping());
-        let builder = SafetyFilter::builder(4, 2);
-        let filter = match vehicle {
-            Vehicle::PointMass => builder
-                .barrier("goal", PointMass, goal, within)
-                .and_then(|b| b.barrier("clear", PointMass, clear, keeping)),
-            Vehicle::Unicycle => builder
-                .barrier("goal", Unicycle, goal, within)
-                .and_then(|b| b.barrier("clear", Unicycle, clear, keeping)),
-        };
-        let filter = filter
+        let filter = vehicle
+            .sets((goal, within), Some((clear, keeping)))
             .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -764,16 +769,8 @@ fn what_begins_later_is_kept_from_then_on() {
         let disc = |centre, radius| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
         let (goal, clear) = (disc(GOAL.0, GOAL.1), Outside(disc(place, radius)));
         let within = BarrierSettings::within(deadline);
-        let builder = SafetyFilter::builder(4, 2);
-        let filter = match vehicle {
-            Vehicle::PointMass => builder
-                .barrier("goal", PointMass, goal, within)
-                .and_then(|b| b.barrier("clear", PointMass, clear, BarrierSettings::keeping())),
-            Vehicle::Unicycle => builder
-                .barrier("goal", Unicycle, goal, within)
-                .and_then(|b| b.barrier("clear", Unicycle, clear, BarrierSettings::keeping())),
-        };
-        let filter = filter
+        let filter = vehicle
+            .sets((goal, within), Some((clear, BarrierSettings::keeping())))
             .and_then(|b| b.window(Begin::At(begin), End::Never))
             .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))

@@ -169,7 +169,7 @@ impl Campaign {
         let (system, system_text) = match file.system {
             SystemSource::File(_) => {
                 let text = text::read(&system_path)?;
-                if coupling::is_configuration(&text) {
+                if FileKind::of(&text) == Some(FileKind::One) {
                     let own = |e: Error| e.in_file(&system_path);
                     let configuration = package::read_configuration(&system_path)?;
                     let (system, configurations) = coupling::alone(configuration).map_err(own)?;

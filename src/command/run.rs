@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_fmu::configuration::FileKind;
 use serde::Serialize;
 
 use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
@@ -182,7 +183,7 @@ struct Opened {
 fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let (path, out) = (&arguments.system, arguments.out.clone());
     let text = text::read(path)?;
-    if !coupling::is_configuration(&text) {
+    if FileKind::of(&text) != Some(FileKind::One) {
         let system = System::parse(&text)?;
         let (simulation, models) =
             Simulation::new(&system, path.parent().unwrap_or(Path::new("")), package::read_configuration)?;
@@ -235,7 +236,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {
-            [] => pictures::usual(&system, &models, outcome.recording.columns()),
+            [] => pictures::usual(&system, &models, &outcome),
             asked => asked.to_vec(),
         };
         files = write_files(&usual, &stem(path), folder, &outcome.recording)?;

@@ -1,19 +1,8 @@
 //! A filter's file as a system: the filter, the plant that its model is, and the nominal controller that stands in it.
 
-use punctual_fmu::configuration::{Configuration, read_toml};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use punctual_fmu::configuration::Configuration;
 
 use crate::error::Error;
-
-/// Whether this is the text of a filter, plant or controller, and not of a system.
-pub fn is_configuration(text: &str) -> bool {
-    #[derive(Deserialize)]
-    struct Head {
-        kind: Option<IgnoredAny>,
-    }
-    read_toml::<Head>(text).is_ok_and(|head| head.kind.is_some())
-}
 
 /// The text of the system of a filter, and the configurations of its components, in order.
 ///

@@ -14,7 +14,7 @@ mod ports;
 mod promises;
 mod system;
 
-pub use alone::{alone, is_configuration};
+pub use alone::alone;
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use master::{Outcome, Simulation, Statistics};

@@ -108,7 +108,7 @@ pub struct Anchoring<'a> {
     pub deadline: f64,
     /// The time in s for which inputs are held; 0 where they are not, or where it is not known.
     pub period: f64,
-    /// The margin of the settings, `[h]`.
+    /// The margin asked for, `[h]`: that of the settings, or what a plan behind the constraint needs.
     pub margin: f64,
     /// The default rate for this deadline and period, 1/s.
     pub default_rate: f64,
@@ -136,7 +136,7 @@ impl Anchoring<'_> {
 /// The choice of a condition at an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchored {
-    /// μ in `[h]`: the settings' margin and the expected cost of held inputs.
+    /// μ in `[h]`: the margin asked for and the expected cost of held inputs.
     pub margin: f64,
     /// a in 1/s.
     pub rate: f64,

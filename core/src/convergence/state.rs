@@ -43,7 +43,8 @@ pub struct FixedTimeState {
     /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, and since the arrival where an approach has ended.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
-    /// μ in the unit of h, chosen at the anchor: the settings' margin and the expected cost of held inputs.
+    /// μ in the unit of h, chosen at the anchor: the settings' margin, or `least_margin` where that is more, and the expected
+    /// cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// What μ is at least, in the unit of h, ≥ 0, whatever the settings say: so that a plan finds room behind the constraint.

@@ -888,11 +888,13 @@ impl AssuredFilter {
             let FixedTimeState { deadline, arrival, on_course, gain, unmet, .. } = *state;
             let deadline = if later { factor * slot.promise.deadline() } else { deadline };
             slot.promise.anchor(state, t, &slot.now.derivatives.drift[..slot.degree()], deadline, hold);
-            (state.arrival, state.on_course, state.gain, state.unmet) = (arrival, on_course, gain, unmet);
+            (state.arrival, state.gain, state.unmet) = (arrival, gain, unmet);
             if later {
                 // Once, whatever the rows had made of it.
                 state.postponed = before.postponed + 1;
                 (b.time_left, b.deadline_unreachable) = (state.deadline, false);
+            } else {
+                state.on_course = on_course;
             }
             b.remember(state);
         }

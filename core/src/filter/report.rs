@@ -127,7 +127,8 @@ pub struct BarrierReport {
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this phase, and every step
     /// since then was satisfied. It does not say that an input will exist at later samples.
     pub on_course: bool,
-    /// μ in force since the anchor, `[h]`: the settings' margin and the expected cost of held inputs.
+    /// μ in force since the anchor, `[h]`: the settings' margin, or what plans behind the rows need where that is
+    /// more, and the expected cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Whether the configured method could not be used from the anchor and another took its place

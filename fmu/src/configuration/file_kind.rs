@@ -18,7 +18,7 @@ pub enum FileKind {
 
 impl FileKind {
     /// The kind of the TOML text, if it is clear.
-    fn of(text: &str) -> Option<Self> {
+    pub fn of(text: &str) -> Option<Self> {
         #[derive(Deserialize)]
         struct Keys {
             kind: Option<IgnoredAny>,

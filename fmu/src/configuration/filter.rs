@@ -365,12 +365,12 @@ impl FilterConfiguration {
         // The filter itself refuses what the ranges of single numbers cannot.
         if let Some(policy) = &configuration.policy {
             configuration.plant.functions::<f64>("policy", policy)?;
-            if configuration.assurance == AssuranceName::Off {
-                let message = "is for plans, of which there are none: assurance is \"off\"";
-                return Err(ConfigurationError::new("policy", message));
-            }
         }
         configuration.unassured = configuration.why_unassured();
+        if configuration.policy.is_some() && !configuration.is_assured() {
+            let message = format!("is for plans, of which there are none: {}", configuration.unassured);
+            return Err(ConfigurationError::new("policy", message));
+        }
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
         if *configuration.run != RunSection::default() {

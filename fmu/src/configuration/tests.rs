@@ -536,6 +536,12 @@ fn expressions_of_inputs_are_checked() {
             "assurance = \"off\"\npolicy.a",
             "policy: is for plans, of which there are none: assurance is \"off\"",
         ),
+        (
+            POLICY,
+            ", omega = [-2.0, 2.0] }",
+            " }",
+            "policy: is for plans, of which there are none: omega has no bounds",
+        ),
     ] {
         assert_eq!(refusal(valid, from, to), wanted, "{to}");
     }

@@ -53,7 +53,7 @@ pub static BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput {
         name: "margin_used",
-        description: "h to arrive and stay above: the parameter, and what held inputs are expected to cost",
+        description: "h to arrive and stay above: the parameter or what plans need, and what held inputs are expected to cost",
         reading: Real(OfH, |b| b.margin, |d| d.margin),
     },
     BarrierOutput {
