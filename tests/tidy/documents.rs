@@ -121,7 +121,7 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
 }
 
 /// Beginnings of files up to a key that none has, in the order of the tables of docs/configuration.md.
-const PLACES: [&str; 19] = [
+const PLACES: [&str; 20] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[[barrier]]",
     "kind = \"filter\"\n[plant]",
@@ -129,6 +129,7 @@ const PLACES: [&str; 19] = [
     "kind = \"filter\"\n[[plant.parameters]]",
     "kind = \"filter\"\n[integrator]",
     "kind = \"plant\"",
+    "kind = \"plant\"\n[[output]]",
     "kind = \"plant\"\n[integration]",
     "kind = \"plant\"\n[disturbance]",
     "kind = \"controller\"",
