@@ -2,8 +2,8 @@
 
 The documents are written for a code host. Three things differ in a book:
 
-- Formulas, code blocks of the language `math`, are set by KaTeX here, so that a reader needs no network. Indices and
-  exponents of formulas in a line (`c_k`, `e^{-t}`) are set below and above it.
+- Formulas, code blocks of the language `math`, are set by KaTeX here, so that a reader needs no network. In a document that
+  has some, indices and exponents of formulas in a line (`c_k`, `e^{-t}`) are set below and above it.
 - A link out of docs/ leads to a page of the book that shows the file.
 - Text that is not Markdown, such as the help of every command, becomes a page.
 """
@@ -65,13 +65,13 @@ def redirected(target, folder, page):
 
 
 def raised_and_lowered(text):
+    """`c_k` and `e^{-t}` with their index and exponent in HTML."""
     text = LOWERED.sub(lambda m: f"<sub>{m[1] or m[2]}</sub>", text)
     return RAISED.sub(lambda m: f"<sup>{m[1] or m[2]}</sup>", text)
 
 
-def prose(text, folder, page):
-    """Text between code blocks."""
-    text = LINK.sub(lambda m: m[1] + redirected(m[2], folder, page) + m[3], text)
+def formulas_in_lines(text):
+    """Text between code blocks, with the formulas in its lines set; headings stay, since anchors are made of them."""
     lines = []
     for line in text.split("\n"):
         if not line.startswith("#"):
@@ -90,7 +90,8 @@ def markdown(text, path, page):
     done = iter(set_formulas([block.removeprefix("```math\n").removesuffix("```") for block in formulas]) if formulas else [])
     result = []
     for k, part in enumerate(FENCE.split(text)):
-        result.append(prose(part, folder, page))
+        part = LINK.sub(lambda m: m[1] + redirected(m[2], folder, page) + m[3], part)
+        result.append(formulas_in_lines(part) if formulas else part)
         if k < len(blocks):
             block = blocks[k]
             result.append(f'<div class="formula">{next(done)}</div>' if block in formulas else block)
@@ -185,7 +186,8 @@ def main():
     json.dump(book, sys.stdout)
 
 
-CHAPTERS = {}
+# Pages by what they show. The contents stand beside every page.
+CHAPTERS = {"docs/SUMMARY.md": "index.md"}
 PAGES = {}
 if __name__ == "__main__":
     main()
