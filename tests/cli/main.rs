@@ -21,6 +21,7 @@ mod misbehaving;
 mod mistakes;
 mod models;
 mod packing;
+mod pages;
 mod plugins;
 mod reproducing;
 mod running;

@@ -14,12 +14,12 @@ fn example(name: &str) -> Vec<u8> {
     fs::read(root().join("examples/models").join(name)).expect("an example")
 }
 
-fn document(name: &str) -> String {
+pub(crate) fn document(name: &str) -> String {
     fs::read_to_string(root().join("docs").join(name)).expect("a document")
 }
 
 /// The contents of the blocks of `text` in the language `language`.
-fn blocks<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+pub(crate) fn blocks<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
     let fence = format!("```{language}\n");
     text.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap_or_default()).collect()
 }

@@ -174,6 +174,18 @@ fn links_between_documents_lead_somewhere() {
     }
 }
 
+#[test]
+fn every_document_is_a_chapter_of_the_book() {
+    let summary = text("docs/SUMMARY.md");
+    for document in TEXTS.iter().filter(|t| t.path.starts_with("docs/") && t.path.ends_with(".md")) {
+        let name = document.path.rsplit('/').next().unwrap_or_default();
+        assert!(
+            name == "SUMMARY.md" || summary.contains(&format!("]({name})")),
+            "docs/SUMMARY.md: no {name}"
+        );
+    }
+}
+
 /// The subcommands that `punctual --help` shows.
 fn subcommands() -> BTreeSet<String> {
     let help =

@@ -219,7 +219,7 @@ pub(super) static SECTION: Section = Section {
                 NumberByName(Of("unit of the state"), Range::NON_NEGATIVE),
                 Some("none"),
                 "largest error of a measured state, by name: the promise then holds for the true state, to first order \
-                 ([theory](theory.md), section 12). Needs the reference profile, prediction over the period, no delay",
+                 ([theory](theory.md#measurement-errors)). Needs the reference profile, prediction over the period, no delay",
             ),
             Key::new(
                 "integrator",
