@@ -95,8 +95,7 @@ fn an_output_is_an_expression_of_states() {
     workshop.write("follower.toml", follower);
     let component =
         |name: &str, rest: &str| format!("[[component]]\nname = \"{name}\"\nfmu = \"{name}.toml\"\n{rest}");
-    let system = "kind = \"system\"\nconnection = [{ from = \"car.y.v_x\", to = \"follower.u.v\" }]\n"
-        .to_owned()
+    let system = "connection = [{ from = \"car.y.v_x\", to = \"follower.u.v\" }]\n".to_owned()
         + "[experiment]\nstop_time = 2.0\nstep = 0.1\n"
         + &component("car", "start = { \"u.a\" = 0.5, \"u.omega\" = 0.7 }\n")
         + &component("follower", "");
