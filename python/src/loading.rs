@@ -4,7 +4,9 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use punctual_fmu::PluginFolder;
-use punctual_fmu::configuration::{Configuration, ConfigurationError, FilterConfiguration};
+use punctual_fmu::configuration::{
+    Configuration, ConfigurationError, FilterConfiguration, PlantConfiguration, VariableSection,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -37,6 +39,19 @@ pub(crate) fn parse(text: &str, folder: PathBuf, file: &str) -> PyResult<FilterC
             let message = format!("is {:?}, must be \"filter\"", other.kind());
             Err(refused(ConfigurationError::new("kind", message)))
         }
+    }
+}
+
+/// The names of the states and of the inputs of the vehicle called `model`, in order.
+#[pyfunction]
+pub(crate) fn vehicle(model: &str) -> PyResult<(Vec<String>, Vec<String>)> {
+    let text = format!("kind = \"plant\"\nplant.model = {model:?}\n");
+    match Configuration::parse(&text).map_err(|error| refused(&error))? {
+        Configuration::Plant(PlantConfiguration { plant, .. }) => {
+            let names = |variables: Vec<VariableSection>| variables.into_iter().map(|v| v.name).collect();
+            Ok((names(plant.states()), names(plant.inputs())))
+        }
+        other => Err(refused(&format!("kind: is {:?}, must be \"plant\"", other.kind()))),
     }
 }
 
