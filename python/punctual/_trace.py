@@ -323,3 +323,17 @@ def _named(function: Callable[..., Any]) -> str:
     code = getattr(function, "__code__", None)
     name = getattr(function, "__qualname__", repr(function))
     return f"{name} ({code.co_filename}:{code.co_firstlineno})" if code else name
+
+
+def with_function(reason: str, configuration: Any, path: str = "") -> str:
+    """The words of a refusal, with the function that made the expression which they are about."""
+    if callable(configuration):
+        about = reason.startswith((f"{path}:", f"{path}."))
+        return f"{reason}; {_named(configuration)} made it" if about else reason
+    if isinstance(configuration, Mapping):
+        for key, value in configuration.items():
+            reason = with_function(reason, value, f"{path}.{key}" if path else key)
+    elif isinstance(configuration, (list, tuple)):
+        for i, value in enumerate(configuration):
+            reason = with_function(reason, value, f"{path}[{i}]")
+    return reason

@@ -23,7 +23,12 @@ pub(crate) fn configuration(argument: &Bound<'_, PyAny>) -> PyResult<FilterConfi
     let helper = argument.py().import("punctual._configuration")?;
     let (text, folder, file): (String, PathBuf, String) =
         helper.call_method1("text_folder_file", (argument,))?.extract()?;
-    parse(&text, folder, &file)
+    parse(&text, folder, &file).or_else(|error| {
+        let reason = error.value(argument.py()).str()?;
+        let told =
+            argument.py().import("punctual._trace")?.call_method1("with_function", (reason, argument))?;
+        Err(refused(&told))
+    })
 }
 
 /// Reads and completes the TOML text of a filter, whose plug-in is in `folder`; errors begin with the name of the `file`,

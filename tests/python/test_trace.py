@@ -287,6 +287,23 @@ def test_what_does_not_fit_is_refused(change, words):
         punctual.Filter(model(**change))
 
 
+def test_what_the_filter_refuses_names_the_function():
+    def squared(x, u):
+        return [x[1], u[0] ** 2]
+
+    place = f"squared ({__file__}:{squared.__code__.co_firstlineno}) made it"
+    for use in [punctual.Filter, punctual.check]:
+        with pytest.raises(punctual.Error, match="^plant.derivatives.v: ") as refused:
+            use(model(squared, lambda x: 3 - x[0]))
+        assert str(refused.value).endswith(f"; test_what_the_filter_refuses_names_the_function.<locals>.{place}")
+    with pytest.raises(punctual.Error) as refused:
+        punctual.Filter(model(barrier=lambda x: x[0] + x[1]))
+    assert str(refused.value).startswith("barrier[0].expression: ") and " made it" in str(refused.value)
+    with pytest.raises(punctual.Error) as refused:
+        punctual.Filter(model({"p": "v", "v": "F^2"}, lambda x: 3 - x[0]))
+    assert "made it" not in str(refused.value)
+
+
 def test_a_function_where_no_expression_stands_is_refused():
     words = r"^plant.inputs\[0\].max: is <function .*; a function may stand in the place of an expression only$"
     with pytest.raises(TypeError, match=words):
