@@ -1,4 +1,4 @@
-"""Configurations: the path of a TOML file, or a dict with the same content."""
+"""Configurations: the path of a TOML file, or a dict with the same content, and functions in the place of expressions."""
 
 from __future__ import annotations
 
@@ -11,15 +11,20 @@ from typing import Any, TypeAlias
 
 import tomli_w
 
+from ._trace import traced
+
 Configuration: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
 
 
-def toml_text(configuration: Mapping[str, Any]) -> str:
-    """The dict as TOML; arrays and scalars of NumPy become lists and numbers, paths become text.
+def to_toml(configuration: Mapping[str, Any]) -> str:
+    """The dict as TOML, for a file that the command line takes; functions become expressions.
 
-    Raises `TypeError` for a value that a configuration cannot have, with its path.
+    Arrays and scalars of NumPy become lists and numbers, paths become text.
+
+    Raises `TypeError` for a value that a configuration cannot have, with its path, and for what cannot be traced, with
+    the line; `Error` for a function whose arguments or result do not fit.
     """
-    return tomli_w.dumps(_plain(configuration, ""))
+    return tomli_w.dumps(_plain(traced(configuration), ""))
 
 
 def _plain(value: Any, path: str) -> Any:
@@ -32,6 +37,8 @@ def _plain(value: Any, path: str) -> Any:
         return [_plain(item, f"{path}[{i}]") for i, item in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
+    if callable(value):
+        raise TypeError(f"{path}: is {value!r}; a function may stand in the place of an expression only")
     if not isinstance(value, (str, bool, int, float)):
         raise TypeError(f"{path}: is {value!r}, must be a number, text, truth value, list or dict")
     return value
@@ -40,7 +47,7 @@ def _plain(value: Any, path: str) -> Any:
 def text_folder_file(configuration: Configuration) -> tuple[str, str, str]:
     """The TOML text; where its plug-in is looked for; the name of its file, for a dict none."""
     if isinstance(configuration, Mapping):
-        return toml_text(configuration), os.getcwd(), ""
+        return to_toml(configuration), os.getcwd(), ""
     path = Path(configuration)
     return path.read_text(encoding="utf-8"), str(path.absolute().parent), str(path)
 
@@ -54,7 +61,7 @@ def configuration_file(configuration: Configuration) -> Iterator[Path]:
     if not isinstance(configuration, Mapping):
         yield Path(configuration)
         return
-    text = toml_text(configuration)
+    text = to_toml(configuration)
     plant = configuration.get("plant")
     beside = os.getcwd() if isinstance(plant, Mapping) and "plugin" in plant else None
     handle, name = tempfile.mkstemp(suffix=".toml", prefix="punctual-", dir=beside)

@@ -13,6 +13,7 @@ from typing import Any
 from ._command import run
 from ._configuration import Configuration, configuration_file
 from ._error import Error
+from ._trace import with_function
 
 Value = float | int | bool | str
 
@@ -104,7 +105,7 @@ def _run_for(
         reason = str(error)
         for configuration, file in given:
             if isinstance(configuration, Mapping):
-                reason = reason.replace(f"{file}: ", "")
+                reason = with_function(reason.replace(f"{file}: ", ""), configuration)
         raise Error(reason) from None
 
 

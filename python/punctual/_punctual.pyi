@@ -17,6 +17,7 @@ __all__ = [
     "judge",
     "unpickled_batch",
     "unpickled_filter",
+    "vehicle",
 ]
 
 __version__: str
@@ -24,6 +25,7 @@ __version__: str
 def judge(
     rows: Sequence[tuple[float, float, int, bool, int]], deadline: float | None, units: tuple[str, str]
 ) -> dict[str, Any]: ...
+def vehicle(model: str) -> tuple[list[str], list[str]]: ...
 
 _Saved = tuple[str, str, str, list[bytes]]
 
@@ -75,6 +77,10 @@ class Step:
 
 @final
 class Plan:
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def inputs(self) -> list[str]: ...
     @property
     def times(self) -> NDArray[np.float64]: ...
     @property

@@ -17,9 +17,10 @@ use crate::saved::{self, Reduced, Saved};
 /// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
 /// same bits.
 ///
-/// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. A plug-in is
-/// loaded from the folder of the file (of a dict: from the current folder), without the trial in a process of its
-/// own that `punctual.check` makes.
+/// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. In a dict a function
+/// may stand in the place of an expression; it is called once, with symbols, and never in a step. A plug-in is loaded
+/// from the folder of the file (of a dict: from the current folder), without the trial in a process of its own that
+/// `punctual.check` makes.
 ///
 /// Raises `punctual.Error` for a configuration that cannot be used, with the field, the value and what is allowed.
 ///
@@ -116,7 +117,7 @@ impl Filter {
     #[getter]
     fn plan(&mut self, py: Python<'_>) -> PyResult<Option<Plan>> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), self.u.len())
+        Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), &self.interface)
     }
 
     /// Why there is no plan, where the promise was refused or withdrawn.

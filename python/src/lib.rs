@@ -40,6 +40,7 @@ fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<report::Step>()?;
     module.add_class::<report::BarrierReport>()?;
     module.add_function(wrap_pyfunction!(promise::judge, module)?)?;
+    module.add_function(wrap_pyfunction!(loading::vehicle, module)?)?;
     module.add_function(wrap_pyfunction!(filter::unpickled_filter, module)?)?;
     module.add_function(wrap_pyfunction!(batch::unpickled_batch, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -4,7 +4,9 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use punctual_fmu::PluginFolder;
-use punctual_fmu::configuration::{Configuration, ConfigurationError, FilterConfiguration};
+use punctual_fmu::configuration::{
+    Configuration, ConfigurationError, FilterConfiguration, PlantConfiguration, VariableSection,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -21,7 +23,12 @@ pub(crate) fn configuration(argument: &Bound<'_, PyAny>) -> PyResult<FilterConfi
     let helper = argument.py().import("punctual._configuration")?;
     let (text, folder, file): (String, PathBuf, String) =
         helper.call_method1("text_folder_file", (argument,))?.extract()?;
-    parse(&text, folder, &file)
+    parse(&text, folder, &file).or_else(|error| {
+        let reason = error.value(argument.py()).str()?;
+        let told =
+            argument.py().import("punctual._trace")?.call_method1("with_function", (reason, argument))?;
+        Err(refused(&told))
+    })
 }
 
 /// Reads and completes the TOML text of a filter, whose plug-in is in `folder`; errors begin with the name of the `file`,
@@ -37,6 +44,19 @@ pub(crate) fn parse(text: &str, folder: PathBuf, file: &str) -> PyResult<FilterC
             let message = format!("is {:?}, must be \"filter\"", other.kind());
             Err(refused(ConfigurationError::new("kind", message)))
         }
+    }
+}
+
+/// The names of the states and of the inputs of the vehicle called `model`, in order.
+#[pyfunction]
+pub(crate) fn vehicle(model: &str) -> PyResult<(Vec<String>, Vec<String>)> {
+    let text = format!("kind = \"plant\"\nplant.model = {model:?}\n");
+    match Configuration::parse(&text).map_err(|error| refused(&error))? {
+        Configuration::Plant(PlantConfiguration { plant, .. }) => {
+            let names = |variables: Vec<VariableSection>| variables.into_iter().map(|v| v.name).collect();
+            Ok((names(plant.states()), names(plant.inputs())))
+        }
+        other => Err(refused(&format!("kind: is {:?}, must be \"plant\"", other.kind()))),
     }
 }
 

@@ -5,12 +5,20 @@ use punctual_core::plan::Witness;
 use punctual_fmu::FilterLoop;
 use pyo3::prelude::*;
 
+use crate::loading::Interface;
+
 /// Points of the way, at least.
 const POINTS: f64 = 200.0;
 
 /// A verified way to keep every promise from the last step on, whatever u_ref is. The last input is held for ever.
 #[pyclass(frozen, module = "punctual")]
 pub(crate) struct Plan {
+    /// Names of the states, the columns of `x`.
+    #[pyo3(get)]
+    states: Vec<String>,
+    /// Names of the inputs, the columns of `u`.
+    #[pyo3(get)]
+    inputs: Vec<String>,
     /// Times on the way in s, shape (n,); the plant is at rest from the last on.
     #[pyo3(get)]
     times: Py<PyArray1<f64>>,
@@ -34,10 +42,11 @@ impl Plan {
         py: Python<'_>,
         filter: &FilterLoop,
         (t, x): (f64, &[f64]),
-        inputs: usize,
+        interface: &Interface,
     ) -> PyResult<Option<Self>> {
         let (Some(witness), FilterLoop::Assured(assured)) = (filter.plan(), filter) else { return Ok(None) };
         let Witness { inputs: holds, tightest, effort, .. } = witness;
+        let inputs = interface.inputs.len();
         let end = holds.last().map_or(t, |(end, _)| *end);
         let way = assured.way(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
         let times: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
@@ -47,6 +56,8 @@ impl Plan {
         let name =
             |barrier: usize| assured.filter().barrier_names().nth(barrier).unwrap_or_default().to_owned();
         Ok(Some(Self {
+            states: interface.states.names.clone(),
+            inputs: interface.inputs.names.clone(),
             times: times.into_pyarray(py).unbind(),
             x: states.into_pyarray(py).reshape([count, x.len()])?.unbind(),
             u: held.into_pyarray(py).reshape([count, inputs])?.unbind(),
