@@ -102,7 +102,7 @@ fn the_message_says_what_is_wrong() {
     for (bytes, wanted) in [
         (Vec::new(), "the state is cut off in the magic number: 0 bytes of 8".to_owned()),
         (with(&bytes, 0, b"p"), "the bytes do not begin as a state does, with \"PUNCTUAL\"".to_owned()),
-        (forged(VERSION, &[1]), "the version of the layout is 1, must be 6".to_owned()),
+        (forged(VERSION, &[1]), "the version of the layout is 1, must be 7".to_owned()),
         (
             other.now(),
             format!(

@@ -31,6 +31,9 @@ const COMFORTABLE: f64 = 0.5;
 /// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
 const FIRST: f64 = 0.125;
 const BISECTIONS: u32 = 3;
+/// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
+/// it again at the next, and the input jump between the two.
+const GIVEN_BACK: f64 = 1.0 / 32.0;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
 
@@ -132,6 +135,9 @@ pub struct Commitment {
     /// One of each barrier; `None` where nothing is promised.
     promises: Vec<Option<Promise>>,
     plan: Plan,
+    /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    share: f64,
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     sample: Option<[f64; 2]>,
@@ -506,7 +512,7 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, sample, .. } = commitment;
+        let Commitment { standing, promises, plan, share, sample, .. } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -517,6 +523,9 @@ impl AssuredFilter {
         if matches!(standing, Standing::Assured | Standing::Irregular) {
             if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
                 return refuse("plan", flaw);
+            }
+            if !(0.0..=1.0).contains(share) {
+                return refuse("share", "is no part, must be 0 to 1");
             }
             let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
             if !promises.iter().flatten().all(is_promise) {
@@ -948,7 +957,7 @@ impl AssuredFilter {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
-        let plan = &self.next.plan;
+        let (plan, share) = (&self.next.plan, self.commitment.share);
         let was_committed = self.commitment.standing == Standing::Assured;
         // Gentle, and with the margin that the rows aim at.
         let comfortable = |witness: &Witness| {
@@ -964,34 +973,41 @@ impl AssuredFilter {
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
             {
-                return Ok((Driver::Reference, Piece::Mixed { rows: 0.0, wish: 1.0 }, witness));
+                return Ok((Driver::Reference, Piece::Mixed { rows: 0.0, wish: 1.0 }, witness, 0.0));
             }
             wanted.copy_from_slice(u);
-            if let Ok(witness) = planner.behind(plan, t, x, wanted) {
+            if share <= GIVEN_BACK
+                && let Ok(witness) = planner.behind(plan, t, x, wanted)
+            {
                 if !passes || !comfortable(&witness) || u == wish {
-                    return Ok((Driver::Rows, Piece::ROWS, witness));
+                    return Ok((Driver::Rows, Piece::ROWS, witness, 0.0));
                 }
                 // As near to u_ref as is comfortable, so that the input does not jump between the two.
                 let (wish, witness) =
                     towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
                 let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
-                return Ok((driver, Piece::Mixed { rows: 1.0 - wish, wish }, witness));
+                return Ok((driver, Piece::Mixed { rows: 1.0 - wish, wish }, witness, 0.0));
             }
-            // Towards the answer of the rows, from the plan's own input.
+            // Towards the answer of the rows, from the plan's own input: as near as can be at first, then little by little.
             let (kept, is_replayed) = planner.tail(plan, t, x)?;
             let own = kept.inputs[0].1;
-            let (rows, witness) = towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
+            let behind = |u: &[f64]| planner.behind(plan, t, x, u).ok();
+            let (rows, witness) = match share > GIVEN_BACK {
+                true => back(&own[..u.len()], u, kept, share, behind),
+                false => towards(&own[..u.len()], u, kept, behind),
+            };
             let driver = if rows > 0.0 { Driver::Between } else { Driver::Plan };
             // The first one, or one by feedback, moves with the state.
             let piece = match was_committed && is_replayed {
                 true => Piece::Mixed { rows, wish: 0.0 },
                 false => Piece::Searched,
             };
-            Ok((driver, piece, witness))
+            Ok((driver, piece, witness, 1.0 - rows))
         });
         let failure = match found {
-            Ok((driver, piece, witness)) => {
+            Ok((driver, piece, witness, share)) => {
                 self.piece = piece;
+                self.next.share = share;
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
                 self.next.plan.witness = witness;
                 return driver;
@@ -1001,7 +1017,7 @@ impl AssuredFilter {
         match self.planned(&self.next.promises, (t, hold), u, |planner| planner.search(t, x)) {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
-                self.next.plan = plan;
+                (self.next.plan, self.next.share) = (plan, 1.0);
                 self.piece = Piece::Searched;
                 Driver::Plan
             }
@@ -1015,6 +1031,31 @@ impl AssuredFilter {
             }
         }
     }
+}
+
+/// `from` a plan's own input, whose witness is `kept`, towards `to`: a little further than the last time, when `share` was the
+/// plan's, or as far, or a little less, if a witness is behind it. The part of the way, and its witness.
+fn back(
+    from: &[f64],
+    to: &[f64],
+    kept: Witness,
+    share: f64,
+    behind: impl Fn(&[f64]) -> Option<Witness>,
+) -> (f64, Witness) {
+    let mut input = [0.0; MAX_INPUTS];
+    for more in [-1.0, 0.0, 1.0, 4.0, 12.0] {
+        let part = 1.0 - (share + more * GIVEN_BACK);
+        if part <= 0.0 {
+            continue;
+        }
+        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
+            *input = from + part * (to - from);
+        }
+        if let Some(witness) = behind(&input[..from.len()]) {
+            return (part, witness);
+        }
+    }
+    (0.0, kept)
 }
 
 /// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
