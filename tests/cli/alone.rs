@@ -5,6 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
+use crate::page::{body, cells, data};
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -70,29 +71,6 @@ fn a_new_file_for_an_fmu_runs_with_one() {
     let text = text.replace("plant.position", "plant.x.position").replace("plant.speed", "plant.x.speed");
     workshop.write("cart.toml", text.replace("plant.force", "plant.u.force"));
     workshop.punctual(["run", "cart.toml", "--out", "out", "--require", "kept"]).success();
-}
-
-/// The JSON after `const <name> = ` in a page.
-#[track_caller]
-fn data(page: &str, name: &str) -> Value {
-    let (_, rest) = page.split_once(&format!("const {name} = ")).unwrap_or_else(|| panic!("no {name}"));
-    let line = rest.lines().next().and_then(|line| line.strip_suffix(';')).expect("a line of data");
-    serde_json::from_str(line).unwrap_or_else(|e| panic!("{name}: {e}"))
-}
-
-/// The page without its scripts and styles, as a tree.
-#[track_caller]
-fn body(page: &str) -> roxmltree::Document<'_> {
-    let (from, to) = (page.find("<main>").expect("a body"), page.find("</main>").expect("its end"));
-    roxmltree::Document::parse(&page[from..to + "</main>".len()]).expect("well-formed HTML")
-}
-
-/// The texts of the cells of a table, row after row.
-fn cells(tree: &roxmltree::Document<'_>) -> Vec<Vec<String>> {
-    let rows = tree.descendants().filter(|node| node.has_tag_name("tr"));
-    let text =
-        |node: roxmltree::Node<'_, '_>| node.descendants().filter_map(|n| n.text()).next().map(str::to_owned);
-    rows.map(|row| row.children().filter(|cell| cell.is_element()).filter_map(text).collect()).collect()
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod misbehaving;
 mod mistakes;
 mod models;
 mod packing;
+mod page;
 mod plugins;
 mod reproducing;
 mod running;
