@@ -11,6 +11,7 @@ mod building;
 mod campaigns;
 mod checking;
 mod demonstrating;
+mod failing;
 mod help;
 mod hostile;
 mod in_process;
