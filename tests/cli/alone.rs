@@ -289,6 +289,35 @@ fn what_cannot_be_run_alone_is_told() {
 }
 
 #[test]
+fn units_are_the_second_line_where_they_are_asked_for() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 0.1"));
+    workshop.punctual(["run", "car.toml"]).success();
+    let plain = workshop.text("car/car.csv");
+    for more in [&["--units"][..], &["--units", "--isolate"]] {
+        workshop.punctual([&["run", "car.toml", "--out", "with"], more].concat()).success();
+        let with = workshop.text("with/car.csv");
+        let (header, rest) = with.split_once('\n').expect("lines");
+        let (units, rows) = rest.split_once('\n').expect("lines");
+        // Without that line it is what it is without the option.
+        assert_eq!(format!("{header}\n{rows}"), plain);
+        let units: Vec<_> = header.split(',').zip(units.split(',')).collect();
+        assert_eq!(header.split(',').count(), units.len());
+        for (column, unit) in [
+            ("time", "s"),
+            ("filter.u.a", "m/s2"),
+            ("filter.u.omega", "rad/s"),
+            ("filter.goal.h", "m"),
+            ("plant.x.x_p", "m"),
+            ("plant.x.v", "m/s"),
+            ("filter.status", ""),
+        ] {
+            assert!(units.contains(&(column, unit)), "{column} in {unit}: {units:?}");
+        }
+    }
+}
+
+#[test]
 fn two_vehicles_in_one_model_avoid_each_other() {
     let workshop = Workshop::new();
     workshop

@@ -69,7 +69,7 @@ fn couple(
     if let Some(failure) = outcome.failure {
         return Err(failure);
     }
-    outcome.recording.save_csv(&folder.join(format!("{}.csv", case.stem())))?;
+    outcome.recording.save_csv(&folder.join(format!("{}.csv", case.stem())), false)?;
     let summary = Summary::new(&case, &outcome.recording, outcome.statistics.steps_per_second())?;
     Ok(Run { case, recording: outcome.recording, summary })
 }
