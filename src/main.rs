@@ -31,7 +31,7 @@ enum Command {
     Build(build::Arguments),
     /// Check a configuration before it is built: relative degree, rates, guarantee from a start, warnings
     Check(check::Arguments),
-    /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
+    /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours; then with bounds, past a rock
     Demo(demo::Arguments),
     /// Compare the paper's tables and figures with ours and with other methods; write CSV, SVG and a page
     Reproduce(reproduce::Arguments),
