@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use punctual_fmu::configuration::ConfigurationError;
+use serde::Serialize;
 
 use crate::host::{LogMessage, Status};
 
@@ -25,6 +26,26 @@ enum Kind {
     Broken { what: String, how: String },
     Plot { path: PathBuf, message: String },
     Interrupted { time: f64 },
+}
+
+/// An error as `--json` prints it.
+#[derive(Debug, PartialEq, Eq, Serialize)]
+pub struct Details {
+    /// What is at fault: `usage`, `configuration`, `file`, `fmu`, `call`, `process`, `picture`, or `interrupted`.
+    pub kind: &'static str,
+    /// The exit code.
+    pub code: u8,
+    /// The file it is about.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// The component of the system, or the instance that was called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub component: Option<String>,
+    /// The path in the file, or the option.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
+    /// What is wrong with it.
+    pub message: String,
 }
 
 /// Reasons why an `.fmu` file cannot be used.
@@ -235,6 +256,33 @@ impl Error {
             Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => 2,
             Kind::Interrupted { .. } => INTERRUPTED,
         }
+    }
+}
+
+impl Error {
+    /// The error in parts.
+    pub fn details(&self) -> Details {
+        let shown = |path: &Path| Some(path.display().to_string());
+        let (kind, file, component, field, message) = match &*self.0 {
+            Kind::Configuration { file, error } => {
+                let field = Some(error.field().to_owned()).filter(|field| !field.is_empty());
+                let file = file.as_deref().and_then(shown);
+                ("configuration", file, None, field, error.message().to_owned())
+            }
+            Kind::Io { action, path, source } => {
+                ("file", shown(path), None, None, format!("cannot {action} it: {source}"))
+            }
+            Kind::Fmu { component, path, problem } => {
+                ("fmu", shown(path), component.clone(), None, problem.to_string())
+            }
+            Kind::Call(failure) => {
+                ("call", shown(&failure.path), Some(failure.instance.clone()), None, failure.to_string())
+            }
+            Kind::Plot { path, message } => ("picture", shown(path), None, None, message.clone()),
+            Kind::Broken { .. } => ("process", None, None, None, self.to_string()),
+            Kind::Interrupted { .. } => ("interrupted", None, None, None, self.to_string()),
+        };
+        Details { kind, code: self.exit_code(), file, component, field, message }
     }
 }
 

@@ -18,7 +18,7 @@
 //! package              from a configuration to an .fmu file, from a system to an .ssp file, FMUs merged
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! output               the one place that prints
-//! report               a run as a page, with an animation
+//! report               a run as a page, with an animation; a campaign as a page
 //! reproduce            the study: the paper's tables and figures beside ours and the literature's; the demonstration
 //! command              one thin function per subcommand
 //! ```

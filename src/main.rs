@@ -8,7 +8,9 @@ use clap::{CommandFactory, Parser, Subcommand};
 use punctual::command::{
     build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, shell, validate,
 };
+use punctual::error::Details;
 use punctual::output;
+use serde::Serialize;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
 ///
@@ -29,7 +31,7 @@ enum Command {
     Build(build::Arguments),
     /// Check a configuration before it is built: relative degree, rates, guarantee from a start, warnings
     Check(check::Arguments),
-    /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours
+    /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours; then with bounds, past a rock
     Demo(demo::Arguments),
     /// Compare the paper's tables and figures with ours and with other methods; write CSV, SVG and a page
     Reproduce(reproduce::Arguments),
@@ -57,8 +59,32 @@ enum Command {
     TryPlugin(build::TryPluginArguments),
 }
 
+/// The exit code of wrong usage, as clap has it.
+const USAGE: u8 = 2;
+
+/// What stdout gets under `--json` where a command fails.
+#[derive(Serialize)]
+struct Failure {
+    error: Details,
+}
+
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    let tell = |error: Details| {
+        if wants_json {
+            output::json(&Failure { error });
+        }
+    };
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        // Help and version are no errors.
+        if error.use_stderr() {
+            let words = error.render().to_string();
+            let message = words.trim_start_matches("error: ").trim_end().to_owned();
+            tell(Details { kind: "usage", code: USAGE, file: None, component: None, field: None, message });
+        }
+        error.exit()
+    });
+    let result = match arguments.command {
         Command::Build(arguments) => build::execute(&arguments),
         Command::Campaign(arguments) => campaign::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
@@ -78,6 +104,7 @@ fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
+            tell(error.details());
             output::error(&error);
             ExitCode::from(error.exit_code())
         }

@@ -88,41 +88,49 @@ impl Recording {
         self.values[start.min(self.values.len())..].iter().copied().step_by(n.max(1))
     }
 
-    /// Writes the table as CSV: a header of `time` and the column names, then rows of numbers that
-    /// read back to the same doubles.
+    /// Writes the table as CSV: a header of `time` and the column names, with `units` a line of these, then rows of numbers
+    /// that read back to the same doubles.
     ///
     /// # Errors
     ///
     /// As the writer's.
-    pub fn write_csv(&self, mut out: impl Write) -> io::Result<()> {
-        write_header(&mut out, &self.columns)?;
+    pub fn write_csv(&self, mut out: impl Write, units: bool) -> io::Result<()> {
+        write_header(&mut out, &self.columns, units)?;
         for (index, time) in self.times.iter().enumerate() {
             write_row(&mut out, *time, self.row(index))?;
         }
         out.flush()
     }
 
-    /// Writes the table as a CSV file.
+    /// Writes the table as a CSV file, as [`Recording::write_csv`] does.
     ///
     /// # Errors
     ///
     /// The file cannot be made or written.
-    pub fn save_csv(&self, path: &Path) -> Result<(), Error> {
-        whole::write_with(path, |out| self.write_csv(out))
+    pub fn save_csv(&self, path: &Path, units: bool) -> Result<(), Error> {
+        whole::write_with(path, |out| self.write_csv(out, units))
     }
 }
 
-/// Writes the first line of the CSV form.
+/// Writes the first line of the CSV form, and with `units` the second, where a column without one has an empty field.
 ///
 /// # Errors
 ///
 /// As the writer's.
-pub fn write_header(out: &mut impl Write, columns: &[Column]) -> io::Result<()> {
+pub fn write_header(out: &mut impl Write, columns: &[Column], units: bool) -> io::Result<()> {
     write!(out, "time")?;
     for column in columns {
         write!(out, ",{}", quoted(&column.name))?;
     }
-    writeln!(out)
+    writeln!(out)?;
+    if units {
+        write!(out, "s")?;
+        for column in columns {
+            write!(out, ",{}", quoted(column.unit.as_deref().unwrap_or_default()))?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 /// Writes one line of the CSV form.
@@ -173,13 +181,25 @@ mod tests {
     #[test]
     fn csv_reads_back_to_the_same_doubles() {
         let mut text = Vec::new();
-        recording().write_csv(&mut text).unwrap();
+        recording().write_csv(&mut text, false).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert_eq!(text, "time,a.x,\"a.y[1,2]\"\n0,0.30000000000000004,-0\n0.001,1.5e-300,inf\n");
         let line = text.lines().nth(1).unwrap();
         let numbers: Vec<f64> = line.split(',').map(|n| n.parse().unwrap()).collect();
         assert_eq!(numbers[1].to_bits(), (0.1_f64 + 0.2).to_bits());
         assert_eq!(numbers[2].to_bits(), (-0.0_f64).to_bits());
+    }
+
+    #[test]
+    fn units_are_a_line_of_their_own() {
+        let column =
+            |name: &str, unit: Option<&str>| Column { name: name.into(), unit: unit.map(str::to_owned) };
+        let mut recording =
+            Recording::new(vec![column("a.v", Some("m/s")), column("a.n", None), column("a.x", Some("a,b"))]);
+        recording.push(0.0, &[1.0, 2.0, 3.0]);
+        let mut text = Vec::new();
+        recording.write_csv(&mut text, true).unwrap();
+        assert_eq!(String::from_utf8(text).unwrap(), "time,a.v,a.n,a.x\ns,m/s,,\"a,b\"\n0,1,2,3\n");
     }
 
     #[test]
@@ -197,7 +217,7 @@ mod tests {
         let mut recording = Recording::new(vec![]);
         recording.push(0.0, &[]);
         let mut text = Vec::new();
-        recording.write_csv(&mut text).unwrap();
+        recording.write_csv(&mut text, false).unwrap();
         assert_eq!(text, b"time\n0\n");
     }
 }

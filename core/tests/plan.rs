@@ -1134,3 +1134,34 @@ fn at_the_edge_the_input_does_not_chatter() {
     // It comes to rest, once; it moved 14 times as far while the wish was followed to the margin of plans.
     assert!(moved < 2.0 * BOUND, "{moved}");
 }
+
+/// On the way, a wish that never lets go is followed as far as a plan allows. The input slides there, and does not jump between
+/// the wish and the plan.
+#[test]
+fn on_the_way_the_input_does_not_jump_to_and_fro() {
+    const BOUND: f64 = 4.0;
+    let goal = DistanceDisc::new([25.0, 15.0], 2.0, 0.5).expect("valid disc");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("goal", Unicycle, goal, BarrierSettings::within(10.0))
+        .and_then(|b| b.bounds(&[-BOUND, -1.5], &[BOUND, 1.5]))
+        .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+    let (mut x, mut u, mut last, mut turns) = ([0.0, 0.0, -2.0, 3.0], [0.0; 2], [0.0; 4], 0);
+    for k in 0..(12.0 / PERIOD) as usize {
+        let t = k as f64 * PERIOD;
+        let wish = [0.5 * (6.0 - x[3]), 0.2];
+        let assurance = *filter.step(t, &x, &wish, &mut u).expect("right dimensions");
+        assert!(assurance.is_assured(), "at {t}: {assurance:?}");
+        for i in 0..2 {
+            // A jump that undoes most of the one before.
+            let (by, before) = (u[i] - last[i], last[i + 2]);
+            turns += u32::from(by * before < 0.0 && by.abs().min(before.abs()) > 0.1 * BOUND);
+            (last[i], last[i + 2]) = (u[i], by);
+        }
+        x = Vehicle::Unicycle.move_by(x, u, PERIOD);
+    }
+    println!("turns {turns}");
+    assert!(turns <= 2, "{turns} jumps to and fro");
+}

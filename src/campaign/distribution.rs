@@ -1,8 +1,11 @@
 //! `[vary]`: the distribution of one number, as a function from (0, 1) to values.
 
+use std::fmt;
+
 use punctual_fmu::configuration::{ConfigurationError, Range};
 use serde::Deserialize;
 use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::statistics::Distribution as _;
 
 /// `[vary."component.variable"]`: the keys that its `distribution` needs, and no other.
 #[derive(Clone, Debug, Deserialize)]
@@ -163,6 +166,32 @@ impl VarySection {
             return Err(wrong("mean", message));
         }
         Ok(Distribution::Normal { normal, min, max })
+    }
+}
+
+/// The distribution in words, without its unit.
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Uniform { min, max } => write!(f, "uniform from {min} to {max}"),
+            Self::LogUniform { min, max } => write!(f, "log-uniform from {min} to {max}"),
+            Self::Normal { normal, min, max } => {
+                let [mean, deviation] = [normal.mean(), normal.std_dev()].map(Option::unwrap_or_default);
+                write!(f, "normal, mean {mean}, deviation {deviation}")?;
+                if min.is_finite() {
+                    write!(f, ", from {min}")?;
+                }
+                if max.is_finite() {
+                    write!(f, ", to {max}")?;
+                }
+                Ok(())
+            }
+            Self::Choice(values) => {
+                let values: Vec<_> = values.iter().map(ToString::to_string).collect();
+                write!(f, "one of {}", values.join(", "))
+            }
+            Self::Seed => f.write_str("the seed of the run"),
+        }
     }
 }
 

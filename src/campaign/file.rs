@@ -128,7 +128,7 @@ pub struct Varied {
     /// Its value reference.
     pub reference: u32,
     /// Its distribution.
-    distribution: Distribution,
+    pub distribution: Distribution,
 }
 
 /// The numbers drawn for one run.
@@ -146,7 +146,9 @@ pub struct Campaign {
     system: System,
     models: Vec<Own>,
     varied: Vec<Varied>,
+    sampling: Sampling,
     sampler: Sampler,
+    seed: u64,
     runs: u64,
     success: Success,
 }
@@ -265,7 +267,7 @@ impl Campaign {
         check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
-        Ok(Self { source, system, models, varied, sampler, runs, success })
+        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success })
     }
 
     /// The texts it is made of.
@@ -286,6 +288,16 @@ impl Campaign {
     /// The varied variables, by name.
     pub fn varied(&self) -> &[Varied] {
         &self.varied
+    }
+
+    /// How the runs are spread over what is varied.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// The seed of the campaign.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// The number of runs.

@@ -116,6 +116,7 @@ impl PartialEq for Kept {
 #[derive(Debug, Serialize)]
 pub struct Summary {
     /// Number of runs.
+    #[serde(skip)]
     pub runs: u64,
     /// The successful runs.
     pub success: Rate,

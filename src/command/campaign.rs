@@ -1,14 +1,16 @@
 //! `punctual campaign`: many runs of a system from what a campaign file draws.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use serde::Serialize;
 
-use crate::campaign::{self, Campaign, Measures, Options, Rate, Summary};
+use crate::campaign::{self, Campaign, Measures, Options, Rate, Reader, Summary};
 use crate::error::{Error, INTERRUPTED};
 use crate::output::{self, Counter, number};
+use crate::report::campaign::{Pages, pages as campaign_pages};
+use crate::whole;
 
 /// Lines of a list that are printed at once.
 const AT_ONCE: usize = 1000;
@@ -31,6 +33,10 @@ pub struct Arguments {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
+    /// Write a page for a browser and a picture beside the Parquet file: success over what was varied, arrivals against
+    /// the deadline, the worst runs
+    #[arg(long, conflicts_with = "list")]
+    report: bool,
     /// Exit with code 1 unless every run succeeded
     #[arg(long, value_enum, value_name = "WHAT")]
     require: Option<Requirement>,
@@ -78,6 +84,9 @@ struct Report {
     runs: u64,
     wall_time: f64,
     runs_per_second: f64,
+    /// The page and the picture, where they are asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    report: Vec<String>,
     #[serde(flatten)]
     summary: Option<Summary>,
 }
@@ -94,6 +103,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let output = arguments.output.clone();
     let output = output.unwrap_or_else(|| arguments.campaign.with_extension("parquet"));
+    if let Some(ending) = output.extension().filter(|e| arguments.report && (*e == "html" || *e == "svg")) {
+        let message = format!(
+            "ends in .{}, the ending of what --report writes beside it; give another ending, such as .parquet",
+            ending.display()
+        );
+        return Err(Error::configuration("--output", message));
+    }
     // A second Ctrl-C ends the program at once, since the kept rows are safe.
     let stop = super::interruption()?;
     // Run.
@@ -104,12 +120,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 
     // Sum up.
     let complete = progress.done == campaign.runs();
-    let summary = if complete {
+    let (mut summary, mut pages) = (None, Vec::new());
+    if complete {
         let (reader, _) = campaign::recorded(&output)?;
-        Some(campaign::summary(&reader, &Measures::new(&campaign), arguments.worst)?)
-    } else {
-        None
-    };
+        let measures = Measures::new(&campaign);
+        let found = campaign::summary(&reader, &measures, arguments.worst)?;
+        if arguments.report {
+            pages = report_files(&arguments.campaign, &output, &campaign, &measures, &reader, &found)?;
+        }
+        summary = Some(found);
+    }
     let seconds = progress.wall_time.as_secs_f64();
     let report = Report {
         campaign: arguments.campaign.display().to_string(),
@@ -119,6 +139,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         runs: campaign.runs(),
         wall_time: seconds,
         runs_per_second: (progress.done - progress.before) as f64 / seconds.max(1e-9),
+        report: pages,
         summary,
     };
     // Tell.
@@ -144,6 +165,28 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Writes the page and the picture beside `output`. Returns their paths.
+fn report_files(
+    file: &Path,
+    output: &Path,
+    campaign: &Campaign,
+    measures: &Measures,
+    reader: &Reader,
+    summary: &Summary,
+) -> Result<Vec<String>, Error> {
+    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let results = output.display().to_string();
+    let Pages { page, picture } = campaign_pages(&name, &results, campaign, measures, reader, summary)?;
+    let mut files = Vec::new();
+    for (ending, text) in [("html", Some(page)), ("svg", picture)] {
+        let Some(text) = text else { continue };
+        let path = output.with_extension(ending);
+        whole::write(&path, text)?;
+        files.push(path.display().to_string());
+    }
+    Ok(files)
 }
 
 fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<ExitCode, Error> {
@@ -212,6 +255,7 @@ fn text(report: &Report, summary: &Summary) -> String {
     });
     format!(
         "{} runs{made}\n\n{parts}\n\n{spreads}\n\nthe worst\n{worst}\n\nwritten: {}{again}",
-        summary.runs, report.file
+        summary.runs,
+        std::iter::once(&report.file).chain(&report.report).cloned().collect::<Vec<_>>().join("\n         ")
     )
 }

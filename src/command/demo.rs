@@ -13,7 +13,7 @@ use crate::reproduce::demo::{self, Run, Summary};
 /// Arguments of `punctual demo`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Write configurations, FMUs, system files, CSV and pictures into this folder
+    /// Write configurations, FMUs, system files, CSV, pictures and pages into this folder
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
     /// The shared library to put into the FMUs [default: the one beside this program]
@@ -51,11 +51,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     } else {
         output::result(&text(&runs));
         output::note(&format!(
-            "written to {}: TOML configurations, FMUs, system files (punctual run), CSV and SVG pictures",
+            "written to {}: TOML configurations, FMUs, system files (punctual run), CSV, SVG pictures; to see: *-plans.html",
             arguments.out.display()
         ));
     }
-    let kept = runs.iter().all(|[_, ours]| ours.summary.kept(DEADLINE));
+    let kept = runs.iter().all(|[_, ours, hindered]| ours.kept() && hindered.kept());
     Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
@@ -64,13 +64,13 @@ fn entry(run: &Run) -> Entry<'_> {
         model: run.case.vehicle.key(),
         method: run.case.method,
         deadline: DEADLINE,
-        kept: run.summary.kept(DEADLINE),
+        kept: run.kept(),
         inputs: run.case.vehicle.inputs().iter().map(|signal| signal.name).collect(),
         summary: &run.summary,
     }
 }
 
-fn text(runs: &[[Run; 2]]) -> String {
+fn text(runs: &[[Run; 3]]) -> String {
     let header = [
         "model",
         "method",
@@ -103,7 +103,9 @@ fn text(runs: &[[Run; 2]]) -> String {
     }
     format!(
         "From rest at the origin into a disc of radius 2 m at (45, 45) m within {DEADLINE} s, 1 ms steps, to {} s.\n\
-         Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\"after\": from the deadline to the end of the run.\n\n{}",
+         Repeated root: the paper's method, h = R² - d², u_ref = 0. Reference profile: ours, distance-shaped h, u_ref = -v.\n\
+         Plans: ours with bounds on the inputs, around a rock, from a speed away from the disc; 10 ms steps, to 15 s.\n\
+         \"after\": from the deadline to the end of the run.\n\n{}",
         2.0 * DEADLINE,
         output::table(&rows, &[false, false, true, true, true, true, true, true, true])
     )

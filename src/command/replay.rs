@@ -99,7 +99,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 Some(folder) => {
                     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
                     let pictures = pictures(campaign.system(), &measures, &outcome.recording);
-                    write_files(&pictures, &format!("{}-{run}", stem(path)), folder, &outcome.recording)?
+                    write_files(
+                        &pictures,
+                        &format!("{}-{run}", stem(path)),
+                        folder,
+                        &outcome.recording,
+                        false,
+                    )?
                 }
                 None => Vec::new(),
             };

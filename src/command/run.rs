@@ -34,6 +34,9 @@ pub struct Arguments {
     /// Write a page for a browser into that folder too: verdicts, and the run as an animation with charts
     #[arg(long)]
     report: bool,
+    /// Write the unit of each column as the second line of the CSV file
+    #[arg(long)]
+    units: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -139,6 +142,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
         words.extend(["--out".into(), folder.into()]);
     }
     words.extend(arguments.report.then(|| "--report".into()));
+    words.extend(arguments.units.then(|| "--units".into()));
     words.extend(arguments.json.then(|| "--json".into()));
     if let Some(required) = arguments.require {
         words.extend(["--require".into(), required.word().into()]);
@@ -216,7 +220,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
     let columns = simulation.columns().to_vec();
-    stream(&mut rows, |line| recording::write_header(line, &columns));
+    stream(&mut rows, |line| recording::write_header(line, &columns, arguments.units));
     let outcome = simulation.run(|time, row| {
         stream(&mut rows, |line| recording::write_row(line, time, row));
         progress.update((time - experiment.start_time) / (experiment.stop_time - experiment.start_time));
@@ -226,7 +230,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     if let Some(failure) = outcome.failure {
         if let Some(folder) = &out {
             let csv = csv_file(path, folder);
-            outcome.recording.save_csv(&csv)?;
+            outcome.recording.save_csv(&csv, arguments.units)?;
             output::note(&format!("note: what was recorded until then is in {}", csv.display()));
         }
         return Err(failure);
@@ -239,7 +243,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
             [] => pictures::usual(&system, &models, &outcome),
             asked => asked.to_vec(),
         };
-        files = write_files(&usual, &stem(path), folder, &outcome.recording)?;
+        files = write_files(&usual, &stem(path), folder, &outcome.recording, arguments.units)?;
         if arguments.report {
             let page = folder.join(format!("{}.html", stem(path)));
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
@@ -271,16 +275,18 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.csv", stem(path)))
 }
 
-/// Writes the CSV file and the `pictures` into `folder`, which exists, under names that begin with `stem`.
+/// Writes the CSV file, with `units` or without, and the `pictures` into `folder`, which exists, under names that begin with
+/// `stem`.
 /// Returns their paths.
 pub(super) fn write_files(
     pictures: &[Picture],
     stem: &str,
     folder: &Path,
     recording: &Recording,
+    units: bool,
 ) -> Result<Vec<String>, Error> {
     let csv = folder.join(format!("{stem}.csv"));
-    recording.save_csv(&csv)?;
+    recording.save_csv(&csv, units)?;
     let mut files = vec![csv];
     for (i, picture) in pictures.iter().enumerate() {
         let name = picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);

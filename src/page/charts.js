@@ -153,6 +153,17 @@ const views = (() => {
       const near = (v) => Math.max(-far, Math.min(far, v));
       for (const c of curves) {
         if (!c.shown) continue;
+        if (c.style === "points" || c.style === "crosses") {
+          const dots = c.style === "points";
+          let d = "";
+          for (let i = 0; i < c.px.length; i++) {
+            const [x, y] = [X(c.px[i]), Y(c.py[i])];
+            if (inside([x, y])) d += dots ? `M${x.toFixed(1)} ${y.toFixed(1)}h0` : `M${(x - 3).toFixed(1)} ${(y - 3).toFixed(1)}l6 6m0 -6l-6 6`;
+          }
+          make("path", { d, class: "curve", fill: "none", stroke: colour(c.colour), "stroke-width": dots ? 5 : 2, "stroke-linecap": "round",
+            "stroke-opacity": dots ? 0.75 : 1 }, inner);
+          continue;
+        }
         let d = "", pen = false, last = 0;
         for (let i = 0; i < c.px.length; i++) {
           if (!Number.isFinite(c.px[i]) || !Number.isFinite(c.py[i])) { pen = false; continue; }
@@ -162,7 +173,7 @@ const views = (() => {
           pen = true;
           last = y;
         }
-        make("path", { d, class: "curve", fill: "none", stroke: colour(c.colour), "stroke-width": 2, "stroke-linejoin": "round",
+        make("path", { d, class: "curve", fill: "none", color: colour(c.colour), stroke: colour(c.colour), "stroke-width": 2, "stroke-linejoin": "round",
           ...(c.style === "dashed" ? { "stroke-dasharray": "7 4" } : {}) }, inner);
         if (c.dots) for (let i = 0; i < c.px.length; i++) {
           if (Number.isFinite(c.py[i])) make("circle", { cx: X(c.px[i]), cy: Y(c.py[i]), r: 3, fill: colour(c.colour) }, inner);
@@ -185,9 +196,8 @@ const views = (() => {
       return [((event.clientX - box.left) / box.width) * view.width, ((event.clientY - box.top) / box.height) * view.height];
     };
     const inside = ([x, y]) => x >= area.left && x <= area.left + area.width && y >= area.top && y <= area.top + area.height;
-    const point = (at) => {
-      svg.cursor.textContent = "";
-      output.textContent = "";
+    // The point nearest to a place, if one is near.
+    const nearest = (at) => {
       let best = null;
       for (const c of curves) {
         if (!c.shown) continue;
@@ -197,9 +207,16 @@ const views = (() => {
           if (inside([x, y]) && (!best || away < best.away)) best = { away, c, i, x, y };
         }
       }
-      if (!best || best.away > 60) return;
+      return best && best.away <= 60 ? best : null;
+    };
+    const point = (at) => {
+      svg.cursor.textContent = "";
+      output.textContent = "";
+      const best = nearest(at);
+      if (!best) return;
       make("circle", { cx: best.x, cy: best.y, r: 5, fill: "none", stroke: "var(--ink)", "stroke-width": 2 }, svg.cursor);
-      output.textContent = `${best.c.label ? best.c.label + ": " : ""}${chart.x.label} = ${short(best.c.x[best.i])}, ` +
+      const label = best.c.names ? best.c.names[best.i] : best.c.label;
+      output.textContent = `${label ? label + ": " : ""}${chart.x.label} = ${short(best.c.x[best.i])}, ` +
         `${chart.y.label} = ${short(best.c.y[best.i])}`;
     };
     const zoom = (from, to) => {
@@ -281,21 +298,24 @@ const views = (() => {
       });
       key.className = "key";
       const line = document.createElement("i");
-      line.style.borderColor = colour(c.colour);
-      if (c.style === "dashed") line.className = "dashed";
+      line.style.borderColor = line.style.color = colour(c.colour);
+      if (c.style !== "solid") line.className = c.style;
       key.prepend(line);
     }
     render();
-    addEventListener("resize", render);
-    dark.addEventListener("change", render);
+    // Whoever draws another chart here ends this one.
+    holder.life?.abort();
+    holder.life = new AbortController();
+    addEventListener("resize", render, { signal: holder.life.signal });
+    dark.addEventListener("change", render, { signal: holder.life.signal });
     holder.dataset.drawn = String(curves.length);
-    views.set(holder.dataset.chart, Object.assign(seen, { svg, at: (event) => place(...where(event)) }));
+    return Object.assign(seen, { svg, at: (event) => place(...where(event)), nearest: (event) => nearest(where(event)) });
   };
 
   for (const [key, chart] of charts) {
     const holder = document.querySelector(`[data-chart="${key}"]`);
-    if (holder) draw(holder, chart);
+    if (holder) views.set(key, draw(holder, chart));
   }
   document.documentElement.dataset.ready = "yes";
-  return Object.assign(views, { make, colour, short });
+  return Object.assign(views, { draw, make, colour, short });
 })();

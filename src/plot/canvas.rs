@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use svg::node::element::{Circle, ClipPath, Definitions, Group, Polygon, Polyline, Rectangle, Text};
+use svg::node::element::{
+    Circle, ClipPath, Definitions, Group, Path as Strokes, Polygon, Polyline, Rectangle, Text,
+};
 use svg::{Document, Node};
 
 use crate::error::Error;
@@ -105,6 +107,20 @@ impl Canvas {
             line = line.set("stroke-dasharray", dash);
         }
         self.add(line);
+    }
+
+    /// Dots or crosses of the size that `pen` gives them, as one element, since there may be thousands.
+    pub(super) fn scattered(&mut self, points: impl Iterator<Item = Point>, crosses: bool, pen: Pen) {
+        let mark = |(x, y): Point| match crosses {
+            true => format!("M{} {}l6 6m0 -6l-6 6", fine(x - 3.0), fine(y - 3.0)),
+            false => format!("M{} {}h0", fine(x), fine(y)),
+        };
+        let strokes = Strokes::new()
+            .set("d", points.map(mark).collect::<String>())
+            .set("stroke", hex(pen.colour))
+            .set("stroke-width", pen.width)
+            .set("stroke-linecap", "round");
+        self.add(strokes);
     }
 
     /// A filled polygon.

@@ -122,7 +122,12 @@ impl Chart {
 
     fn entries(&self) -> Vec<Entry> {
         let labelled = self.curves.iter().filter(|curve| !curve.label.is_empty());
-        let mut entries: Vec<Entry> = labelled.map(|c| (Key::Line(pen(c)), c.label.clone())).collect();
+        let key = |curve: &Curve| match curve.style {
+            Style::Points => Key::Dot(pen(curve)),
+            Style::Crosses => Key::Cross(pen(curve)),
+            _ => Key::Line(pen(curve)),
+        };
+        let mut entries: Vec<Entry> = labelled.map(|c| (key(c), c.label.clone())).collect();
         for (index, key, label) in [(0, Key::Start, "start"), (1, Key::Arrival, "arrival")] {
             if self.curves.iter().any(|curve| curve.ends[index].is_some()) {
                 entries.push((key, label.to_owned()));
@@ -137,7 +142,8 @@ impl Chart {
 
 fn pen(curve: &Curve) -> Pen {
     let dash = (curve.style == Style::Dashed).then_some((7.0, 4.0));
-    Pen { colour: colour(curve.colour), width: 1.9, dash }
+    let width = if curve.style == Style::Points { 4.6 } else { 1.9 };
+    Pen { colour: colour(curve.colour), width, dash }
 }
 
 pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
@@ -169,11 +175,13 @@ pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
     marks(chart, &axes, canvas);
     for curve in curves() {
         let points = || curve.x.iter().copied().zip(curve.y.iter().copied());
+        if matches!(curve.style, Style::Points | Style::Crosses) {
+            let places = points().map(|(x, y)| axes.place(x, y)).filter(|at| inside(area, at));
+            canvas.scattered(places, curve.style == Style::Crosses, pen(curve));
+            continue;
+        }
         axes.curve(canvas, points(), pen(curve), curve.style == Style::Steps);
-        let inside = |(x, y): &(f64, f64)| {
-            (area[0]..=area[2]).contains(x) && (area[1] - 1.0..=area[3] + 1.0).contains(y)
-        };
-        let place = |[x, y]: [f64; 2]| Some(axes.place(x, y)).filter(inside);
+        let place = |[x, y]: [f64; 2]| Some(axes.place(x, y)).filter(|at| inside(area, at));
         for point in points().filter(|_| curve.dots).filter_map(|(x, y)| place([x, y])) {
             canvas.circle(point, 3.2, (colour(curve.colour), 1.0), Pen::solid(colour(curve.colour), 1.0));
         }
@@ -186,6 +194,11 @@ pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
     }
     legend::draw(canvas, &legend, (area[0], area[3] + 52.0));
     Ok(())
+}
+
+/// Whether a point lies in the rectangle, or as good as.
+fn inside(area: [f64; 4], (x, y): &(f64, f64)) -> bool {
+    (area[0]..=area[2]).contains(x) && (area[1] - 1.0..=area[3] + 1.0).contains(y)
 }
 
 fn marks(chart: &Chart, axes: &Axes, canvas: &mut Canvas) {
@@ -234,6 +247,23 @@ mod tests {
         }
         assert_eq!(svg.matches("<circle").count(), 2);
         assert!(crate::plot::chart(&Chart::default(), "test").is_err());
+    }
+
+    #[test]
+    fn points_without_a_line_are_one_element_without_what_is_not_finite() {
+        let curve = |style, label: &str| Curve {
+            label: label.into(),
+            x: vec![0.0, 1.0, f64::NAN],
+            y: vec![2.0, 3.0, 4.0],
+            style,
+            ..Curve::default()
+        };
+        let curves = vec![curve(Style::Points, "dots"), curve(Style::Crosses, "crosses")];
+        let svg = crate::plot::chart(&Chart { curves, ..Chart::default() }, "test").expect("points");
+        // Two of the curve, and one in the legend.
+        assert_eq!((svg.matches("h0").count(), svg.matches("l6 6m0 -6l-6 6").count()), (3, 3), "{svg}");
+        assert_eq!(svg.matches("<path").count(), 4);
+        assert!(!svg.contains("NaN"), "{svg}");
     }
 
     #[test]

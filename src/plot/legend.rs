@@ -13,6 +13,10 @@ const KEY: f64 = 26.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Line(Pen),
+    /// A dot.
+    Dot(Pen),
+    /// A cross.
+    Cross(Pen),
     /// Fill colour, its opacity, and the rim.
     Patch([u8; 3], f64, Pen),
     Start,
@@ -35,6 +39,8 @@ pub(super) fn draw(canvas: &mut Canvas, entries: &[Entry], at: Point) {
         let middle = ((left + right) / 2.0, y);
         match *key {
             Key::Line(pen) => canvas.line(&[(left, y), (right, y)], pen),
+            Key::Dot(pen) => canvas.scattered([middle].into_iter(), false, pen),
+            Key::Cross(pen) => canvas.scattered([middle].into_iter(), true, pen),
             Key::Patch(colour, opacity, pen) => {
                 let corners = [(left, y - 6.0), (right, y - 6.0), (right, y + 6.0), (left, y + 6.0)];
                 canvas.polygon(&corners, colour, opacity);

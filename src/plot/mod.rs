@@ -148,7 +148,7 @@ pub struct Series {
     pub colour: Option<usize>,
 }
 
-/// Styles of a line.
+/// Styles of a line. Points without one are for charts only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -159,6 +159,10 @@ pub enum Style {
     Dashed,
     /// Held from point to point: sampled inputs. In a path the same as solid.
     Steps,
+    /// No line: a dot at each point.
+    Points,
+    /// No line: a cross at each point.
+    Crosses,
 }
 
 /// A straight line across the picture.

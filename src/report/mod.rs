@@ -1,5 +1,7 @@
-//! A run as one page of HTML: what became of each promise, the path as an animation, h and the inputs over time.
+//! A run as one page of HTML: what became of each promise, the path as an animation, h and the inputs over time. And a
+//! [`campaign`] as one.
 
+pub mod campaign;
 mod scene;
 
 use std::fmt::Write;

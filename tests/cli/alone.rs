@@ -5,6 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
+use crate::page::{body, cells, data};
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -70,29 +71,6 @@ fn a_new_file_for_an_fmu_runs_with_one() {
     let text = text.replace("plant.position", "plant.x.position").replace("plant.speed", "plant.x.speed");
     workshop.write("cart.toml", text.replace("plant.force", "plant.u.force"));
     workshop.punctual(["run", "cart.toml", "--out", "out", "--require", "kept"]).success();
-}
-
-/// The JSON after `const <name> = ` in a page.
-#[track_caller]
-fn data(page: &str, name: &str) -> Value {
-    let (_, rest) = page.split_once(&format!("const {name} = ")).unwrap_or_else(|| panic!("no {name}"));
-    let line = rest.lines().next().and_then(|line| line.strip_suffix(';')).expect("a line of data");
-    serde_json::from_str(line).unwrap_or_else(|e| panic!("{name}: {e}"))
-}
-
-/// The page without its scripts and styles, as a tree.
-#[track_caller]
-fn body(page: &str) -> roxmltree::Document<'_> {
-    let (from, to) = (page.find("<main>").expect("a body"), page.find("</main>").expect("its end"));
-    roxmltree::Document::parse(&page[from..to + "</main>".len()]).expect("well-formed HTML")
-}
-
-/// The texts of the cells of a table, row after row.
-fn cells(tree: &roxmltree::Document<'_>) -> Vec<Vec<String>> {
-    let rows = tree.descendants().filter(|node| node.has_tag_name("tr"));
-    let text =
-        |node: roxmltree::Node<'_, '_>| node.descendants().filter_map(|n| n.text()).next().map(str::to_owned);
-    rows.map(|row| row.children().filter(|cell| cell.is_element()).filter_map(text).collect()).collect()
 }
 
 #[test]
@@ -308,6 +286,35 @@ fn what_cannot_be_run_alone_is_told() {
         2,
         "plant.toml: kind: is \"plant\"; must be \"filter\", which runs with its own model, or a system file, which couples components",
     );
+}
+
+#[test]
+fn units_are_the_second_line_where_they_are_asked_for() {
+    let workshop = Workshop::new();
+    workshop.write("car.toml", CAR.replace("stop_time = 3.0", "stop_time = 0.1"));
+    workshop.punctual(["run", "car.toml"]).success();
+    let plain = workshop.text("car/car.csv");
+    for more in [&["--units"][..], &["--units", "--isolate"]] {
+        workshop.punctual([&["run", "car.toml", "--out", "with"], more].concat()).success();
+        let with = workshop.text("with/car.csv");
+        let (header, rest) = with.split_once('\n').expect("lines");
+        let (units, rows) = rest.split_once('\n').expect("lines");
+        // Without that line it is what it is without the option.
+        assert_eq!(format!("{header}\n{rows}"), plain);
+        let units: Vec<_> = header.split(',').zip(units.split(',')).collect();
+        assert_eq!(header.split(',').count(), units.len());
+        for (column, unit) in [
+            ("time", "s"),
+            ("filter.u.a", "m/s2"),
+            ("filter.u.omega", "rad/s"),
+            ("filter.goal.h", "m"),
+            ("plant.x.x_p", "m"),
+            ("plant.x.v", "m/s"),
+            ("filter.status", ""),
+        ] {
+            assert!(units.contains(&(column, unit)), "{column} in {unit}: {units:?}");
+        }
+    }
 }
 
 #[test]

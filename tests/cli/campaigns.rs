@@ -8,6 +8,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use punctual::campaign::{self, Campaign, Cell, Measures, Row};
 use serde_json::Value;
 
+use crate::page::{body, cells, data};
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -356,6 +357,149 @@ fn each_defect_is_told_with_its_field() {
     fails("plant.x0.x_p", "filter.goal.deadline", deadline, "is 0, must be finite and >= 1e-9");
     let missing = "cannot read nothing.toml: ";
     campaign("\"system.toml\"", "\"nothing.toml\"").fails_like(2, missing, &[]);
+}
+
+/// The numbers of a list of JSON; NaN for what is none.
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().expect("a list").iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect()
+}
+
+/// The page of a campaign, against its rows.
+#[test]
+fn a_report_has_the_runs_and_how_to_see_them_again() {
+    let workshop = workshop(40, "sobol");
+    let report = workshop.punctual(["campaign", "c.toml", "--report", "--json"]).success();
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!(report["report"], serde_json::json!(["c.html", "c.svg"]));
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    let column = |name: &str| -> Vec<Option<f64>> {
+        let c = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no {name}"));
+        rows.iter().map(|row| number(&row[c])).collect()
+    };
+    let count = |name: &str| column(name).iter().filter(|flag| **flag == Some(1.0)).count();
+    let page = workshop.text("c.html");
+    // The name of SVG elements is no address that is asked.
+    assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"), "an address");
+    // Every run has its place, and every number that differs is an axis.
+    let scene = data(&page, "scene");
+    assert_eq!(numbers(&scene["runs"]), (0..40).map(f64::from).collect::<Vec<_>>());
+    let good: Vec<Option<f64>> = scene["good"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|good| good.as_bool().map(|good| f64::from(u8::from(good))))
+        .collect();
+    assert_eq!(good, column("success"));
+    let axes = scene["axes"].as_array().expect("a list");
+    let labels: Vec<&str> = axes.iter().filter_map(|axis| axis["label"].as_str()).collect();
+    assert_eq!(
+        labels[..4],
+        ["filter.u_max.a (m/s2)", "filter.u_min.a (m/s2)", "plant.x0.v (m/s)", "plant.x0.x_p (m)"],
+        "what was varied, but for plant.inner_step, which has one value"
+    );
+    for axis in axes {
+        let name = axis["label"].as_str().and_then(|label| label.split(' ').next()).expect("a label");
+        for (drawn, recorded) in numbers(&axis["values"]).iter().zip(column(name)) {
+            // Seven digits are kept.
+            let same = recorded.map_or(drawn.is_nan(), |v| (drawn - v).abs() <= 1e-6 * v.abs());
+            assert!(same, "{name}: {drawn}, not {recorded:?}");
+        }
+    }
+    // The lower bound decides, not the start: it is shown first.
+    assert!(numbers(&scene["shown"]).contains(&1.0), "{}", scene["shown"]);
+    let picture = workshop.text("c.svg");
+    // A mark for each run that fails, and one in the legend.
+    assert_eq!(picture.matches("l6 6m0 -6l-6 6").count(), 40 - count("success") + 1);
+    // The bars count what the rows say, on the side of the deadline where it was.
+    let arrivals = &scene["arrivals"][0];
+    let (on_time, arrived) =
+        (count("filter.goal.on_time"), column("filter.goal.arrival").iter().flatten().count());
+    let said = format!(
+        "filter.goal: of 40 runs {on_time} arrive by the deadline, {} later, {} not in their time.",
+        arrived - on_time,
+        40 - arrived
+    );
+    assert_eq!(arrivals["said"], said);
+    assert_eq!(arrivals["chart"]["verticals"][0]["at"], 10.0);
+    let curves = arrivals["chart"]["curves"].as_array().expect("a list");
+    let heights = |label: &str| {
+        let curve =
+            curves.iter().find(|curve| curve["label"] == label).unwrap_or_else(|| panic!("no {label}"));
+        (numbers(&curve["x"]), numbers(&curve["y"]).iter().sum::<f64>())
+    };
+    let ((early, before), (late, after)) = (heights("on time"), heights("late"));
+    assert_eq!((before, after), (on_time as f64, (arrived - on_time) as f64));
+    assert!(early.iter().all(|t| *t <= 10.0) && late.iter().all(|t| *t >= 10.0), "{early:?}, {late:?}");
+    // The rate, what was varied, and the worst runs.
+    let tree = body(&page);
+    let texts: Vec<_> = tree.descendants().filter_map(|node| node.text()).collect();
+    let rate = format!("{} of 40 runs succeed: ", count("success"));
+    assert!(texts.iter().any(|text| text.starts_with(&rate)), "{texts:?}");
+    let [low, high] = [0, 1].map(|end| report["success"]["interval"][end].as_f64().expect("a number"));
+    let interval = texts.iter().find(|text| text.starts_with("The rate of success is ")).expect("a sentence");
+    let told: Vec<f64> = interval.split([' ', '\u{202f}']).filter_map(|word| word.parse().ok()).collect();
+    assert!((told[0] - 100.0 * low).abs() < 0.005 && (told[1] - 100.0 * high).abs() < 0.005, "{interval}");
+    assert!(interval.contains("a rough guide"), "{interval}");
+    let cells = cells(&tree);
+    let row = |name: &str| cells.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name}"));
+    assert_eq!(row("plant.x0.x_p")[1..3], ["uniform from 0 to 20", "m"]);
+    assert_eq!(row("plant.x0.v")[1..3], ["normal, mean 0, deviation 2", "m/s"]);
+    assert_eq!(row("filter.u_min.a")[1], "one of -20, -0.1, -0.1, 30");
+    let commands: Vec<_> =
+        tree.descendants().filter(|node| node.attribute("class") == Some("command")).collect();
+    let first = commands.iter().find_map(|node| node.text()).expect("a command");
+    assert_eq!(first, format!("punctual replay c.parquet --run {} --out out", report["worst"][0]["run"]));
+    workshop.punctual(first.split(' ').skip(1)).success();
+    // It is written anew without a run; and only where it does not take the place of the rows.
+    fs::remove_file(workshop.path("c.html")).expect("the page");
+    workshop.punctual(["campaign", "c.toml", "--report"]).success();
+    assert_eq!(workshop.text("c.html"), page);
+    workshop.punctual(["campaign", "c.toml", "--report", "-o", "c.html"]).fails(
+        2,
+        "--output: ends in .html, the ending of what --report writes beside it; give another ending, such as .parquet",
+    );
+}
+
+/// Deadlines that are varied, names that are no names, and nothing to choose from.
+#[test]
+fn a_report_counts_from_the_deadline_where_that_is_varied() {
+    let workshop = workshop(6, "random");
+    let name = "<!--<script>";
+    workshop.write(
+        "system.toml",
+        workshop
+            .text("system.toml")
+            .replace("\"filter\"", &format!("{name:?}"))
+            .replace("filter.u", &format!("{name}.u")),
+    );
+    let deadline =
+        format!("[vary.\"{name}.goal.deadline\"]\ndistribution = \"log_uniform\"\nmin = 6\nmax = 11\n");
+    let head = "system = \"system.toml\"\n[campaign]\nruns = 6\n";
+    workshop.write("c.toml", format!("{head}{deadline}"));
+    workshop.punctual(["campaign", "c.toml", "--report"]).success();
+    let page = workshop.text("c.html");
+    assert_eq!((page.matches("<script").count(), page.matches("<!--").count()), (1, 0));
+    let scene = data(&page, "scene");
+    assert_eq!((&scene["axes"][0]["logarithmic"], &scene["shown"][0]), (&true.into(), &0.into()));
+    let chart = &scene["arrivals"][0]["chart"];
+    assert_eq!(
+        (&chart["x"]["label"], &chart["verticals"][0]["at"]),
+        (&"arrival, from the deadline on (s)".into(), &0.0.into())
+    );
+    assert!(numbers(&chart["curves"][0]["x"]).iter().all(|t| (-11.0..=0.0).contains(t)), "{chart}");
+    // All runs alike: there is nothing to draw them over.
+    fs::remove_file(workshop.path("c.parquet")).expect("the rows");
+    fs::remove_file(workshop.path("c.svg")).expect("the picture");
+    workshop.write("c.toml", head);
+    workshop.punctual(["campaign", "c.toml", "--report"]).success();
+    let page = workshop.text("c.html");
+    assert_eq!(data(&page, "scene")["shown"], Value::Null);
+    assert!(
+        body(&page)
+            .descendants()
+            .any(|node| node.text().is_some_and(|text| text.starts_with("Nothing: all runs")))
+    );
+    assert!(!workshop.path("c.svg").exists());
 }
 
 /// An inline system, of configurations in place of FMUs, with a disturbance whose seed is the run's own.

@@ -5,6 +5,15 @@ use punctual_core::filter::Sampling;
 use crate::reproduce::baseline::Baseline;
 use crate::reproduce::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Shape, Vehicle};
 
+/// Sampling period of the hindered vehicles, in s.
+const HINDERED_STEP: f64 = 0.01;
+/// End of their runs, in s.
+const HINDERED_END: f64 = 15.0;
+/// Centre of the rock, in m: between start and disc.
+const ROCK: [f64; 2] = [22.0, 24.0];
+/// Its radius, in m.
+const ROCK_RADIUS: f64 = 5.0;
+
 /// A vehicle with a method in its setting, from rest in the origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
@@ -38,6 +47,58 @@ impl Case {
             ..paper
         };
         [paper, ours]
+    }
+
+    /// `vehicle` as it would be used: it moves the wrong way, its inputs have bounds, a rock is in its way, and u_ref only drives
+    /// on. With bounds on all inputs the filter follows plans.
+    pub fn hindered(vehicle: Vehicle) -> Self {
+        let setup =
+            Setup { step: HINDERED_STEP, end: HINDERED_END, ..Setup::advised(DEADLINE, HINDERED_STEP) };
+        let [_, ours] = Self::of(vehicle);
+        Self { setup, method: "plans", title: "plans, bounded, past a rock", ..ours }
+    }
+
+    /// The file of a hindered vehicle, which has its plant, its start and its u_ref too.
+    pub(super) fn alone(&self) -> String {
+        let (title, key) = (self.vehicle.title(), self.vehicle.key());
+        let [first, second] = [0, 1].map(|i| self.vehicle.inputs()[i].name);
+        let (start, bounds, wanted) = match self.vehicle {
+            Vehicle::PointMass => ("v_x = -4.0, v_y = -2.0", [5.0, 5.0], ["-1", "-1"]),
+            Vehicle::Unicycle => ("theta = -2.5, v = 4.0", [5.0, 1.5], ["1", "0"]),
+            Vehicle::Bicycle => ("theta = 0.8, v = -4.0", [5.0, 0.5], ["-1", "0"]),
+        };
+        let Setup { deadline, end, step, .. } = self.setup;
+        format!(
+            r#"# A {title} that begins the wrong way, with bounds on its inputs and a rock before it: `punctual run` takes this file.
+kind = "filter"
+name = "{key}_among_bounds"
+bounds = {{ {first} = [{low0:?}, {high0:?}], {second} = [{low1:?}, {high1:?}] }}
+x0 = {{ {start} }}
+u_ref = {{ {first} = "{wanted0}", {second} = "{wanted1}" }} # on and on
+experiment = {{ stop_time = {end:?}, step_size = {step:?} }} # s
+
+[plant]
+model = "{key}"
+
+[[barrier]]
+name = "goal"
+centre = {CENTRE:?} # m
+radius = {RADIUS:?} # m
+deadline = {deadline:?} # s
+
+[[barrier]]
+name = "rock"
+shape = "obstacle"
+centre = {ROCK:?} # m
+radius = {ROCK_RADIUS:?} # m
+"#,
+            low0 = -bounds[0],
+            high0 = bounds[0],
+            low1 = -bounds[1],
+            high1 = bounds[1],
+            wanted0 = wanted[0],
+            wanted1 = wanted[1],
+        )
     }
 
     /// Whether the method is the paper's, which is expected to be late.

@@ -1,4 +1,5 @@
-//! The demonstration: three vehicles, the paper's method and ours, each filter and plant an FMU, coupled through FMI.
+//! The demonstration: three vehicles, the paper's method and ours, each filter and plant an FMU, coupled through FMI. Then the
+//! same vehicles with bounds on their inputs, past a rock, each from one file.
 
 mod case;
 mod pictures;
@@ -11,11 +12,13 @@ use std::path::Path;
 
 use punctual_fmu::configuration::Configuration;
 
+use super::cases::DEADLINE;
 use super::{Vehicle, write};
-use crate::coupling::{Simulation, System};
+use crate::coupling::{self, Kept, Model, Own, Promise, Simulation, System};
 use crate::error::Error;
 use crate::package;
 use crate::recording::Recording;
+use crate::report;
 
 /// One coupled run.
 pub struct Run {
@@ -23,12 +26,21 @@ pub struct Run {
     pub case: Case,
     /// Its recording.
     pub recording: Recording,
+    /// What became of its promises.
+    pub promises: Vec<Promise>,
     /// The numbers of the table.
     pub summary: Summary,
 }
 
-/// Runs all cases, for each vehicle the paper's method and ours. Writes configurations, FMUs, system files, CSV
-/// and pictures into `folder`. `progress` hears of the fraction done (0 to 1).
+impl Run {
+    /// Whether it was in the disc in time and from then on, and every promise was kept.
+    pub fn kept(&self) -> bool {
+        self.summary.kept(DEADLINE) && self.promises.iter().all(|p| p.promise == Kept::Kept)
+    }
+}
+
+/// Runs all cases, for each vehicle the paper's method, ours, and ours as it would be used. Writes configurations, FMUs,
+/// system files, CSV, pictures and pages into `folder`. `progress` hears of the fraction done (0 to 1).
 ///
 /// # Errors
 ///
@@ -37,19 +49,20 @@ pub fn run(
     folder: &Path,
     library: Option<&Path>,
     mut progress: impl FnMut(f64),
-) -> Result<Vec<[Run; 2]>, Error> {
+) -> Result<Vec<[Run; 3]>, Error> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let mut runs = Vec::new();
     for (k, vehicle) in Vehicle::ALL.into_iter().enumerate() {
         let mut part = |j: usize, fraction: f64| {
-            progress(((2 * k + j) as f64 + fraction) / (2 * Vehicle::ALL.len()) as f64);
+            progress(((3 * k + j) as f64 + fraction) / (3 * Vehicle::ALL.len()) as f64);
         };
         let [paper, ours] = Case::of(vehicle);
         build(folder, &paper.plant_stem(), &paper.plant(), library)?;
         let paper = couple(paper, folder, library, |fraction| part(0, fraction))?;
         let ours = couple(ours, folder, library, |fraction| part(1, fraction))?;
         pictures::draw(vehicle, &paper, &ours, folder)?;
-        runs.push([paper, ours]);
+        let hindered = alone(Case::hindered(vehicle), folder, |fraction| part(2, fraction))?;
+        runs.push([paper, ours, hindered]);
     }
     Ok(runs)
 }
@@ -69,9 +82,32 @@ fn couple(
     if let Some(failure) = outcome.failure {
         return Err(failure);
     }
-    outcome.recording.save_csv(&folder.join(format!("{}.csv", case.stem())))?;
+    outcome.recording.save_csv(&folder.join(format!("{}.csv", case.stem())), false)?;
     let summary = Summary::new(&case, &outcome.recording, outcome.statistics.steps_per_second())?;
-    Ok(Run { case, recording: outcome.recording, summary })
+    Ok(Run { case, recording: outcome.recording, promises: outcome.promises, summary })
+}
+
+/// Runs the file of a hindered vehicle, and writes its page.
+fn alone(case: Case, folder: &Path, mut progress: impl FnMut(f64)) -> Result<Run, Error> {
+    let name = format!("{}.toml", case.stem());
+    let (path, text) = (folder.join(&name), case.alone());
+    write(&path, &text)?;
+    let in_file = |e: Error| e.in_file(&path);
+    let (text, configurations) =
+        coupling::alone(Configuration::parse(&text).map_err(|e| in_file(e.into()))?)?;
+    let system = System::parse(&text)?;
+    let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.clone()));
+    let models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
+    let mut simulation = Simulation::of(&system, &models)?;
+    let mut outcome = simulation.run(|time, _| progress(time / case.setup.end))?;
+    if let Some(failure) = outcome.failure.take() {
+        return Err(failure);
+    }
+    outcome.recording.save_csv(&path.with_extension("csv"), false)?;
+    let page = report::document(&name, &system, &models, &outcome, &outcome.notes);
+    write(&path.with_extension("html"), &page)?;
+    let summary = Summary::new(&case, &outcome.recording, outcome.statistics.steps_per_second())?;
+    Ok(Run { case, recording: outcome.recording, promises: outcome.promises, summary })
 }
 
 /// Writes a configuration and the FMU made from it.
