@@ -967,45 +967,70 @@ impl AssuredFilter {
             };
             witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
         };
+        // Between the plan's own input and the rows' answer: `share` of the way from that.
+        let behind = |planner: &Planner<'_>, kept: &Witness, u: &[f64], share: f64| {
+            let own = kept.inputs[0].1;
+            let input: [f64; MAX_INPUTS] = core::array::from_fn(|i| {
+                if i < u.len() { own[i] + (1.0 - share) * (u[i] - own[i]) } else { 0.0 }
+            });
+            planner.behind(plan, t, x, &input[..u.len()]).ok()
+        };
+        // The first plan, or one by feedback, moves with the state.
+        let mixed = |is_replayed: bool, share: f64| match was_committed && is_replayed {
+            true => (Piece::Mixed { rows: 1.0 - share, wish: 0.0 }, share),
+            false => (Piece::Searched, share),
+        };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
             let passes = reached && wanted == wish;
             if passes
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
             {
-                return Ok((Driver::Reference, Piece::Mixed { rows: 0.0, wish: 1.0 }, witness, 0.0));
+                return Ok((Driver::Reference, (Piece::Mixed { rows: 0.0, wish: 1.0 }, 0.0), witness));
+            }
+            // From the plan's own input a little further back to the rows, if a plan is behind that.
+            let mut tail = None;
+            if share > GIVEN_BACK {
+                let (kept, is_replayed) = planner.tail(plan, t, x)?;
+                if let Some(witness) = behind(planner, &kept, u, share - GIVEN_BACK) {
+                    return Ok((Driver::Between, mixed(is_replayed, share - GIVEN_BACK), witness));
+                }
+                tail = Some((kept, is_replayed));
             }
             wanted.copy_from_slice(u);
-            if share <= GIVEN_BACK
-                && let Ok(witness) = planner.behind(plan, t, x, wanted)
-            {
+            if let Ok(witness) = planner.behind(plan, t, x, wanted) {
                 if !passes || !comfortable(&witness) || u == wish {
-                    return Ok((Driver::Rows, Piece::ROWS, witness, 0.0));
+                    return Ok((Driver::Rows, (Piece::ROWS, 0.0), witness));
                 }
                 // As near to u_ref as is comfortable, so that the input does not jump between the two.
                 let (wish, witness) =
                     towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
                 let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
-                return Ok((driver, Piece::Mixed { rows: 1.0 - wish, wish }, witness, 0.0));
+                return Ok((driver, (Piece::Mixed { rows: 1.0 - wish, wish }, 0.0), witness));
             }
-            // Towards the answer of the rows, from the plan's own input: as near as can be at first, then little by little.
-            let (kept, is_replayed) = planner.tail(plan, t, x)?;
-            let own = kept.inputs[0].1;
-            let behind = |u: &[f64]| planner.behind(plan, t, x, u).ok();
-            let (rows, witness) = match share > GIVEN_BACK {
-                true => back(&own[..u.len()], u, kept, share, behind),
-                false => towards(&own[..u.len()], u, kept, behind),
+            // Towards the answer of the rows: as near as can be at first, then as near as last, or a little less.
+            let (kept, is_replayed) = match tail {
+                Some(tail) => tail,
+                None => planner.tail(plan, t, x)?,
             };
-            let driver = if rows > 0.0 { Driver::Between } else { Driver::Plan };
-            // The first one, or one by feedback, moves with the state.
-            let piece = match was_committed && is_replayed {
-                true => Piece::Mixed { rows, wish: 0.0 },
-                false => Piece::Searched,
+            let shares = [0.0, 1.0, 4.0, 12.0].map(|more| share + more * GIVEN_BACK);
+            let near = shares.into_iter().filter(|s| share > GIVEN_BACK && *s < 1.0);
+            let found = near.into_iter().find_map(|s| Some((s, behind(planner, &kept, u, s)?)));
+            let (share, witness) = match found {
+                Some(found) => found,
+                None if share > GIVEN_BACK => (1.0, kept),
+                None => {
+                    let own = kept.inputs[0].1;
+                    let (rows, witness) =
+                        towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
+                    (1.0 - rows, witness)
+                }
             };
-            Ok((driver, piece, witness, 1.0 - rows))
+            let driver = if share < 1.0 { Driver::Between } else { Driver::Plan };
+            Ok((driver, mixed(is_replayed, share), witness))
         });
         let failure = match found {
-            Ok((driver, piece, witness, share)) => {
+            Ok((driver, (piece, share), witness)) => {
                 self.piece = piece;
                 self.next.share = share;
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
@@ -1031,31 +1056,6 @@ impl AssuredFilter {
             }
         }
     }
-}
-
-/// `from` a plan's own input, whose witness is `kept`, towards `to`: a little further than the last time, when `share` was the
-/// plan's, or as far, or a little less, if a witness is behind it. The part of the way, and its witness.
-fn back(
-    from: &[f64],
-    to: &[f64],
-    kept: Witness,
-    share: f64,
-    behind: impl Fn(&[f64]) -> Option<Witness>,
-) -> (f64, Witness) {
-    let mut input = [0.0; MAX_INPUTS];
-    for more in [-1.0, 0.0, 1.0, 4.0, 12.0] {
-        let part = 1.0 - (share + more * GIVEN_BACK);
-        if part <= 0.0 {
-            continue;
-        }
-        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
-            *input = from + part * (to - from);
-        }
-        if let Some(witness) = behind(&input[..from.len()]) {
-            return (part, witness);
-        }
-    }
-    (0.0, kept)
 }
 
 /// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
