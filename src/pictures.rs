@@ -156,16 +156,24 @@ impl Part<'_> {
             .map(|side| self.number(&format!("{side}.{input}")).filter(|limit| limit.abs() < UNBOUNDED))
     }
 
-    /// The names of two of its outputs that are where it is in a plane, without their component.
-    pub fn places(&self) -> impl Iterator<Item = [String; 2]> {
-        let description = self.model.description();
-        let moves = |name: &String| {
-            description
-                .index_of(name)
-                .is_some_and(|i| description.variables[i].causality == Causality::Output)
+    /// Where it is in a plane, as two signals; more than once where it moves several things. Each with its name.
+    pub fn places(&self) -> Vec<(String, [String; 2])> {
+        let variables = &self.model.description().variables;
+        let outputs = variables.iter().filter(|v| v.causality == Causality::Output);
+        let states: Vec<_> =
+            outputs.filter_map(|v| Some((v.name.strip_prefix("x.")?, v.kind.unit()))).collect();
+        let beside = |&(x, unit): &(&str, Option<&str>)| {
+            let named = PLANES.iter().find(|axes| axes[0] == x).map(|axes| axes[1].to_owned());
+            // Such as xa and ya, or x and z: lengths whose names differ in that letter.
+            let letters = ["y", "z"].map(|letter| x.replacen('x', letter, 1));
+            let lengths = letters.into_iter().filter(|_| x.contains('x') && unit == Some("m"));
+            named.into_iter().chain(lengths).find(|y| states.contains(&(y.as_str(), unit)))
         };
-        let places = PLANES.iter().map(|axes| axes.map(|axis| format!("x.{axis}")));
-        places.filter(move |place| place.iter().all(moves))
+        let planes: Vec<_> = states.iter().filter_map(|x| Some((x.0, beside(x)?))).collect();
+        let component = &self.component.name;
+        let label = |x: &str| if planes.len() == 1 { component.clone() } else { format!("{component} {x}") };
+        let signal = |axis: &str| self.signal(&format!("x.{axis}"));
+        planes.iter().map(|(x, y)| (label(x), [signal(x), signal(y)])).collect()
     }
 
     /// The discs of its barriers that stay where they are.
@@ -198,12 +206,11 @@ impl Part<'_> {
 fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<PathPicture> {
     let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
     let arrival = arrival.filter(is_recorded);
-    let mut paths = parts.iter().flat_map(|part| {
-        let places = part.places().map(|place| place.map(|name| part.signal(&name)));
-        places.filter(|place| place.iter().all(is_recorded)).map(|[x, y]| (x, y))
-    });
-    let (x, y) = paths.next()?;
-    let more: Vec<_> = paths.map(|(x, y)| PathEntry { x, y, label: None, arrival: None }).collect();
+    let mut paths = parts.iter().flat_map(Part::places).filter(|(_, place)| place.iter().all(is_recorded));
+    let (label, [x, y]) = paths.next()?;
+    let entry =
+        |(label, [x, y]): (String, [String; 2])| PathEntry { x, y, label: Some(label), arrival: None };
+    let more: Vec<_> = paths.map(entry).collect();
     let mut discs: Vec<_> = parts.iter().flat_map(Part::discs).collect();
     if let Some(first) = discs.iter_mut().find(|disc| disc.obstacle) {
         first.label = Some("obstacle".to_owned());
@@ -215,7 +222,7 @@ fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<Pa
         arrival: arrival.filter(|_| more.is_empty()),
         x,
         y,
-        label: None,
+        label: Some(label),
         more,
         discs,
     })

@@ -352,12 +352,17 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         table.signal("u", input, "", Causality::Input);
     }
     let outputs = table.variables.len();
-    let parameters = outputs + states.len();
+    let told = c.output_signals();
+    let parameters = outputs + states.len() + told.len();
     for (i, state) in states.iter().enumerate() {
         let variable = table.signal("x", state, "", Causality::Output);
         variable.dependencies = Some(Vec::new());
         // `x0.*` are the first parameters, in the order of the states.
         variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
+    }
+    for output in &told {
+        // At the start it may depend on any state and constant.
+        table.signal("y", output, "", Causality::Output).dependencies = Some(Vec::new());
     }
     table.finish(
         c,

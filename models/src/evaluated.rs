@@ -187,7 +187,13 @@ pub struct CodeBarrier {
 impl CodeBarrier {
     /// The relative degree, found on [`samples`](punctual_core::lie::samples) of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
-        motion::relative_degree(&self.equations, &self.equations, ranges)
+        motion::relative_degree(&self.equations, &self.equations, ranges, false)
+    }
+
+    /// The same with inputs that are not 0: one that enters only as a factor of another one, as a turn does of a speed or a
+    /// thrust, is seen too.
+    pub fn driven_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
+        motion::relative_degree(&self.equations, &self.equations, ranges, true)
     }
 
     /// Its derivatives at relative degree `n`, for a filter.

@@ -3,6 +3,7 @@
 #![expect(clippy::print_stdout, reason = "the figures of the search")]
 
 use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::lie::RelativeDegree;
 use punctual_models::Model;
 
 /// Numbers that are the same on every machine.
@@ -164,6 +165,63 @@ fn a_cart_with_a_pole_is_promised_only_what_is_kept() {
         println!("cart and pole, others {around}: {accepted} of {starts} accepted and kept");
         assert!(100 * accepted >= 95 * starts, "{accepted} of {starts} accepted");
     }
+}
+
+/// A quadrotor in a vertical plane with thrust and torque for inputs: 1 kg, 0.05 kg m². It is to be within 0.3 m of a place
+/// by the `deadline`, above 0.5 m, below 6 m, and leaning by 1 rad at most. The thrust enters the second derivative of the
+/// distance, the torque the fourth.
+fn quadrotor<R>([x, z, deadline, thrust]: [f64; 4], judge: impl FnOnce(&Case<'_>) -> R) -> R {
+    const INERTIA: f64 = 0.05;
+    let states = ["x", "z", "theta", "v", "w", "omega"];
+    let derivatives = ["v", "w", "omega", "f * sin(theta)", "f * cos(theta) - g", "tau / i"];
+    let parameters = [("g", GRAVITY), ("i", INERTIA), ("a", x), ("b", z)];
+    let model = Model::new(&states, &["f", "tau"], &parameters, &derivatives).expect("a model");
+    let goal = "0.3 - sqrt((x - a)^2 + (z - b)^2 + 1e-4)";
+    let free = [[f64::NEG_INFINITY, f64::INFINITY]; 6];
+    let driven = model.barrier(goal).expect("a barrier").driven_degree(&free);
+    assert_eq!(driven, RelativeDegree::Mixed(vec![Some(2), Some(4)]));
+    judge(&Case {
+        period: 0.02,
+        deadline,
+        states: 6,
+        model,
+        barriers: &[(goal, 2, true), ("z - 0.5", 2, false), ("6 - z", 2, false), ("1 - theta^2", 2, false)],
+        bounds: &[[0.0, thrust], [-2.0, 2.0]],
+        rate: &|x, u| {
+            let (sin, cos) = x[2].sin_cos();
+            vec![x[3], x[4], x[5], u[0] * sin, u[0] * cos - GRAVITY, u[1] / INERTIA]
+        },
+        h: &|at| {
+            let distance = ((at[0] - x).powi(2) + (at[1] - z).powi(2) + 1e-4).sqrt();
+            vec![0.3 - distance, at[1] - 0.5, 6.0 - at[1], 1.0 - at[2] * at[2]]
+        },
+    })
+}
+
+#[test]
+fn a_quadrotor_with_thrust_and_torque_is_promised_only_what_is_kept() {
+    let starts = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 100 } else { 5 };
+    let mut accepted = 0;
+    for seed in 1..=starts {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let mut draw = |low: f64, high: f64| random.between(low, high);
+        let numbers = [draw(-5.0, 5.0), draw(1.0, 5.0), draw(2.5, 6.0), draw(15.0, 30.0)];
+        let x = [0.0, draw(1.0, 5.0), draw(-0.3, 0.3), draw(-0.5, 0.5), draw(-0.5, 0.5), draw(-0.3, 0.3)];
+        let is_kept = quadrotor(numbers, |case| {
+            case.is_kept(&x, 2.0, |_, x| match seed % 5 {
+                0 => vec![random.between(0.0, 30.0), random.between(-2.0, 2.0)],
+                // Nothing at all: it falls.
+                1 => vec![0.0, 0.0],
+                2 => vec![40.0, 4.0],
+                // To turn it over.
+                3 => vec![numbers[3], 2.0 * x[2].signum()],
+                _ => vec![GRAVITY, 0.0],
+            })
+        });
+        accepted += u64::from(is_kept);
+    }
+    println!("quadrotor: {accepted} of {starts} accepted and kept");
+    assert!(100 * accepted >= 80 * starts, "{accepted} of {starts} accepted");
 }
 
 /// The two links of `examples/models/arm-filter.toml`.

@@ -11,7 +11,7 @@ use crate::{output, package};
 pub struct Arguments {
     /// The configuration file (TOML): `kind = "filter"`, `"plant"` or `"controller"`; or a system file
     configuration: PathBuf,
-    /// The .fmu file to write; for a system file the .ssp file, with the FMUs it names
+    /// The .fmu file to write; for a system file the .ssp file, with the FMUs it names, and those of the configurations it names
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// The shared library to put inside [default: the one beside this program]

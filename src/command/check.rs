@@ -99,7 +99,11 @@ struct BarrierReport {
     shape: &'static str,
     /// Unit of h.
     unit: String,
+    /// The order of the derivative that the row is on.
     relative_degree: usize,
+    /// Where inputs enter at different orders, so that only plans move them all: what was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uneven: Option<String>,
     method: &'static str,
     /// In s; `null` for a barrier without one, that is to be kept.
     deadline: Option<f64>,
@@ -356,6 +360,7 @@ fn filter(
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
     let degrees: Vec<usize> = filter.relative_degrees().collect();
+    let (uneven, inputs) = (c.uneven(), c.plant.inputs());
     let mut barriers = Vec::new();
     // Each barrier: its settings, as given or chosen.
     for (i, section) in c.barrier.iter().enumerate() {
@@ -399,6 +404,13 @@ fn filter(
         }
         if deadline.is_finite() && experiment.stop_time - experiment.start_time < deadline {
             warn("the experiment stops before the deadline".to_owned());
+        }
+        let uneven = uneven.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
+        if uneven.is_some() && !c.is_assured() {
+            let reason = c.unassured();
+            warn(format!(
+                "inputs enter h at different orders, and without plans only the first is used: {reason}"
+            ));
         }
         if let Some(reason) = filter.refusal(i) {
             warn(match reason {
@@ -449,6 +461,7 @@ fn filter(
             shape: section.shape.name(),
             unit,
             relative_degree: degrees[i],
+            uneven: uneven.map(|found| found.describe(|input| inputs[input].name.clone())),
             method,
             deadline: settings.deadline,
             rate,
@@ -583,6 +596,10 @@ fn filter_text(report: &FilterReport) -> String {
             ("stay rate", stay_rate),
             ("margin", format!("{} {}", number(b.margin), b.unit)),
         ];
+        if let Some(found) = &b.uneven {
+            let found = found.strip_prefix("is ").unwrap_or(found);
+            rows.insert(1, ("", format!("{found}; the row moves what enters first, plans every input")));
+        }
         if let Some(start) = &b.start {
             let side = if start.inside { "inside" } else { "outside" };
             rows.push(("start", format!("{side}, h = {} {}; {}", number(start.h), b.unit, start.words())));

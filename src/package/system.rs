@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 use punctual_modeldescription::{
     Archive, Causality, Connector, DefaultExperiment, EnumerationItem, ParameterSet, ParameterValue,
@@ -46,10 +47,22 @@ pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
     Ok(packed)
 }
 
+/// The FMU at `path`, or the one that the configuration there becomes, and its bytes.
+fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>), Error> {
+    let read = |file: &Path| std::fs::read(file).map_err(|e| Error::io("read", file, e));
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        return Ok((Rc::new(Fmu::open(path)?), read(path)?));
+    }
+    let configuration = super::read_configuration(path)?;
+    let folder = tempfile::tempdir().map_err(|e| Error::io("make a folder in", &std::env::temp_dir(), e))?;
+    let file = folder.path().join("made.fmu");
+    Ok((super::build(configuration, None, &file)?, read(&file)?))
+}
+
 /// The FMUs of a system, each file once.
 struct Store {
     /// The FMUs, each with its place in the archive and its bytes.
-    fmus: Vec<(Fmu, String, Vec<u8>)>,
+    fmus: Vec<(Rc<Fmu>, String, Vec<u8>)>,
     /// The index of the FMU of each component.
     of_component: Vec<usize>,
 }
@@ -74,16 +87,7 @@ impl Store {
                 let message = format!("there is no file {}{advice}", path.display());
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
-                let (file, fmu) = (path.display(), path.with_extension("fmu"));
-                let message = format!(
-                    "is {file}, a configuration; an .ssp file takes FMUs: make one with `punctual build {file} -o {}`",
-                    fmu.display()
-                );
-                return Err(Error::configuration(format!("component[{i}].fmu"), message));
-            }
-            let fmu = Fmu::open(&path).map_err(|e| e.in_component(&component.name))?;
-            let bytes = std::fs::read(&path).map_err(|e| Error::io("read", &path, e))?;
+            let (fmu, bytes) = fmu(&path).map_err(|e| e.in_component(&component.name))?;
             let place = store.place(&path);
             known.insert(path, store.fmus.len());
             store.of_component.push(store.fmus.len());
@@ -106,7 +110,7 @@ impl Store {
         place
     }
 
-    fn of(&self, component: usize) -> &(Fmu, String, Vec<u8>) {
+    fn of(&self, component: usize) -> &(Rc<Fmu>, String, Vec<u8>) {
         &self.fmus[self.of_component[component]]
     }
 }

@@ -34,18 +34,16 @@ pub(super) struct Vehicle {
 impl Vehicle {
     /// All that `part` moves, of the signals recorded.
     pub(super) fn all(part: &Part<'_>, recording: &Recording) -> Vec<Self> {
-        let places = part.places().map(|place| place.map(|name| part.signal(&name)));
-        let vehicle = |place: [String; 2]| {
+        let vehicle = |(label, place): (String, [String; 2])| {
             let (x, y) = (recording.series(&place[0])?, recording.series(&place[1])?);
             let heading = recording.series(&part.signal(HEADING)).unwrap_or_default();
             let mut channels = vec![&x[..], &y];
             channels.extend((!heading.is_empty()).then_some(&heading[..]));
             let kept = plot::decimate(&channels, POINTS);
-            let label = part.component.name.clone();
             let [time, x, y, heading] = [recording.times(), &x, &y, &heading].map(|all| chosen(all, &kept));
             Some(Self { label, place, time, x, y, heading })
         };
-        places.filter_map(vehicle).collect()
+        part.places().into_iter().filter_map(vehicle).collect()
     }
 
     /// The least and the greatest x and y.

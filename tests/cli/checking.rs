@@ -155,8 +155,8 @@ fn a_mixed_relative_degree_is_refused() {
     workshop.punctual(["check", "filter.toml"]).fails(
         2,
         "filter.toml: barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, \
-         a enters derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
-         bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself",
+         a enters derivative 2 of h; one row cannot use them all. Plans can, but none are followed: a has no bounds. \
+         Mend that, or take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself",
     );
 }
 

@@ -94,6 +94,26 @@ fn a_system_is_packed_with_its_fmus() {
     }
 }
 
+/// A configuration is packed as the FMU that it becomes.
+#[test]
+fn a_system_of_configurations_is_packed_as_one_of_fmus() {
+    let workshop = Workshop::with_library();
+    for name in ["filter", "plant"] {
+        let file = examples().join(format!("unicycle-{name}.toml"));
+        workshop.write(&format!("{name}.toml"), fs::read(file).expect("an example"));
+        workshop.punctual(["build", &format!("{name}.toml"), "-o", &format!("{name}.fmu")]).success();
+    }
+    workshop.write("my.toml", SYSTEM);
+    workshop.punctual(["build", "my.toml", "-o", "fmus.ssp"]).success();
+    workshop.write("my.toml", SYSTEM.replace("plant.fmu", "plant.toml").replace("filter.fmu", "filter.toml"));
+    let said = workshop.punctual(["build", "my.toml", "-o", "own.ssp"]).success();
+    assert_eq!(said, "own.ssp: 3 components from 2 FMUs, 7 connections, 3 start values\n");
+    assert!(workshop.bytes("own.ssp") == workshop.bytes("fmus.ssp"), "the packages differ");
+    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicicle\"\n");
+    let done = workshop.punctual(["build", "my.toml", "-o", "own.ssp"]);
+    done.fails_like(2, "plant.toml: plant.model: ", &["unicicle"]);
+}
+
 #[test]
 fn fmus_of_the_same_name_get_places_of_their_own() {
     let workshop = Workshop::with_fmus();

@@ -121,7 +121,7 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
 }
 
 /// Beginnings of files up to a key that none has, in the order of the tables of docs/configuration.md.
-const PLACES: [&str; 19] = [
+const PLACES: [&str; 20] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[[barrier]]",
     "kind = \"filter\"\n[plant]",
@@ -129,6 +129,7 @@ const PLACES: [&str; 19] = [
     "kind = \"filter\"\n[[plant.parameters]]",
     "kind = \"filter\"\n[integrator]",
     "kind = \"plant\"",
+    "kind = \"plant\"\n[[output]]",
     "kind = \"plant\"\n[integration]",
     "kind = \"plant\"\n[disturbance]",
     "kind = \"controller\"",
@@ -170,6 +171,18 @@ fn links_between_documents_lead_somewhere() {
             let elsewhere = target.is_empty() || target.contains("://");
             assert!(elsewhere || folder.join(target).exists(), "{}: no {target}", document.path);
         }
+    }
+}
+
+#[test]
+fn every_document_is_a_chapter_of_the_book() {
+    let summary = text("docs/SUMMARY.md");
+    for document in TEXTS.iter().filter(|t| t.path.starts_with("docs/") && t.path.ends_with(".md")) {
+        let name = document.path.rsplit('/').next().unwrap_or_default();
+        assert!(
+            name == "SUMMARY.md" || summary.contains(&format!("]({name})")),
+            "docs/SUMMARY.md: no {name}"
+        );
     }
 }
 

@@ -41,6 +41,17 @@ const COMMANDS: &[&str] = &[
     "varphi",
     "sigma",
     "omega",
+    "Delta",
+    "eta",
+    "hat",
+    "infty",
+    "int",
+    "lambda",
+    "sqrt",
+    "top",
+    "varepsilon",
+    "vartheta",
+    "zeta",
 ];
 
 /// A block: the line after its fence, and its text.

@@ -74,20 +74,17 @@ fn label(text: &str) -> Option<&str> {
     (letter || number).then_some(label)
 }
 
-/// The formula of a line that is one, indented by four.
-fn formula(line: &str) -> Option<&str> {
-    line.strip_prefix("    ").filter(|formula| !formula.trim().is_empty())
+/// The labels that the formulas of a text have: `\tag{L}`.
+fn tags(text: &str) -> impl Iterator<Item = &str> {
+    text.split(r"\tag{").skip(1).map(|part| part.split('}').next().unwrap_or_default())
 }
 
 impl Numbers {
-    /// Reads the numbers as they are given: `## 1. …`, `**Lemma 1…`, and `   (L)` at the end of a formula.
+    /// Reads the numbers as they are given: `## 1. …`, `**Lemma 1…`, and `\tag{L}` in a formula.
     fn of(markdown: &str) -> Self {
-        let mut numbers = Self::default();
+        let equations = tags(markdown).map(str::to_owned).collect();
+        let mut numbers = Self { equations, ..Self::default() };
         for (_, line) in lines(markdown) {
-            if let Some((formula, _)) = formula(line).and_then(|formula| formula.rsplit_once("  (")) {
-                let given = label(&line[4 + formula.len() + 2..]);
-                numbers.equations.extend(given.map(str::to_owned));
-            }
             numbers.sections.extend(line.strip_prefix("## ").and_then(number));
             for kind in STATEMENTS {
                 let rest = line.strip_prefix("**").and_then(|line| {
@@ -163,8 +160,7 @@ fn numbers_of_the_theory_are_given_once_and_in_order() {
 #[test]
 fn references_of_the_theory_to_itself_exist() {
     let document = text("docs/theory.md");
-    let prose =
-        lines(document).into_iter().filter(|(_, line)| formula(line).is_none() && !line.starts_with('|'));
+    let prose = lines(document).into_iter().filter(|(_, line)| !line.starts_with('|'));
     let prose: Vec<_> = prose.map(|(_, line)| line).collect();
     let missing = theory().missing(&prose.join("\n"), true);
     assert!(missing.is_empty(), "docs/theory.md has no {missing:?}");
@@ -198,8 +194,7 @@ fn labels_of_the_sources_are_those_of_the_theory() {
     for text in TEXTS.iter().filter(|t| t.path.contains("src/") && t.path.ends_with(".rs")) {
         for (i, line) in text.text.lines().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"))
         {
-            for part in line.split(r"\tag{").skip(1) {
-                let label = part.split('}').next().unwrap_or_default();
+            for label in tags(line) {
                 let known = theory.equations.iter().any(|known| known == label);
                 assert!(known, "{}:{}: docs/theory.md has no ({label})", text.path, i + 1);
                 seen += 1;
@@ -273,7 +268,7 @@ fn anchors_are_unique_and_of_use() {
 
 #[test]
 fn numbers_and_references_are_found() {
-    let document = "## 1. A b\n\n**Lemma 1.** If\n\n    e ≥ f(T),   (L)\n    g (Z)\n\n**Theorem 2 (n).** x\n\
+    let document = "## 1. A b\n\n**Lemma 1.** If\n\n```math\ne \\ge f(T) \\tag{L}\n```\n\n**Theorem 2 (n).** x\n\
                     ```\n## 3. No\n```\n<a id=\"here\"></a>\n";
     let numbers = Numbers::of(document);
     let statements = vec![("lemma".to_owned(), 1), ("theorem".to_owned(), 2)];

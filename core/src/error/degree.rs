@@ -31,6 +31,17 @@ impl RelativeDegree {
         }
     }
 
+    /// The order of the first derivative that an input enters, wherever that was found: n where it is uniform. A row on that
+    /// derivative is right, but moves only the inputs that enter it.
+    pub fn least(&self) -> Option<usize> {
+        match self {
+            Self::Uniform(n) => Some(*n),
+            Self::Mixed(orders) => orders.iter().flatten().copied().min(),
+            Self::Varying(orders) => orders.first().copied(),
+            Self::Unreached | Self::NotFinite => None,
+        }
+    }
+
     /// The finding as a sentence without its subject ("is …"), input i (from 0) called `name(i)`.
     pub fn describe(&self, name: impl Fn(usize) -> String) -> String {
         match self {

@@ -1,6 +1,7 @@
 //! A plant: holds its state and integrates it under held inputs.
 
 use punctual_core::dynamics::DynPlant;
+use punctual_models::Functions;
 
 use super::disturbance::Disturbance;
 use super::{Block, BlockState, Values};
@@ -16,6 +17,8 @@ pub(super) struct PlantBlock {
     parameters: Vec<Parameter<PlantConfiguration>>,
     layout: Layout,
     plant: Box<dyn DynPlant>,
+    /// What is told beside the states.
+    outputs: Functions<f64>,
     disturbance: Disturbance,
     x: Vec<f64>,
     /// Scratch: the state after the step under way.
@@ -27,9 +30,10 @@ pub(super) struct PlantBlock {
 impl PlantBlock {
     pub(super) fn new(configuration: PlantConfiguration, layout: Layout) -> Result<Self, ConfigurationError> {
         let (parameters, plant) = (configuration.parameters(), configuration.build()?);
+        let outputs = configuration.outputs()?;
         let (x, u) = (vec![0.0; layout.states], vec![0.0; layout.inputs]);
         let disturbance = Disturbance::new(&configuration);
-        Ok(Self { next: x.clone(), x, u, configuration, parameters, layout, plant, disturbance })
+        Ok(Self { next: x.clone(), x, u, configuration, parameters, layout, plant, outputs, disturbance })
     }
 }
 
@@ -38,6 +42,7 @@ impl Block for PlantBlock {
         let numbers = &values.reals[self.layout.parameters..self.layout.end];
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
         self.plant = configuration.build()?;
+        self.outputs = configuration.outputs()?;
         self.disturbance = Disturbance::new(&configuration);
         self.configuration = configuration;
         // The first parameters are the initial state.
@@ -46,9 +51,11 @@ impl Block for PlantBlock {
     }
 
     fn output(&mut self, t: f64, values: &mut Values) {
-        let measured = &mut values.reals[self.layout.outputs..][..self.layout.states];
+        let told = &mut values.reals[self.layout.outputs..self.layout.parameters];
+        let (measured, others) = told.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
         self.disturbance.blur(t, measured);
+        others.iter_mut().zip(self.outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
     }
 
     /// The state does not depend on the inputs before a step.
@@ -91,6 +98,15 @@ impl Block for PlantBlock {
             let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
             return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i]));
         }
+        if let Some((i, value)) =
+            self.outputs.at(t + h, |i| self.next[i]).enumerate().find(|(_, v)| !v.is_finite())
+        {
+            let output = &self.configuration.output[i];
+            return Err(format!(
+                "y.{} becomes {value} in the step from t = {t} by {h} s; it is {:?}",
+                output.name, output.expression
+            ));
+        }
         std::mem::swap(&mut self.x, &mut self.next);
         self.output(t + h, values);
         Ok(())
@@ -105,6 +121,7 @@ impl Block for PlantBlock {
             parameters: _,
             layout: _,
             plant: _,
+            outputs: _,
             disturbance: _,
             next: _,
             u: _,

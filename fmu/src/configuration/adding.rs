@@ -17,9 +17,30 @@ pub(super) struct Adding<'a> {
     pub(super) index: usize,
     /// The index of the first state of the filter that is an input of this barrier.
     pub(super) first: usize,
+    /// Where barriers go whose inputs enter at different orders, with what was found; `None` where they are refused.
+    pub(super) uneven: Option<&'a mut Vec<(usize, RelativeDegree)>>,
 }
 
 impl Adding<'_> {
+    /// The order of the derivative that the row is on, for the relative degree `found`; `driven` where inputs are not 0.
+    fn degree(&mut self, found: RelativeDegree, driven: Option<RelativeDegree>) -> Result<usize, Error> {
+        let Some(uneven) = &mut self.uneven else { return found.require(None) };
+        let later = driven.filter(|driven| matches!(driven, RelativeDegree::Mixed(_)));
+        match (found.uniform(), found.least(), later) {
+            // The row is right, but other inputs come in later.
+            (Some(n), _, Some(later)) if later.least() == Some(n) => {
+                uneven.push((self.index, later));
+                Ok(n)
+            }
+            // A plan moves every input, whatever the row moves.
+            (None, Some(n), _) => {
+                uneven.push((self.index, found));
+                Ok(n)
+            }
+            _ => found.require(None),
+        }
+    }
+
     fn section(&self) -> &BarrierSection {
         &self.configuration.barrier[self.index]
     }
@@ -64,7 +85,7 @@ impl Adding<'_> {
 
     /// Adds it along a plant. `EXTENDED` = `NX` + 4 states where the barrier follows a point.
     fn along_plant<P, B, const NX: usize, const EXTENDED: usize>(
-        self,
+        mut self,
         plant: P,
         barrier: B,
     ) -> Result<FilterBuilder, ConfigurationError>
@@ -74,15 +95,13 @@ impl Adding<'_> {
     {
         let dim = NX + self.configuration.barrier_inputs().len();
         let source = if self.section().shape.followed().is_none() {
-            lie::detected(&plant, &barrier)
-                .require(None)
+            self.degree(lie::detected(&plant, &barrier), None)
                 .and_then(|n| lie::along(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i)))
         } else {
             let (plant, first) = (WithPoint::<_, NX>(plant), self.first);
             let picks = std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
-            lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier)
-                .require(None)
+            self.degree(lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier), None)
                 .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &picks))
         };
@@ -93,7 +112,8 @@ impl Adding<'_> {
     pub(super) fn expression(self, text: &str) -> Result<FilterBuilder, ConfigurationError> {
         let plant = &self.configuration.plant;
         let barrier = plant.expressions()?.barrier(text).map_err(|e| self.of_model(&e))?;
-        let found = barrier.relative_degree(&plant.ranges());
+        let ranges = plant.ranges();
+        let found = [barrier.relative_degree(&ranges), barrier.driven_degree(&ranges)];
         self.model(found, |n| barrier.source(n))
     }
 
@@ -107,7 +127,8 @@ impl Adding<'_> {
         let position = plant.plugin_barriers().iter().position(|b| b.name == output);
         let barrier =
             plugin.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
-        let found = barrier.relative_degree(&plant.ranges());
+        let ranges = plant.ranges();
+        let found = [barrier.relative_degree(&ranges), barrier.driven_degree(&ranges)];
         self.model(found, |n| barrier.source(n))
     }
 
@@ -120,13 +141,13 @@ impl Adding<'_> {
         self.source(source.and_then(|source| lie::embedded(source, dim, &own)))
     }
 
-    /// Adds a barrier of the relative degree `found`; `source` makes its derivatives.
+    /// Adds a barrier of the relative degree `found`, without and with inputs; `source` makes its derivatives.
     fn model(
-        self,
-        found: RelativeDegree,
+        mut self,
+        [found, driven]: [RelativeDegree; 2],
         source: impl FnOnce(usize) -> Result<Box<dyn DerivativeSource>, punctual_models::Error>,
     ) -> Result<FilterBuilder, ConfigurationError> {
-        let n = found.require(None).map_err(|e| self.named(e))?;
+        let n = self.degree(found, Some(driven)).map_err(|e| self.named(e))?;
         let own: Vec<usize> = (0..self.configuration.plant.states().len()).collect();
         let dim = own.len() + self.configuration.barrier_inputs().len();
         let source = source(n).map_err(|e| self.of_model(&e))?;
@@ -155,23 +176,42 @@ impl FilterConfiguration {
     pub(super) fn refused(&self, index: usize, error: &Error) -> ConfigurationError {
         if let Some(found) = error.relative_degree() {
             let inputs = self.plant.inputs();
-            let found_in_words = found.describe(|i| inputs.get(i).map_or("u", |s| &s.name).to_owned());
-            let advice = match (self.plant.model(), found) {
-                (Some(ModelName::BicycleSmallSlip), _) => {
-                    "; one constraint cannot use both, so take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself"
-                }
-                (None, RelativeDegree::Mixed(_)) => {
-                    "; one constraint cannot use both, so make the input that enters first a state whose derivative is the new input"
-                }
-                (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)",
-                _ => "",
+            let name = |i: usize| inputs.get(i).map_or("u", |s| &s.name).to_owned();
+            let uneven = |advice: &str| {
+                format!(
+                    "; one row cannot use them all. Plans can, but none are followed: {}. Mend that{advice}",
+                    self.unassured()
+                )
             };
-            let message = format!("its relative degree along {} {found_in_words}{advice}", self.plant.name());
+            let advice = match (self.plant.model(), found) {
+                (Some(ModelName::BicycleSmallSlip), _) => uneven(
+                    ", or take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself",
+                ),
+                (None, RelativeDegree::Mixed(orders)) => uneven(&integrators(orders, name)),
+                (None, RelativeDegree::Varying(_)) => uneven(""),
+                (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)".to_owned(),
+                _ => String::new(),
+            };
+            let (plant, found) = (self.plant.name(), found.describe(name));
+            let message = format!("its relative degree along {plant} {found}{advice}");
             return ConfigurationError::new(format!("barrier[{index}]"), message);
         }
         let field = error.field().split_once('.').map_or(error.field(), |(_, field)| field);
         ConfigurationError::new(format!("barrier[{index}].{field}"), error.message())
     }
+}
+
+/// The integrators after which each input enters the same derivative, as an advice; `orders` as in [`RelativeDegree::Mixed`].
+fn integrators(orders: &[Option<usize>], name: impl Fn(usize) -> String) -> String {
+    let last = orders.iter().flatten().copied().max().unwrap_or_default();
+    let missing = orders.iter().enumerate().filter_map(|(i, n)| Some((i, last - (*n)?)));
+    let before: Vec<_> = missing
+        .filter(|(_, count)| *count > 0)
+        .map(|(i, count)| {
+            format!("{count} integrator{} before {}", if count > 1 { "s" } else { "" }, name(i))
+        })
+        .collect();
+    format!(", or put {}: make it a state whose derivative is the new input", before.join(" and "))
 }
 
 /// The error that a filter cannot have `model`, which is not affine in its inputs.

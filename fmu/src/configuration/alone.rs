@@ -46,7 +46,9 @@ impl FilterConfiguration {
             controller.functions::<f64>().map(|_| controller)
         });
         let (kind, name, experiment) = (PlantKind::Plant, "plant".to_owned(), self.experiment);
-        let plant = PlantConfiguration { kind, name, plant, integration, disturbance, x0, experiment };
+        let output = Vec::new();
+        let plant =
+            PlantConfiguration { kind, name, plant, output, integration, disturbance, x0, experiment };
         Ok((plant.completed()?, controller.transpose()?))
     }
 

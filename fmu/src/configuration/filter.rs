@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use punctual_core::MAX_ROWS;
 use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
+use punctual_core::lie::RelativeDegree;
 use punctual_core::plan::Failure;
 use serde::{Deserialize, Serialize};
 
@@ -218,7 +219,7 @@ pub(super) static SECTION: Section = Section {
                 NumberByName(Of("unit of the state"), Range::NON_NEGATIVE),
                 Some("none"),
                 "largest error of a measured state, by name: the promise then holds for the true state, to first order \
-                 ([theory](theory.md), section 12). Needs the reference profile, prediction over the period, no delay",
+                 ([theory](theory.md#measurement-errors)). Needs the reference profile, prediction over the period, no delay",
             ),
             Key::new(
                 "integrator",
@@ -471,6 +472,24 @@ impl FilterConfiguration {
     ///
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
+        let mut uneven = Vec::new();
+        self.built(self.is_assured().then_some(&mut uneven))
+    }
+
+    /// The barriers, by their index, whose inputs enter at different orders, with what was found: only plans move them all.
+    pub fn uneven(&self) -> Vec<(usize, RelativeDegree)> {
+        let mut uneven = Vec::new();
+        match self.built(Some(&mut uneven)) {
+            Ok(_) => uneven,
+            Err(_) => Vec::new(),
+        }
+    }
+
+    /// The filter; barriers whose inputs enter at different orders go into `uneven`, or are refused.
+    pub(super) fn built(
+        &self,
+        mut uneven: Option<&mut Vec<(usize, RelativeDegree)>>,
+    ) -> Result<SafetyFilter, ConfigurationError> {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
@@ -479,7 +498,8 @@ impl FilterConfiguration {
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;
             next_point += section.inputs(&self.plant).len();
-            builder = section.shape.add(Adding { configuration: self, builder, index: i, first })?;
+            let uneven = uneven.as_deref_mut();
+            builder = section.shape.add(Adding { configuration: self, builder, index: i, first, uneven })?;
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
                 (Some(_), Some(_)) => {
@@ -552,7 +572,8 @@ impl FilterConfiguration {
 
     /// What no plan accounts for, in words.
     pub fn unaccounted(&self) -> Option<String> {
-        self.build().map_err(|e| e.to_string()).and_then(|filter| self.assured(filter)).err()
+        let filter = self.built(Some(&mut Vec::new())).map_err(|e| e.to_string());
+        filter.and_then(|filter| self.assured(filter)).err()
     }
 
     /// What keeps a plan from being one, in words.

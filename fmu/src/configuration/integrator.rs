@@ -167,7 +167,8 @@ impl FilterConfiguration {
                 Err(_) => {}
             }
         }
-        let filter = self.build()?;
+        // Rows alone need every input in the same derivative.
+        let filter = self.built(None)?;
         match &self.integrator {
             None => Ok(FilterLoop::Plain(filter)),
             Some(section) => self.integrated(filter, section).map(FilterLoop::Integrated),

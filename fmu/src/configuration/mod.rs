@@ -36,7 +36,7 @@ pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
 pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSection};
 pub use parameter::{Parameter, Range, updated};
-pub use plant::{DisturbanceSection, IntegrationSection, PlantConfiguration};
+pub use plant::{DisturbanceSection, IntegrationSection, OutputSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use punctual_models::Functions;
 pub use read::{ConfigurationError, read_toml};
@@ -160,7 +160,7 @@ impl Configuration {
 }
 
 /// The files and their tables, each after the tables that contain it.
-pub static SECTIONS: [&Section; 11] = [
+pub static SECTIONS: [&Section; 12] = [
     &filter::SECTION,
     &barrier::SECTION,
     &model::PLANT,
@@ -168,6 +168,7 @@ pub static SECTIONS: [&Section; 11] = [
     &model::PARAMETER,
     &integrator::SECTION,
     &plant::SECTION,
+    &plant::OUTPUT,
     &plant::INTEGRATION,
     &plant::DISTURBANCE,
     &controller::SECTION,

@@ -63,7 +63,7 @@ pub struct ParameterSection {
     pub max: Option<f64>,
 }
 
-fn one() -> String {
+pub(super) fn one() -> String {
     "1".to_owned()
 }
 
@@ -471,10 +471,23 @@ impl PlantSection {
             };
             expressions.push((name.as_str(), text.as_str()));
         }
+        self.values(&expressions)
+            .map_err(|e| ConfigurationError::new(format!("{field}.{}", e.field()), e.message()))
+    }
+
+    /// The values of expressions of states, parameters and time, each with its path.
+    ///
+    /// # Errors
+    ///
+    /// One that cannot be used, by its path.
+    pub(super) fn values<C: Scalar>(
+        &self,
+        expressions: &[(&str, &str)],
+    ) -> Result<Functions<C>, ConfigurationError> {
         // Whatever the derivatives are, be they affine or not.
         self.with_derivatives(&vec!["0"; self.states().len()])?
-            .functions(&expressions)
-            .map_err(|e| ConfigurationError::new(format!("{field}.{}", e.field()), e.message()))
+            .functions(expressions)
+            .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
 
     /// The expressions for the derivatives of its states, in order; none where no expressions are known.

@@ -3,18 +3,21 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
+use punctual_core::scalar::Scalar;
+use punctual_models::Functions;
 use serde::{Deserialize, Serialize};
 
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
-    Value::{Name, Number, NumberByName, Table, Word},
+    Value::{Name, Number, NumberByName, Table, Tables, Text, Word},
 };
 use super::model::RawModel;
-use super::names::{check_identifier, check_known};
+use super::names::{check_identifier, check_known, taken};
+use super::unit::measured;
 use super::{
     ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
-    Range, model,
+    Range, VariableSection, check_unit, model,
 };
 
 const INNER_STEP: Range = Range::POSITIVE;
@@ -26,7 +29,7 @@ const SIZE: Range = Range::NON_NEGATIVE;
 pub(super) static SECTION: Section = Section {
     name: "plant",
     keys: || {
-        static KEYS: [Key; 7] = [
+        static KEYS: [Key; 8] = [
             Key::new("kind", Word(&["plant"]), None, ""),
             Key::new("name", Name, Some("the model's"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models)"),
@@ -36,9 +39,29 @@ pub(super) static SECTION: Section = Section {
                 Some("0, or nearest to it in the state's range"),
                 "initial value of a state, by name",
             ),
+            Key::new("output", Tables(&OUTPUT), Some("none"), "what else the FMU tells beside its states"),
             Key::new("integration", Table(&INTEGRATION), Some(""), "how it is integrated"),
             Key::new("disturbance", Table(&DISTURBANCE), Some("none"), "what the model does not say"),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
+        ];
+        KEYS.iter().collect()
+    },
+};
+
+/// An entry of `output`.
+pub(super) static OUTPUT: Section = Section {
+    name: "output",
+    keys: || {
+        static KEYS: [Key; 4] = [
+            Key::new("name", Name, None, "unique; the output is `y.<name>`"),
+            Key::new(
+                "expression",
+                Text,
+                None,
+                "an [expression](#expressions) of states, parameters and `t`, such as `v * cos(theta)`",
+            ),
+            Key::new("unit", Text, Some("`1`"), "that of the expression"),
+            Key::new("description", Text, Some("none"), "for a human"),
         ];
         KEYS.iter().collect()
     },
@@ -81,6 +104,23 @@ pub(super) static DISTURBANCE: Section = Section {
         KEYS.iter().collect()
     },
 };
+
+/// An output of a plant beside its states: an entry of `output`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSection {
+    /// Its name, a C identifier, unique among the outputs; in the FMU `y.<name>`.
+    pub name: String,
+    /// Its value: an expression of states, parameters and the time `t`. Of the states as they are, without the disturbance of
+    /// their measurement.
+    pub expression: String,
+    /// Its unit. Default `1`.
+    #[serde(default = "model::one")]
+    pub unit: String,
+    /// Meaning, for a human. Default: none.
+    #[serde(default)]
+    pub description: String,
+}
 
 /// `[integration]`: the motion of the plant between communication points.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
@@ -162,6 +202,8 @@ pub(super) struct RawPlant {
     name: String,
     plant: RawModel,
     #[serde(default)]
+    output: Vec<OutputSection>,
+    #[serde(default)]
     integration: IntegrationSection,
     disturbance: Option<DisturbanceSection>,
     #[serde(default)]
@@ -178,6 +220,9 @@ pub struct PlantConfiguration {
     pub name: String,
     /// The plant's model.
     pub plant: PlantSection,
+    /// What the FMU tells beside the states.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub output: Vec<OutputSection>,
     /// Integration between communication points.
     pub integration: IntegrationSection,
     /// Disturbances that the model does not know.
@@ -192,14 +237,23 @@ pub struct PlantConfiguration {
 impl PlantConfiguration {
     /// Completes and checks `raw`.
     pub(super) fn parse(raw: RawPlant, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
-        let RawPlant { kind: PlantKind::Plant, mut name, plant, integration, disturbance, x0, experiment } =
-            raw;
+        let RawPlant {
+            kind: PlantKind::Plant,
+            mut name,
+            plant,
+            output,
+            integration,
+            disturbance,
+            x0,
+            experiment,
+        } = raw;
         if name.is_empty() {
             name = plant.model.map_or("plant", ModelName::name).to_owned();
         }
         check_identifier("name", &name)?;
         let plant = PlantSection::parse(plant, loader)?;
-        Self { kind: PlantKind::Plant, name, plant, integration, disturbance, x0, experiment }.completed()
+        Self { kind: PlantKind::Plant, name, plant, output, integration, disturbance, x0, experiment }
+            .completed()
     }
 
     /// Completes and checks what has a valid name and plant.
@@ -220,6 +274,7 @@ impl PlantConfiguration {
         }
         // The plant itself refuses what the ranges of single numbers cannot.
         self.build()?;
+        self.check_outputs()?;
         Ok(self)
     }
 
@@ -284,6 +339,56 @@ impl PlantConfiguration {
             rows.push(row(&field, &place, state.unit, SIZE, meaning, access));
         }
         rows
+    }
+
+    fn check_outputs(&self) -> Result<(), ConfigurationError> {
+        for (i, output) in self.output.iter().enumerate() {
+            let field = |key: &str| format!("output[{i}].{key}");
+            check_identifier(&field("name"), &output.name)?;
+            if self.output[..i].iter().any(|other| other.name == output.name) {
+                return Err(taken(field("name"), &output.name));
+            }
+            check_unit(&field("unit"), &output.unit)?;
+        }
+        self.outputs::<f64>()?;
+        for (i, OutputSection { expression, unit, .. }) in self.output.iter().enumerate() {
+            let refuse = |key: &str, message: String| {
+                Err(ConfigurationError::new(format!("output[{i}].{key}"), message))
+            };
+            match (self.plant.unit_of(expression), measured(unit)) {
+                (Err(message), _) => return refuse("expression", message),
+                (Ok(Some(found)), Some(given)) if !found.is(&given) => {
+                    return refuse("unit", format!("is {unit:?}, but {expression:?} is in {found}"));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The outputs as signals, in order.
+    pub fn output_signals(&self) -> Vec<VariableSection> {
+        let signal = |output: &OutputSection| VariableSection {
+            name: output.name.clone(),
+            unit: output.unit.clone(),
+            description: output.description.clone(),
+            min: None,
+            max: None,
+        };
+        self.output.iter().map(signal).collect()
+    }
+
+    /// The values of the outputs, in order.
+    ///
+    /// # Errors
+    ///
+    /// An expression that cannot be used, by its path.
+    pub fn outputs<C: Scalar>(&self) -> Result<Functions<C>, ConfigurationError> {
+        let place = |i: usize| format!("output[{i}].expression");
+        let places: Vec<String> = (0..self.output.len()).map(place).collect();
+        let texts = self.output.iter().map(|output| output.expression.as_str());
+        let expressions: Vec<_> = places.iter().map(String::as_str).zip(texts).collect();
+        self.plant.values(&expressions)
     }
 
     /// The plant.

@@ -120,8 +120,14 @@ defects! {
         "barrier[0].velocity[2]: is -inf, must be finite";
     mixed_relative_degree: FILTER, "model = \"unicycle\"" => "model = \"bicycle_small_slip\"",
         "barrier[0]: its relative degree along bicycle_small_slip is mixed: beta enters derivative 1, a enters \
-         derivative 2 of h; one constraint cannot use both, so take the model bicycle_small_slip_rate or \
-         bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself";
+         derivative 2 of h; one row cannot use them all. Plans can, but none are followed: beta has no bounds. Mend \
+         that, or take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself";
+    an_output_twice: PLANT, "[integration]" => "output = [{ name = \"a\", expression = \"v\", unit = \"m/s\" }, { name = \"a\", expression = \"v\", unit = \"m/s\" }]\n[integration]",
+        "output[1].name: is \"a\", which is already the name of something else";
+    an_output_of_an_input: PLANT, "[integration]" => "output = [{ name = \"a\", expression = \"a\" }]\n[integration]",
+        "output[0].expression: names a, an input, which it does not depend on";
+    an_output_in_another_unit: PLANT, "[integration]" => "output = [{ name = \"a\", expression = \"v * cos(theta)\", unit = \"km/h\" }]\n[integration]",
+        "output[0].unit: is \"km/h\", but \"v * cos(theta)\" is in m/s";
     a_filter_that_is_not_affine_in_the_steering_angle: FILTER, "model = \"unicycle\"" => "model = \"bicycle_kinematic_angle\"",
         "plant.model: is \"bicycle_kinematic_angle\", which is a plant only: delta does not enter linearly, as a \
          filter needs it; take the model bicycle_kinematic with `[integrator] state = \"delta\"`";

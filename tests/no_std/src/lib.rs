@@ -31,16 +31,18 @@ impl ControlAffine<4, 2> for PointMass {
     }
 }
 
-/// A filter that reaches a disc.
+/// A filter that reaches a disc: that of docs/rust.md.
 ///
 /// # Errors
 ///
 /// None: the numbers are in range.
 pub fn filter() -> Result<Box<SafetyFilter>, Error> {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-    let filter = SafetyFilter::builder(4, 2)
+    let mut filter = SafetyFilter::builder(4, 2)
         .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
+        .bounds(&[-4.0, -4.0], &[4.0, 4.0])?
         .build()?;
+    filter.expect_hold(Some(0.01))?;
     Ok(Box::new(filter))
 }
 

@@ -185,8 +185,8 @@ fn defects() {
     assert_eq!(
         Configuration::parse(&mixed).expect_err("mixed").to_string(),
         "barrier[0]: its relative degree along expressions is mixed: q enters derivative 2, jerk enters derivative 3 \
-         of h; one constraint cannot use both, so make the input that enters first a state whose derivative is the \
-         new input"
+         of h; one row cannot use them all. Plans can, but none are followed: q has no bounds. Mend that, or put 1 \
+         integrator before q: make it a state whose derivative is the new input"
     );
     let controller = format!(
         "kind = \"controller\"\ncontroller = \"damping\"\n{}",

@@ -1,0 +1,94 @@
+//! The tutorial and the page on obstacles: their steps are done, and what they show is what happens.
+
+use crate::models::{blocks, document};
+use crate::workshop::Workshop;
+
+/// Asserts that each line of `shown` is a line of `told`, but for blanks at its end.
+#[track_caller]
+fn assert_told(shown: &str, told: &str) {
+    for line in shown.lines() {
+        assert!(told.lines().any(|said| said.trim_end() == line), "{line:?} in {told}");
+    }
+}
+
+#[test]
+fn the_tutorial_is_what_happens() {
+    let (workshop, text) = (Workshop::with_library(), document("tutorial.md"));
+    let shown = blocks(&text, "text");
+    let [witness, verdicts, sooner, refused, around, never] = shown[..] else { panic!("{shown:?}") };
+    let made = workshop.punctual(["new", "car.toml"]).success();
+    assert!(text.contains(&format!("$ punctual new car.toml\n{made}```")), "{made}");
+    let file = workshop.text("car.toml");
+    let changed = |from: &str, to: &str| {
+        assert_eq!(file.matches(from).count(), 1, "{from:?} in {file}");
+        workshop.write("car.toml", file.replace(from, to));
+    };
+    let run = || workshop.punctual(["run", "car.toml"]).success();
+    let check = |code| {
+        let done = workshop.punctual(["check", "car.toml"]);
+        assert_eq!(done.code, code, "{done:#?}");
+        done
+    };
+    assert_told(witness, &check(0).stdout);
+    assert_told(verdicts, &run());
+    assert!(workshop.path("car/car-path.svg").exists() && workshop.path("car/car-h.svg").exists());
+
+    changed("deadline = 10.0", "deadline = 5.0");
+    assert_told(sooner, &run());
+    changed("deadline = 10.0", "deadline = 4.0");
+    let told = check(1).stdout;
+    assert_told(refused, &told);
+    assert!(text.contains("3.0103 s (no input within") && told.contains("3.0103 s (no input within"));
+    changed("deadline = 10.0", "when_infeasible = \"soonest\"\ndeadline = 4.0");
+    let told = run();
+    assert!(text.contains("after 4.12 s") && told.contains("4.117"), "{told}");
+
+    let [tree, plant] = blocks(&text, "toml")[..] else { panic!("two files") };
+    workshop.write("car.toml", format!("{file}\n{tree}"));
+    assert_told(around, &run());
+    workshop.write("car.toml", format!("{file}\n{}", tree.replace("[29.0, 8.0]", "[25.0, 15.0]")));
+    assert_told(never, &check(1).stdout);
+
+    let mistakes: Vec<_> = text.lines().filter_map(|line| line.strip_prefix("| `")).collect();
+    for (row, right) in mistakes[mistakes.len() - 2..].iter().zip(["radius = 3.0 ", "centre = [20.0, -1.0]"])
+    {
+        let (written, message) = row.split_once("` for the rock | `").expect("two columns");
+        changed(right, written);
+        let message = message.strip_suffix("` |").expect("its end");
+        workshop.punctual(["check", "car.toml"]).fails(2, &format!("car.toml: {message}"));
+    }
+
+    workshop.write("car.toml", &file);
+    workshop.write("plant.toml", plant);
+    for line in blocks(&text, "console").concat().lines().filter_map(|l| l.strip_prefix("$ punctual build "))
+    {
+        workshop.punctual(["build"].into_iter().chain(line.split(' '))).success();
+    }
+    workshop.punctual(["validate", "car.fmu"]).success();
+    assert!(workshop.files().contains(&"plant.fmu".to_owned()));
+}
+
+/// Each file, and the lines of its run that follow it.
+#[test]
+fn the_page_on_obstacles_is_what_happens() {
+    let (workshop, text) = (Workshop::new(), document("obstacles.md"));
+    let parts: Vec<_> = text.split("```toml\n").skip(1).collect();
+    assert_eq!(parts.len(), 6);
+    for part in parts {
+        let (file, rest) = part.split_once("```").expect("its end");
+        workshop.write("my.toml", file);
+        let told = workshop.punctual(["run", "my.toml"]).success();
+        let shown = blocks(rest, "text");
+        assert_told(shown.first().copied().unwrap_or_default(), &told);
+    }
+    // What is said of the two files beside: alone rows get stuck, and without a hint the wall is too wide.
+    let all = blocks(&text, "toml");
+    let [.., rows, hinted, _, _] = all[..] else { panic!("{all:?}") };
+    workshop.write("my.toml", rows.replace("assurance = \"off\"", "assurance = \"on\""));
+    workshop.punctual(["run", "my.toml", "--require", "kept"]).success();
+    let (head, rest) = hinted.split_once("[policy]").expect("a policy");
+    let barriers = &rest[rest.find("[[barrier]]").expect("a barrier")..];
+    workshop.write("my.toml", format!("{head}{barriers}"));
+    let done = workshop.punctual(["run", "my.toml", "--require", "kept"]);
+    assert!(done.code == 1 && done.stderr.contains("refused"), "{done:#?}");
+}
