@@ -5,7 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::page::{body, cells, data};
+use crate::html::{body, cells, data};
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use punctual::campaign::{self, Campaign, Cell, Measures, Row};
 use serde_json::Value;
 
-use crate::page::{body, cells, data};
+use crate::html::{body, cells, data};
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
