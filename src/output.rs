@@ -155,6 +155,14 @@ fn shown(cell: &str) -> usize {
     console::measure_text_width(cell)
 }
 
+/// A [`number`] with its unit, where it has one.
+pub fn quantity(value: f64, unit: &str) -> String {
+    match unit {
+        "1" | "" => number(value),
+        _ => format!("{} {unit}", number(value)),
+    }
+}
+
 /// A number for people: six significant digits, powers of ten only where they help.
 pub fn number(value: f64) -> String {
     if value == 0.0 {

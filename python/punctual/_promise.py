@@ -71,5 +71,6 @@ def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = 
         time, status, h, phase, late, unmet = time[:-1], status[1:], h[1:], phase[1:], late[1:], unmet[1:]
     rows = list(zip(time, h, phase, late, status))
     said = judge(rows, own if deadline is None else deadline, units)
-    failed = sum(n > 0 or s >= Status.INVALID_INPUT for n, s in zip(unmet, status))
+    abstained = range(Status.INVALID_INPUT, Status.BACKUP)
+    failed = sum(n > 0 or s in abstained for n, s in zip(unmet, status))
     return Promise(**said, unmet=failed)

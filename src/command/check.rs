@@ -494,7 +494,11 @@ fn filter(
 fn loop_warnings(run: &LoopReport) -> Vec<String> {
     let unmet = run.barriers.iter().filter(|b| b.unmet > 0).map(|b| {
         let name = &b.name;
-        format!("{name}: {} steps of the closed loop do not meet its constraint: no guarantee there", b.unmet)
+        let (steps, do_not) = if b.unmet == 1 { ("step", "does not") } else { ("steps", "do not") };
+        format!(
+            "{name}: {} {steps} of the closed loop {do_not} meet its constraint: no guarantee there",
+            b.unmet
+        )
     });
     let loose: Vec<_> = run.inputs.iter().filter(|input| input.bounds.is_none()).map(|i| i.words()).collect();
     let loose = (!loose.is_empty()).then(|| {
@@ -570,6 +574,10 @@ fn filter_text(report: &FilterReport) -> String {
         let state: Vec<_> =
             start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();
         lines.push(format!("start: {}", state.join(", ")));
+    } else {
+        lines.push(
+            "start: none; with `x0` in the file or --x0 closed loop and plans are looked at".to_owned(),
+        );
     }
     if let Some(status) = &report.status {
         lines.push(format!("first step with u_ref = 0: {status}"));
@@ -594,7 +602,7 @@ fn filter_text(report: &FilterReport) -> String {
             ("deadline", deadline),
             ("rate", rate),
             ("stay rate", stay_rate),
-            ("margin", format!("{} {}", number(b.margin), b.unit)),
+            ("margin", output::quantity(b.margin, &b.unit)),
         ];
         if let Some(found) = &b.uneven {
             let found = found.strip_prefix("is ").unwrap_or(found);
@@ -602,7 +610,8 @@ fn filter_text(report: &FilterReport) -> String {
         }
         if let Some(start) = &b.start {
             let side = if start.inside { "inside" } else { "outside" };
-            rows.push(("start", format!("{side}, h = {} {}; {}", number(start.h), b.unit, start.words())));
+            let h = output::quantity(start.h, &b.unit);
+            rows.push(("start", format!("{side}, h = {h}; {}", start.words())));
             rows.extend(start.reach.iter().flat_map(ReachReport::rows));
         }
         lines.extend(rows.into_iter().map(|(name, value)| format!("  {name:<16} {value}")));

@@ -201,7 +201,7 @@ impl LoopState {
 impl LoopInput {
     pub(super) fn words(&self) -> String {
         let Self { name, peak, unit, .. } = self;
-        let size = format!("{name} {} {unit}", number(*peak));
+        let size = format!("{name} {}", output::quantity(*peak, unit));
         match self.bounds {
             Some([min, max]) => format!("{size} (bounds {} to {})", number(min), number(max)),
             None => format!("{size} (no bounds)"),

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use punctual_core::filter::AssuredFilter;
-use punctual_core::plan::Witness;
+use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
 use super::map;
 use crate::error::Error;
-use crate::output::number;
+use crate::output::{self, number};
 
 /// The finding on plans from the start.
 #[derive(Serialize)]
@@ -90,7 +90,11 @@ pub(super) fn find(
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let soonest = if has_deadline { filter.soonest(t, x0, AssuredFilter::LONGEST) } else { None };
-    let reason = configured.as_ref().err().map(|failure| c.failure(*failure));
+    let reason = configured.as_ref().err().map(|failure| match failure {
+        // Of one trial alone: the others miss by more.
+        Failure::Broken { .. } => format!("by the nearest way tried, {}", c.failure(*failure)),
+        _ => c.failure(*failure),
+    });
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
         given.collect::<Vec<_>>()
@@ -138,21 +142,25 @@ impl WitnessReport {
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
         } else if !self.found && self.plan.is_none() {
-            lines.push(format!("no deadline up to {} times as long has a plan", AssuredFilter::LONGEST));
+            lines.push(format!(
+                "none was found for deadlines up to {} times as long either",
+                AssuredFilter::LONGEST
+            ));
         }
         if let Some(plan) = &self.plan {
             let inputs: Vec<_> = plan
                 .inputs
                 .iter()
                 .map(|(name, peak, unit, [min, max])| {
-                    format!("{name} {} {unit} (bounds {} to {})", number(*peak), number(*min), number(*max))
+                    let peak = output::quantity(*peak, unit);
+                    format!("{name} {peak} (bounds {} to {})", number(*min), number(*max))
                 })
                 .collect();
             let of = if self.found { "the plan" } else { "the plan for that" };
             lines.push(format!("{of}: at rest from {} s; {}", number(plan.rest), inputs.join(", ")));
             if let Some((barrier, time, slack, unit)) = &plan.tightest {
-                let (slack, time) = (number(*slack), number(*time));
-                lines.push(format!("its tightest place: {barrier} at {time} s, {slack} {unit} inside"));
+                let (slack, time) = (output::quantity(*slack, unit), number(*time));
+                lines.push(format!("its tightest place: {barrier} at {time} s, {slack} inside"));
             }
         }
         if !self.files.is_empty() {

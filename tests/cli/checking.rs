@@ -264,7 +264,10 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{witness}");
     // At 0.8 m/s² the edge, 61.6 m away, is passed after 14.95 s at the earliest by who can still stop inside.
     let (witness, text) = with("0.8", "");
-    assert!(text.contains("witness: NONE was found: goal is not met at "), "{text}");
+    assert!(
+        text.contains("witness: NONE was found: by the nearest way tried, goal is not met at "),
+        "{text}"
+    );
     assert_eq!(witness["found"], false);
     assert!(factor(&witness).is_some_and(|f| (1.49..1.65).contains(&f)), "{witness}");
     let soonest = witness["soonest"][0][1].as_f64();

@@ -7,7 +7,7 @@ use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
 use punctual_reference::plants::{PointMass, Signal, Unicycle};
 
-use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName};
+use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection};
 
 /// A barrier of a configuration, and the filter that it goes into.
 pub(super) struct Adding<'a> {
@@ -22,6 +22,11 @@ pub(super) struct Adding<'a> {
 }
 
 impl Adding<'_> {
+    /// Whether the plant is one of expressions.
+    pub(super) fn is_own(&self) -> bool {
+        matches!(self.configuration.plant, PlantSection::Expressions(_))
+    }
+
     /// The order of the derivative that the row is on, for the relative degree `found`; `driven` where inputs are not 0.
     fn degree(&mut self, found: RelativeDegree, driven: Option<RelativeDegree>) -> Result<usize, Error> {
         let Some(uneven) = &mut self.uneven else { return found.require(None) };

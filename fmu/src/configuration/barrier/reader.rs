@@ -73,7 +73,7 @@ impl Reader<'_> {
     /// Refuses a shape that the plant has no states or no positions for.
     fn check_plant(&self) -> Result<(), ConfigurationError> {
         let (shape, plant) = (self.row.name, self.plant);
-        let own = ["expression", "external", "plugin"].contains(&shape);
+        let own = ["expression", "external", "plugin", "at_most", "at_least"].contains(&shape);
         let message = if plant.is_external() && shape != "external" {
             format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"")
         } else if plant.plugin().is_some() && !["plugin", "external"].contains(&shape) {

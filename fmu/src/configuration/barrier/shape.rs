@@ -332,6 +332,9 @@ impl Shape {
                 to.along(|_| Ok(Outside(Rectangle::new(*centre, *half_sides, *angle)?.around())))
             }
             Self::HalfPlane { centre, normal } => to.along(|_| HalfPlane::new(*normal, *centre)),
+            // Where the plant has no name, as the expression that it is.
+            Self::AtMost { state, bound } if to.is_own() => to.expression(&format!("{bound:?} - {state}")),
+            Self::AtLeast { state, bound } if to.is_own() => to.expression(&format!("{state} - ({bound:?})")),
             Self::AtMost { state: name, bound } => {
                 to.along(|on| StateBound::at_most(state(on, name).unwrap_or(usize::MAX), *bound))
             }

@@ -144,8 +144,8 @@ fn defects() {
         ),
         (
             "expression = \"p - d\"",
-            "shape = \"at_least\"\nstate = \"p\"\nbound = 1.0",
-            "barrier[0].shape: is \"at_least\", which is for the plants that have a name; give an `expression`",
+            "shape = \"speed_limit\"\nbound = 1.0",
+            "barrier[0].shape: is \"speed_limit\", which is for the plants that have a name; give an `expression`",
         ),
         (
             "expression = \"p - d\"",
@@ -315,5 +315,23 @@ fn the_car_with_jerk_meets_its_deadline() {
         assert!(t < 4.0 || x[0] >= 60.0, "t = {t}: {x:?}");
         assert!(x[1] <= 40.0, "t = {t}: {x:?}");
         plant.rk4_step(&mut x, &u, 0.01).expect("the lengths");
+    }
+}
+
+/// A bound of a state of one's own model is the expression that it stands for.
+#[test]
+fn bounds_of_states_are_expressions() {
+    let stepped = |barrier: &str| {
+        let text = CAR.replace("expression = \"p - d\"", barrier);
+        let Configuration::Filter(c) = Configuration::parse(&text).expect("a filter") else {
+            panic!("{text}")
+        };
+        let (mut filter, mut u) = (c.build().expect("a filter"), [0.0]);
+        filter.step(0.0, &[-20.5, 10.0, 0.25], &[0.0], &mut u).expect("right dimensions");
+        u[0].to_bits()
+    };
+    for (shape, expression) in [("at_least", "p - (-3.5)"), ("at_most", "-3.5 - p")] {
+        let of_shape = stepped(&format!("shape = \"{shape}\"\nstate = \"p\"\nbound = -3.5"));
+        assert_eq!(of_shape, stepped(&format!("expression = \"{expression}\"")), "{shape}");
     }
 }
