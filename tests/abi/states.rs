@@ -55,7 +55,7 @@ fn the_layout_is_what_is_documented() {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
-        assert_eq!(bytes[VERSION..GUID], 6_u32.to_le_bytes());
+        assert_eq!(bytes[VERSION..GUID], 7_u32.to_le_bytes());
         assert_eq!(&bytes[GUID..LENGTH], fmu.guid().as_bytes());
         assert_eq!(bytes[LENGTH..MODE], (bytes.len() as u64).to_le_bytes());
         assert_eq!(bytes[MODE], 2, "step mode");

@@ -322,7 +322,9 @@ fn the_car_with_jerk_meets_its_deadline() {
 #[test]
 fn bounds_of_states_are_expressions() {
     let stepped = |barrier: &str| {
-        let text = CAR.replace("expression = \"p - d\"", barrier);
+        let text = CAR
+            .replace("unit = \"m\"\ndeadline", "deadline")
+            .replace("expression = \"p - d\" # h >= 0 is wanted", barrier);
         let Configuration::Filter(c) = Configuration::parse(&text).expect("a filter") else {
             panic!("{text}")
         };
