@@ -181,6 +181,8 @@ def test_plans_are_followed_as_by_the_fmu(tmp_path):
         assert (distance[plan.times >= 8.0] <= 2.0).all() and (np.hypot(*(plan.x[:, :2] - [10.0, 5.0]).T) >= 2.0).all()
         assert np.abs(plan.x[-1, 3]) < 1e-4, "at rest"
     assert backups > 0
+    # A step that the plan decides keeps the promise; it is none that fails.
+    assert punctual.promise(result, "goal").unmet == 0
 
 
 def test_what_is_not_promised_is_said():
