@@ -118,7 +118,20 @@ impl fmt::Display for FmuProblem {
             Self::NoBinary { wanted, present } => {
                 write!(f, "holds no binary for {wanted}, only for {}", present.join(", "))
             }
-            Self::Load(reason) => write!(f, "its library cannot be loaded: {reason}"),
+            Self::Load(reason) => {
+                write!(f, "its library cannot be loaded: {reason}")?;
+                // Those of pythonfmu do: the symbols are Python's own.
+                let takes_python =
+                    ["undefined symbol: Py", "undefined symbol: _Py"].iter().any(|s| reason.contains(s));
+                match takes_python {
+                    true => f.write_str(
+                        "; it takes Python from the program that loads it: start this one with \
+                         LD_PRELOAD=FOLDER/libpython3.X.so, where `python3 -c \"import sysconfig as s; \
+                         print(s.get_config_var('LIBDIR'), s.get_config_var('LDLIBRARY'))\"` tells both",
+                    ),
+                    false => Ok(()),
+                }
+            }
             Self::MissingSymbol(name) => write!(f, "its library does not export {name}"),
             Self::Version { call, answer } => write!(f, "{call} answered {answer:?}, not FMI 2.0"),
         }

@@ -67,6 +67,13 @@ def test_in_fmpy_it_moves_like_ours(folder):
     assert all(row["filter.goal.h"] >= 0.0 for t, row in rows if t >= DEADLINE - STEP / 2)
 
 
+def test_what_it_takes_is_told(folder, monkeypatch):
+    monkeypatch.delenv("LD_PRELOAD", raising=False)
+    done = punctual("run", "foreign.toml", "--out", "out", cwd=folder, check=False)
+    assert done.returncode == 1 and "undefined symbol" in done.stderr, done
+    assert "start this one with LD_PRELOAD=FOLDER/libpython3.X.so" in done.stderr, done
+
+
 def test_in_punctual_run_too(folder, monkeypatch):
     # The interpreter in the FMU finds its modules (pythonfmu) as this one does.
     monkeypatch.setenv("LD_PRELOAD", str(libpython()))
