@@ -75,6 +75,6 @@ fn a_c_host_under_valgrind() {
     assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
     let mut command = Command::new("valgrind");
     command.args(["-q", "--leak-check=full", "--show-leak-kinds=all", "--errors-for-leak-kinds=all"]);
-    command.args(["--error-exitcode=9"]).arg(host).args(arguments(&workshop));
+    command.args(["--error-exitcode=9", "--keep-debuginfo=yes"]).arg(host).args(arguments(&workshop));
     clean(&command.output().expect("valgrind"));
 }

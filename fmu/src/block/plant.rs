@@ -17,8 +17,8 @@ pub(super) struct PlantBlock {
     parameters: Vec<Parameter<PlantConfiguration>>,
     layout: Layout,
     plant: Box<dyn DynPlant>,
-    /// What is told beside the states.
-    outputs: Functions<f64>,
+    /// What is told beside the states, if anything is.
+    outputs: Option<Functions<f64>>,
     disturbance: Disturbance,
     x: Vec<f64>,
     /// Scratch: the state after the step under way.
@@ -55,7 +55,9 @@ impl Block for PlantBlock {
         let (measured, others) = told.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
         self.disturbance.blur(t, measured);
-        others.iter_mut().zip(self.outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
+        if let Some(outputs) = &mut self.outputs {
+            others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
+        }
     }
 
     /// The state does not depend on the inputs before a step.
@@ -98,8 +100,9 @@ impl Block for PlantBlock {
             let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
             return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i]));
         }
-        if let Some((i, value)) =
-            self.outputs.at(t + h, |i| self.next[i]).enumerate().find(|(_, v)| !v.is_finite())
+        if let Some(outputs) = &mut self.outputs
+            && let Some((i, value)) =
+                outputs.at(t + h, |i| self.next[i]).enumerate().find(|(_, v)| !v.is_finite())
         {
             let output = &self.configuration.output[i];
             return Err(format!(

@@ -378,17 +378,20 @@ impl PlantConfiguration {
         self.output.iter().map(signal).collect()
     }
 
-    /// The values of the outputs, in order.
+    /// The values of the outputs, in order; none where there are no outputs.
     ///
     /// # Errors
     ///
     /// An expression that cannot be used, by its path.
-    pub fn outputs<C: Scalar>(&self) -> Result<Functions<C>, ConfigurationError> {
+    pub fn outputs<C: Scalar>(&self) -> Result<Option<Functions<C>>, ConfigurationError> {
+        if self.output.is_empty() {
+            return Ok(None);
+        }
         let place = |i: usize| format!("output[{i}].expression");
         let places: Vec<String> = (0..self.output.len()).map(place).collect();
         let texts = self.output.iter().map(|output| output.expression.as_str());
         let expressions: Vec<_> = places.iter().map(String::as_str).zip(texts).collect();
-        self.plant.values(&expressions)
+        self.plant.values(&expressions).map(Some)
     }
 
     /// The plant.
