@@ -17,8 +17,29 @@ pub(super) struct Adding<'a> {
     pub(super) index: usize,
     /// The index of the first state of the filter that is an input of this barrier.
     pub(super) first: usize,
-    /// Where barriers go whose inputs enter at different orders, with what was found; `None` where they are refused.
-    pub(super) uneven: Option<&'a mut Vec<(usize, RelativeDegree)>>,
+    /// What becomes of it where its inputs enter at different orders.
+    pub(super) uneven: Uneven<'a>,
+}
+
+/// What becomes of barriers whose inputs enter at different orders.
+pub(super) enum Uneven<'a> {
+    /// They are refused: one row cannot use every input.
+    Refused,
+    /// They are taken: plans use every input.
+    Taken,
+    /// They are taken, and told by their index with what was found.
+    Told(&'a mut Vec<(usize, RelativeDegree)>),
+}
+
+impl Uneven<'_> {
+    /// The same, for one barrier.
+    pub(super) fn reborrow(&mut self) -> Uneven<'_> {
+        match self {
+            Self::Refused => Uneven::Refused,
+            Self::Taken => Uneven::Taken,
+            Self::Told(list) => Uneven::Told(list),
+        }
+    }
 }
 
 impl Adding<'_> {
@@ -27,23 +48,27 @@ impl Adding<'_> {
         matches!(self.configuration.plant, PlantSection::Expressions(_))
     }
 
-    /// The order of the derivative that the row is on, for the relative degree `found`; `driven` where inputs are not 0.
-    fn degree(&mut self, found: RelativeDegree, driven: Option<RelativeDegree>) -> Result<usize, Error> {
-        let Some(uneven) = &mut self.uneven else { return found.require(None) };
-        let later = driven.filter(|driven| matches!(driven, RelativeDegree::Mixed(_)));
-        match (found.uniform(), found.least(), later) {
-            // The row is right, but other inputs come in later.
-            (Some(n), _, Some(later)) if later.least() == Some(n) => {
-                uneven.push((self.index, later));
-                Ok(n)
-            }
-            // A plan moves every input, whatever the row moves.
-            (None, Some(n), _) => {
-                uneven.push((self.index, found));
-                Ok(n)
-            }
-            _ => found.require(None),
+    /// The order of the derivative that the row is on, for the relative degree `found`; `driven` is that with inputs that are
+    /// not 0, where it is known.
+    fn degree(
+        &mut self,
+        found: RelativeDegree,
+        driven: impl FnOnce() -> Option<RelativeDegree>,
+    ) -> Result<usize, Error> {
+        // A plan moves every input, whatever the row moves.
+        let n = match (&self.uneven, found.least()) {
+            (Uneven::Taken | Uneven::Told(_), Some(n)) => n,
+            _ => found.clone().require(None)?,
+        };
+        if let Uneven::Told(list) = &mut self.uneven {
+            let later = match found {
+                // The row is right, but other inputs may come in later.
+                RelativeDegree::Uniform(_) => driven().filter(|d| matches!(d, RelativeDegree::Mixed(_))),
+                _ => Some(found),
+            };
+            list.extend(later.filter(|later| later.least() == Some(n)).map(|later| (self.index, later)));
         }
+        Ok(n)
     }
 
     fn section(&self) -> &BarrierSection {
@@ -100,13 +125,13 @@ impl Adding<'_> {
     {
         let dim = NX + self.configuration.barrier_inputs().len();
         let source = if self.section().shape.followed().is_none() {
-            self.degree(lie::detected(&plant, &barrier), None)
+            self.degree(lie::detected(&plant, &barrier), || None)
                 .and_then(|n| lie::along(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i)))
         } else {
             let (plant, first) = (WithPoint::<_, NX>(plant), self.first);
             let picks = std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
-            self.degree(lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier), None)
+            self.degree(lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier), || None)
                 .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &picks))
         };
@@ -118,8 +143,8 @@ impl Adding<'_> {
         let plant = &self.configuration.plant;
         let barrier = plant.expressions()?.barrier(text).map_err(|e| self.of_model(&e))?;
         let ranges = plant.ranges();
-        let found = [barrier.relative_degree(&ranges), barrier.driven_degree(&ranges)];
-        self.model(found, |n| barrier.source(n))
+        let found = barrier.relative_degree(&ranges);
+        self.model(found, || barrier.driven_degree(&ranges), |n| barrier.source(n))
     }
 
     /// Adds the barrier of the plant's plug-in that is called `output`.
@@ -133,8 +158,8 @@ impl Adding<'_> {
         let barrier =
             plugin.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
         let ranges = plant.ranges();
-        let found = [barrier.relative_degree(&ranges), barrier.driven_degree(&ranges)];
-        self.model(found, |n| barrier.source(n))
+        let found = barrier.relative_degree(&ranges);
+        self.model(found, || barrier.driven_degree(&ranges), |n| barrier.source(n))
     }
 
     /// Adds a barrier whose derivatives are the filter's states from [`Self::first`] on.
@@ -146,13 +171,14 @@ impl Adding<'_> {
         self.source(source.and_then(|source| lie::embedded(source, dim, &own)))
     }
 
-    /// Adds a barrier of the relative degree `found`, without and with inputs; `source` makes its derivatives.
+    /// Adds a barrier of the relative degree `found`, and `driven` with inputs; `source` makes its derivatives.
     fn model(
         mut self,
-        [found, driven]: [RelativeDegree; 2],
+        found: RelativeDegree,
+        driven: impl FnOnce() -> RelativeDegree,
         source: impl FnOnce(usize) -> Result<Box<dyn DerivativeSource>, punctual_models::Error>,
     ) -> Result<FilterBuilder, ConfigurationError> {
-        let n = self.degree(found, Some(driven)).map_err(|e| self.named(e))?;
+        let n = self.degree(found, || Some(driven())).map_err(|e| self.named(e))?;
         let own: Vec<usize> = (0..self.configuration.plant.states().len()).collect();
         let dim = own.len() + self.configuration.barrier_inputs().len();
         let source = source(n).map_err(|e| self.of_model(&e))?;

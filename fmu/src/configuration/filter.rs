@@ -8,7 +8,7 @@ use punctual_core::lie::RelativeDegree;
 use punctual_core::plan::Failure;
 use serde::{Deserialize, Serialize};
 
-use super::adding::{Adding, not_affine};
+use super::adding::{Adding, Uneven, not_affine};
 use super::alone::within;
 use super::barrier::RawBarrier;
 use super::key::{
@@ -472,24 +472,20 @@ impl FilterConfiguration {
     ///
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
-        let mut uneven = Vec::new();
-        self.built(self.is_assured().then_some(&mut uneven))
+        self.built(if self.is_assured() { Uneven::Taken } else { Uneven::Refused })
     }
 
     /// The barriers, by their index, whose inputs enter at different orders, with what was found: only plans move them all.
     pub fn uneven(&self) -> Vec<(usize, RelativeDegree)> {
         let mut uneven = Vec::new();
-        match self.built(Some(&mut uneven)) {
+        match self.built(Uneven::Told(&mut uneven)) {
             Ok(_) => uneven,
             Err(_) => Vec::new(),
         }
     }
 
-    /// The filter; barriers whose inputs enter at different orders go into `uneven`, or are refused.
-    pub(super) fn built(
-        &self,
-        mut uneven: Option<&mut Vec<(usize, RelativeDegree)>>,
-    ) -> Result<SafetyFilter, ConfigurationError> {
+    /// The filter, with what becomes of barriers whose inputs enter at different orders.
+    pub(super) fn built(&self, mut uneven: Uneven<'_>) -> Result<SafetyFilter, ConfigurationError> {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
@@ -498,7 +494,7 @@ impl FilterConfiguration {
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;
             next_point += section.inputs(&self.plant).len();
-            let uneven = uneven.as_deref_mut();
+            let uneven = uneven.reborrow();
             builder = section.shape.add(Adding { configuration: self, builder, index: i, first, uneven })?;
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
@@ -572,7 +568,7 @@ impl FilterConfiguration {
 
     /// What no plan accounts for, in words.
     pub fn unaccounted(&self) -> Option<String> {
-        let filter = self.built(Some(&mut Vec::new())).map_err(|e| e.to_string());
+        let filter = self.built(Uneven::Taken).map_err(|e| e.to_string());
         filter.and_then(|filter| self.assured(filter)).err()
     }
 

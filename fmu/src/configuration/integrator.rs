@@ -6,6 +6,7 @@ use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, Safety
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
+use super::adding::Uneven;
 use super::filter::AssuranceName;
 use super::key::{
     Key, Section,
@@ -168,7 +169,7 @@ impl FilterConfiguration {
             }
         }
         // Rows alone need every input in the same derivative.
-        let filter = self.built(None)?;
+        let filter = self.built(Uneven::Refused)?;
         match &self.integrator {
             None => Ok(FilterLoop::Plain(filter)),
             Some(section) => self.integrated(filter, section).map(FilterLoop::Integrated),
