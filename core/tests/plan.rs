@@ -690,7 +690,12 @@ fn filters_that_plans_do_not_account_for_are_refused() {
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let moves = AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string());
-    assert_eq!(moves.as_deref(), Some("goal.source: moves with time, which no plan accounts for yet"));
+    assert_eq!(
+        moves.as_deref(),
+        Some(
+            "goal.source: moves with time for ever, so that no plan ends; with a horizon one may end before"
+        )
+    );
 }
 
 /// Obstacles that cross the way at constant velocity, and one that comes by where the vehicle has come to rest.

@@ -61,6 +61,14 @@ impl FilterLoop {
         }
     }
 
+    /// The time in s until which the promise is kept, infinite for ever, where it stands.
+    pub fn assured_until(&self) -> Option<f64> {
+        match self {
+            Self::Assured(assured) => assured.assurance().until,
+            Self::Plain(_) | Self::Integrated(_) => None,
+        }
+    }
+
     /// The plan that keeps the promise after the last step, where there is one.
     pub fn plan(&self) -> Option<&Witness> {
         match self {

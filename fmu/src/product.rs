@@ -326,6 +326,10 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     if c.is_assured() {
         table.add("assurance".into(), "where the promise stands", output, enumerated(ASSURANCE));
     }
+    if c.ends_plans() {
+        let until = "time until which the promise is kept, 1e30 for ever; now, where nothing is assured";
+        table.add("assured_until".into(), until, output, real(None, "s"));
+    }
     if let Some(integrator) = &c.integrator {
         let (name, inputs) = (&integrator.state, c.commanded());
         let unit = inputs.iter().find(|i| i.name == *name).map_or("1", |i| &i.unit);

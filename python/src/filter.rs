@@ -109,8 +109,7 @@ impl Filter {
             self.seen.0 = t;
             self.seen.1.copy_from_slice(&self.x);
         }
-        let (report, standing) = (own.filter().filter().report(), own.filter().standing());
-        Ok(Step::new(py, &self.u, report, standing.map(|(standing, _)| standing), &self.names))
+        Ok(Step::new(py, &self.u, own.filter(), &self.names))
     }
 
     /// The plan that keeps every promise from the last step on; `None` without one.
@@ -120,7 +119,7 @@ impl Filter {
         Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), &self.interface)
     }
 
-    /// Why there is no plan, where the promise was refused or withdrawn.
+    /// Why there is no plan, where the promise was refused or withdrawn, or has come to its end.
     #[getter]
     fn refusal(&mut self) -> Option<String> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);

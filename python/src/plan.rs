@@ -10,7 +10,8 @@ use crate::loading::Interface;
 /// Points of the way, at least.
 const POINTS: f64 = 200.0;
 
-/// A verified way to keep every promise from the last step on, whatever u_ref is. The last input is held for ever.
+/// A verified way to keep every promise from the last step on, whatever u_ref is. The last input is held for ever, or the
+/// plan ends with it.
 #[pyclass(frozen, module = "punctual")]
 pub(crate) struct Plan {
     /// Names of the states, the columns of `x`.
@@ -19,7 +20,7 @@ pub(crate) struct Plan {
     /// Names of the inputs, the columns of `u`.
     #[pyo3(get)]
     inputs: Vec<String>,
-    /// Times on the way in s, shape (n,); the plant is at rest from the last on.
+    /// Times on the way in s, shape (n,); the plant is at rest from the last on, or the plan ends there.
     #[pyo3(get)]
     times: Py<PyArray1<f64>>,
     /// The states then, shape (n, states).
@@ -28,6 +29,9 @@ pub(crate) struct Plan {
     /// The inputs held from then until the next time, shape (n, inputs).
     #[pyo3(get)]
     u: Py<PyArray2<f64>>,
+    /// Time in s until which it keeps every promise: `inf` where it ends at rest.
+    #[pyo3(get)]
+    until: f64,
     /// The largest input on the way after the first, as a part of its bounds, 0 to 1.
     #[pyo3(get)]
     effort: f64,
@@ -45,7 +49,7 @@ impl Plan {
         interface: &Interface,
     ) -> PyResult<Option<Self>> {
         let (Some(witness), FilterLoop::Assured(assured)) = (filter.plan(), filter) else { return Ok(None) };
-        let Witness { inputs: holds, tightest, effort, .. } = witness;
+        let Witness { inputs: holds, tightest, effort, until, .. } = witness;
         let inputs = interface.inputs.len();
         let end = holds.last().map_or(t, |(end, _)| *end);
         let way = assured.way(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
@@ -61,6 +65,7 @@ impl Plan {
             times: times.into_pyarray(py).unbind(),
             x: states.into_pyarray(py).reshape([count, x.len()])?.unbind(),
             u: held.into_pyarray(py).reshape([count, inputs])?.unbind(),
+            until: *until,
             effort: *effort,
             tightest: tightest.map(|at| (name(at.barrier), at.time, at.slack)),
         }))
@@ -72,6 +77,7 @@ impl Plan {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let times = self.times.bind(py).readonly();
         let end = times.as_slice()?.last().copied().unwrap_or(f64::NAN);
-        Ok(format!("Plan(at rest from t={end}, effort={})", self.effort))
+        let ending = if self.until.is_finite() { "until" } else { "at rest from" };
+        Ok(format!("Plan({ending} t={end}, effort={})", self.effort))
     }
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use punctual_core::filter::{self, Phase, Report, Standing, Status};
+use punctual_core::filter::{self, Phase, Standing, Status};
+use punctual_fmu::FilterLoop;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -110,22 +111,21 @@ pub(crate) struct Step {
     u: Py<PyArray1<f64>>,
     status: Status,
     standing: Option<Standing>,
+    /// Time in s until which every promise is kept, `inf` for ever; `None` where nothing is assured.
+    #[pyo3(get)]
+    assured_until: Option<f64>,
     barriers: Vec<filter::BarrierReport>,
     names: Arc<[String]>,
 }
 
 impl Step {
-    pub(crate) fn new(
-        py: Python<'_>,
-        u: &[f64],
-        report: &Report,
-        standing: Option<Standing>,
-        names: &Arc<[String]>,
-    ) -> Self {
+    pub(crate) fn new(py: Python<'_>, u: &[f64], filter: &FilterLoop, names: &Arc<[String]>) -> Self {
+        let report = filter.filter().report();
         Self {
             u: PyArray1::from_slice(py, u).unbind(),
             status: report.status,
-            standing,
+            standing: filter.standing().map(|(standing, _)| standing),
+            assured_until: filter.assured_until(),
             barriers: report.barriers.clone(),
             names: Arc::clone(names),
         }

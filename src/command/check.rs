@@ -124,6 +124,9 @@ struct StartReport {
     promised: bool,
     /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
+    /// Time in s until which it does, where the plan ends without a rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guaranteed_until: Option<f64>,
     /// Whether the theorem applies to the first step.
     on_course: bool,
     /// Verdict of the closed loop, where the plant is known.
@@ -134,9 +137,12 @@ struct StartReport {
 
 impl StartReport {
     /// The first step and the closed loop together, in words.
-    fn words(&self) -> &'static str {
+    fn words(&self) -> String {
         match (self.on_course, self.simulated) {
-            _ if self.guaranteed => "guaranteed, whatever u_ref is",
+            _ if self.guaranteed => {
+                let until = self.guaranteed_until.map(|until| format!(" until {} s", number(until)));
+                return format!("guaranteed{}, whatever u_ref is", until.unwrap_or_default());
+            }
             (true, Some(Kept::Kept)) => "on course, and the closed loop keeps it",
             (true, None) => "on course at the first step; without a model nothing is simulated",
             (_, Some(Kept::NothingPromised)) => "nothing is promised without a deadline",
@@ -144,6 +150,7 @@ impl StartReport {
             (false, Some(Kept::Kept)) => "not on course, though the closed loop keeps it",
             (false, _) => "not on course",
         }
+        .to_owned()
     }
 }
 
@@ -444,6 +451,7 @@ fn filter(
             inside: b.h >= -ROUND_OFF,
             promised: guaranteed || b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
             guaranteed,
+            guaranteed_until: witness.as_ref().filter(|_| guaranteed).and_then(WitnessReport::until),
             on_course: b.on_course,
             simulated,
             reach,

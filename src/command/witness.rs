@@ -35,8 +35,10 @@ pub(super) struct WitnessReport {
 /// A plan that was checked.
 #[derive(Serialize)]
 struct PlanReport {
-    /// Time in s from which the plant is at rest.
-    rest: f64,
+    /// Time in s from which the plant is at rest, where the plan ends so.
+    rest: Option<f64>,
+    /// Time in s until which it keeps every promise, where it ends without a rest.
+    until: Option<f64>,
     /// The largest size of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
     /// The barrier with the least h above its margin, the time in s, and that h.
@@ -71,7 +73,8 @@ pub(super) fn find(
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
     let plan = |witness: &Witness| PlanReport {
-        rest: witness.inputs.last().map_or(t, |(end, _)| *end),
+        rest: witness.until.is_infinite().then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
+        until: Some(witness.until).filter(|until| until.is_finite()),
         inputs: inputs
             .iter()
             .enumerate()
@@ -121,6 +124,11 @@ impl WitnessReport {
         self.found && self.left_out.iter().all(|name| name != barrier)
     }
 
+    /// Time in s until which the plan keeps what it does, where it ends without a rest.
+    pub(super) fn until(&self) -> Option<f64> {
+        self.plan.as_ref()?.until
+    }
+
     /// The soonest deadline of `barrier` in s with a plan.
     pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
         self.soonest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
@@ -129,7 +137,11 @@ impl WitnessReport {
     pub(super) fn text(&self) -> String {
         let mut lines = vec![match (self.found, &self.reason) {
             (true, _) => {
-                "\nwitness: a plan within the bounds keeps every promise, whatever u_ref is".to_owned()
+                let until = self
+                    .until()
+                    .map(|until| format!(", until {} s; it is prolonged where one is found", number(until)));
+                let keeps = "a plan within the bounds keeps every promise, whatever u_ref is";
+                format!("\nwitness: {keeps}{}", until.unwrap_or_default())
             }
             (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
             (false, None) => "\nwitness: NONE was found".to_owned(),
@@ -157,7 +169,11 @@ impl WitnessReport {
                 })
                 .collect();
             let of = if self.found { "the plan" } else { "the plan for that" };
-            lines.push(format!("{of}: at rest from {} s; {}", number(plan.rest), inputs.join(", ")));
+            let ending = match (plan.rest, plan.until) {
+                (Some(rest), _) => format!("at rest from {} s", number(rest)),
+                (None, until) => format!("until {} s, without a rest", number(until.unwrap_or(f64::NAN))),
+            };
+            lines.push(format!("{of}: {ending}; {}", inputs.join(", ")));
             if let Some((barrier, time, slack, unit)) = &plan.tightest {
                 let (slack, time) = (output::quantity(*slack, unit), number(*time));
                 lines.push(format!("its tightest place: {barrier} at {time} s, {slack} inside"));

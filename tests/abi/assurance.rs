@@ -304,3 +304,29 @@ fn derivatives_are_given_or_refused() {
     }
     assert!(given > 60 && backups > 5, "{given} given, {backups} of the plan, {refused} refused");
 }
+
+/// A vehicle that must not stop has no plan that ends at rest: it is promised until a time, which is saved with the state.
+#[test]
+fn a_promise_with_an_end_tells_it() {
+    let forwards = "[[barrier]]\nname = \"forwards\"\nshape = \"at_least\"\nstate = \"v\"\nbound = 0.5\n";
+    let horizon = "assurance = \"on\"\nplan_horizon = 4.0";
+    let moving = ASSURED.replace("assurance = \"on\"", horizon) + forwards;
+    let fmu = Fmu::new(&moving);
+    let (slave, other) = (Slave::ready(&fmu), Slave::new(&fmu));
+    let mut x = [0.0, 0.0, 1.0, 1.0];
+    let mut until = 0.0;
+    for k in 0..12 {
+        (_, x) = drive(&slave, x, 25 * k, 25 * (k + 1));
+        assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+        let now = slave.real("assured_until");
+        assert!(now >= until && now > slave.time(), "from {until} to {now}");
+        until = now;
+    }
+    // More than the deadline and the horizon: it was put off.
+    assert!(until > 18.0, "{until}");
+    other.restore(other.read(&slave.now()));
+    assert_eq!(other.real("assured_until").to_bits(), until.to_bits());
+    assert_eq!(drive(&other, x, 300, 320).0, drive(&slave, x, 300, 320).0);
+    // Without it there is no such output.
+    assert!(Fmu::new(ASSURED).product.variables.iter().all(|variable| variable.name != "assured_until"));
+}

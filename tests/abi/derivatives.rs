@@ -151,6 +151,30 @@ fn of_a_filter_in_every_mode_that_has_them() {
     }
 }
 
+/// Plans and an integral: outputs of both kinds come after those of the barriers.
+#[test]
+fn of_a_filter_with_plans_behind_an_integrator() {
+    let planned = STEERED.replace("bounds = {", "bounds = { a = [-60.0, 60.0],");
+    let fmu = Fmu::new(&planned);
+    assert!(fmu.filter().is_assured());
+    let slave = Slave::ready(&fmu);
+    let mut values = [3.0, -2.0, 0.45, 2.0, -0.5, 0.1];
+    for k in 0..5 {
+        set(&slave, &reals(&fmu, Causality::Input), &values);
+        slave.step(0.1 * f64::from(k), 0.1);
+        // Where the plant goes, in small steps.
+        let (a, beta) = (slave.real("u.a"), slave.real("u.beta"));
+        for _ in 0..10_000 {
+            let [_, _, theta, v, ..] = values;
+            let (sin, cos) = theta.sin_cos();
+            let rates = [v * (cos - sin * beta), v * (sin + cos * beta), v * beta / 1.5, a];
+            values.iter_mut().zip(rates).for_each(|(x, rate)| *x += 1e-5 * rate);
+        }
+    }
+    compare(&slave, &values, "of a plan that was there");
+    assert_eq!(slave.integer("assurance"), 1, "assured");
+}
+
 #[test]
 fn of_a_controller() {
     for (text, values) in [

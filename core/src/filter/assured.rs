@@ -34,6 +34,8 @@ const BISECTIONS: u32 = 3;
 /// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
 /// it again at the next, and the input jump between the two.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
+/// The part of the time until the end of a plan after which it is tried again to be prolonged, where it was not.
+const SOONER: f64 = 0.25;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
 
@@ -74,12 +76,14 @@ pub enum Standing {
     /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
     /// from there. After a late one the promise is taken up again at the next sample in time, if a plan keeps it from there.
     Irregular = 4,
+    /// Was assured until a time, which has come: no plan was found beyond it.
+    Expired = 5,
 }
 
 impl Standing {
     /// Every standing, in the order of its number.
-    pub const ALL: [Self; 5] =
-        [Self::Undecided, Self::Assured, Self::Refused, Self::Withdrawn, Self::Irregular];
+    pub const ALL: [Self; 6] =
+        [Self::Undecided, Self::Assured, Self::Refused, Self::Withdrawn, Self::Irregular, Self::Expired];
 
     /// Its name, as the FMU's enumeration has it.
     pub fn name(self) -> &'static str {
@@ -100,6 +104,7 @@ impl Standing {
             Self::Irregular => {
                 ("irregular", "was assured: a step came late, or early without a plan from there")
             }
+            Self::Expired => ("expired", "was assured until now: no plan was found beyond"),
         }
     }
 }
@@ -112,8 +117,11 @@ pub struct Assurance {
     pub standing: Standing,
     /// Who chose the input.
     pub driver: Driver,
-    /// Why there is no plan, where the promise was refused or withdrawn.
+    /// Why there is no plan, where the promise was refused, withdrawn, or has come to its end.
     pub failure: Option<Failure>,
+    /// The time in s until which every promise is kept, infinite for ever; `None` where nothing is assured. Once given, it
+    /// never goes back.
+    pub until: Option<f64>,
 }
 
 impl Assurance {
@@ -138,6 +146,9 @@ pub struct Commitment {
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     share: f64,
+    /// The time in s at which a plan that ends is next tried to be prolonged.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    prolong_at: f64,
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     sample: Option<[f64; 2]>,
@@ -163,6 +174,23 @@ struct Looked {
     u_ref: Vec<f64>,
     u: [f64; MAX_INPUTS],
     inside: [f64; MAX_INPUTS],
+}
+
+/// How often inputs change, and how far plans reach. A number is a period, with plans that end at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// The time in s for which an input is held, finite, > 0.
+    pub period: f64,
+    /// Where no plan ends at rest, the time in s, finite, > 0, that one has to reach past the last deadline and the sample;
+    /// promises are then kept [until its end](Assurance::until). `None`: a plan has to end at rest. For plants without a
+    /// rest, such as an aeroplane, and for sets that move for ever. It is tried to be prolonged before it ends.
+    pub horizon: Option<f64>,
+}
+
+impl From<f64> for Pace {
+    fn from(period: f64) -> Self {
+        Self { period, horizon: None }
+    }
 }
 
 /// A [`SafetyFilter`] that promises only what a plan keeps.
@@ -204,6 +232,7 @@ pub struct AssuredFilter {
     /// The bounds of the inputs of the filter inside; for an integral those of a sample are tighter.
     bounds: Bounds,
     period: f64,
+    horizon: Option<f64>,
     policies: Vec<Policy>,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
@@ -322,34 +351,35 @@ impl AssuredFilter {
     /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
     pub const LONGEST: f64 = 16.0;
 
-    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0.
+    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0; or [`Pace`] says more.
     ///
     /// # Errors
     ///
-    /// A period out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with another plant
-    /// than the first one; one with a deadline that begins later, one that begins on another's arrival, or one that moves for
-    /// ever; a bound on disturbance or measurement errors; a delay.
-    pub fn new(filter: SafetyFilter, period: f64) -> Result<Self, Error> {
+    /// A period or horizon out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with
+    /// another plant than the first one; one with a deadline that begins later, one that begins on another's arrival, or
+    /// without a horizon one that moves for ever; a bound on disturbance or measurement errors; a delay.
+    pub fn new(filter: SafetyFilter, pace: impl Into<Pace>) -> Result<Self, Error> {
         let bounds = filter.bounds;
-        Self::around(Rows::Plain(filter), bounds, period)
+        Self::around(Rows::Plain(filter), bounds, pace.into())
     }
 
-    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0. Plans account for the mean that the
-    /// plant is given over each period, and keep the limits of the integral. `x`, `u` and `u_ref` are those of
-    /// [`IntegratedFilter::step`].
+    /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0; or [`Pace`] says more. Plans account
+    /// for the mean that the plant is given over each period, and keep the limits of the integral. `x`, `u` and `u_ref` are
+    /// those of [`IntegratedFilter::step`].
     ///
     /// # Errors
     ///
     /// As for [`Self::new`].
-    pub fn integrated(filter: IntegratedFilter, period: f64) -> Result<Self, Error> {
+    pub fn integrated(filter: IntegratedFilter, pace: impl Into<Pace>) -> Result<Self, Error> {
         let mut bounds = filter.filter.bounds;
         let input = filter.of.input;
         [bounds.min[input], bounds.max[input]] = filter.rates;
-        Self::around(Rows::Integrated(filter), bounds, period)
+        Self::around(Rows::Integrated(filter), bounds, pace.into())
     }
 
-    fn around(rows: Rows, bounds: Bounds, period: f64) -> Result<Self, Error> {
+    fn around(rows: Rows, bounds: Bounds, Pace { period, horizon }: Pace) -> Result<Self, Error> {
         positive("period", period)?;
+        horizon.map(|horizon| positive("horizon", horizon)).transpose()?;
         let filter = rows.filter();
         let refuse = |field: &str, message: &str| {
             Err(Error::new(
@@ -386,14 +416,17 @@ impl AssuredFilter {
         }
         one_plant(filter, period)?;
         for slot in &filter.slots {
-            if slot.end == End::Never && leaves(slot, filter.state_dim) {
-                return refuse("source", "moves with time").map_err(|e| e.within(&slot.name));
+            if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
+                let message =
+                    "moves with time for ever, so that no plan ends; with a horizon one may end before";
+                return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
             }
         }
         Ok(Self {
             rows,
             bounds,
             period,
+            horizon,
             policies: Vec::new(),
             expected: None,
             commitment: Commitment::default(),
@@ -512,7 +545,7 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, share, sample, .. } = commitment;
+        let Commitment { standing, promises, plan, share, prolong_at, sample, .. } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -527,6 +560,9 @@ impl AssuredFilter {
             if !(0.0..=1.0).contains(share) {
                 return refuse("share", "is no part, must be 0 to 1");
             }
+            if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
+                return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
+            }
             let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
             if !promises.iter().flatten().all(is_promise) {
                 return refuse("promises", "have a time or a margin that is no number");
@@ -539,7 +575,8 @@ impl AssuredFilter {
         self.commitment.clone_from(commitment);
         self.looked = None;
         let Commitment { standing, failure, .. } = self.commitment;
-        self.assurance = Assurance { standing, driver: Driver::Rows, failure };
+        let until = self.plan().map(|witness| witness.until);
+        self.assurance = Assurance { standing, driver: Driver::Rows, failure, until };
         Ok(())
     }
 
@@ -682,15 +719,18 @@ impl AssuredFilter {
                 *promise = None;
             }
         }
-        let is_over = self.next.promises.iter().all(Option::is_none);
+        let is_over = self.next.promises.iter().flatten().all(|promise| promise.until <= t);
         if self.next.standing == Standing::Assured && !is_over {
             self.assurance.driver = match is_valid {
                 true => self.choose(t, hold, x, u_ref, u),
                 false => self.go_on(t, hold, u),
             };
         }
-        (self.assurance.standing, self.assurance.failure) = (self.next.standing, self.next.failure);
-        if self.next.standing == Standing::Assured {
+        let Commitment { standing, failure, plan, .. } = &self.next;
+        let is_assured = *standing == Standing::Assured;
+        (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
+        self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { plan.witness.until });
+        if is_assured {
             self.report_on(&rows[..u.len()], u);
         }
     }
@@ -871,6 +911,7 @@ impl AssuredFilter {
         match found {
             Ok((factor, (promises, plan))) => {
                 (self.next.promises, self.next.plan) = (promises, plan);
+                self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
                 self.end(Standing::Assured, None);
                 self.postpone(t, hold, factor);
             }
@@ -940,7 +981,8 @@ impl AssuredFilter {
         if let Rows::Integrated(own) = &self.rows {
             planner = planner.integrated(Integral { state: own.of.state, input: own.of.input });
         }
-        f(&planner.led(&self.policies).irregular(!self.is_regular(t, period)))
+        let planner = planner.led(&self.policies).until(self.horizon);
+        f(&planner.irregular(!self.is_regular(t, period)))
     }
 
     /// The limits of the integral as barriers along `plant`.
@@ -951,14 +993,46 @@ impl AssuredFilter {
         sides.map(|(sign, limit)| Limit { plant, state, sign, limit }).collect()
     }
 
+    /// The time in s at which a plan that ends at `until` is next tried to be prolonged, at `t`: when it has become as short
+    /// as it may be, and then ever more often until its end.
+    fn next_prolonging(&self, t: f64, until: f64) -> f64 {
+        let Some(horizon) = self.horizon else { return f64::INFINITY };
+        let last = self.next.promises.iter().flatten().map(|promise| promise.from).fold(t, f64::max);
+        let is_last = self.next.promises.iter().flatten().all(|promise| promise.until <= until);
+        match until - horizon {
+            _ if is_last => f64::INFINITY,
+            due if last < due => due,
+            _ => t + SOONER * (until - t),
+        }
+    }
+
+    /// Looks for a plan that ends later than the one at hand, where it is time to. Whether there is one.
+    fn prolong(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) -> bool {
+        if t < self.next.prolong_at {
+            return false;
+        }
+        let until = self.next.plan.witness.until;
+        let longer = self.planned(&self.next.promises, (t, hold), u, |planner| {
+            planner.beyond(&self.next.plan.witness).search(t, x)
+        });
+        let longer = longer.ok().filter(|longer| longer.witness.until > until);
+        let is_longer = longer.is_some();
+        if let Some(plan) = longer {
+            self.next.plan = plan;
+        }
+        self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
+        is_longer
+    }
+
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
     /// does, else the plan's own.
     fn choose(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
+        let is_new = self.prolong(t, hold, x, u);
         let (plan, share) = (&self.next.plan, self.commitment.share);
-        let was_committed = self.commitment.standing == Standing::Assured;
+        let was_committed = self.commitment.standing == Standing::Assured && !is_new;
         // Gentle, and with the margin that the rows aim at.
         let comfortable = |witness: &Witness| {
             let margin = |at: &Tightest| {
@@ -1039,17 +1113,22 @@ impl AssuredFilter {
             }
             Err(failure) => failure,
         };
-        match self.planned(&self.next.promises, (t, hold), u, |planner| planner.search(t, x)) {
+        let again = |planner: &Planner<'_>| planner.beyond(&self.next.plan.witness).search(t, x);
+        match self.planned(&self.next.promises, (t, hold), u, again) {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
+                self.next.prolong_at = self.next_prolonging(t, plan.witness.until);
                 (self.next.plan, self.next.share) = (plan, 1.0);
                 self.piece = Piece::Searched;
                 Driver::Plan
             }
-            Err(_) => {
-                let standing = match self.is_regular(t, hold) {
-                    true => Standing::Withdrawn,
-                    false => Standing::Irregular,
+            Err(longer) => {
+                // A plan that has come to its end was kept.
+                let is_at_its_end = self.next.plan.witness.until <= t + 0.5 * hold;
+                let (standing, failure) = match self.is_regular(t, hold) {
+                    _ if is_at_its_end => (Standing::Expired, longer),
+                    true => (Standing::Withdrawn, failure),
+                    false => (Standing::Irregular, failure),
                 };
                 self.end(standing, Some(failure));
                 Driver::Rows

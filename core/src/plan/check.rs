@@ -49,8 +49,11 @@ const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 864
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Witness {
-    /// The end of each hold in s, and its input. The plant is at rest under the last, which is held for ever.
+    /// The end of each hold in s, and its input. The last is held for ever where the plant is at rest under it.
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
+    /// The time in s until which every requirement is met: infinite where the plan ends at rest, else its end.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub until: f64,
     /// The place on the way where h − margin is least.
     pub tightest: Option<Tightest>,
     /// The largest rate of each state on the way, and on the way of the plan before it: what rest is small against. It never
@@ -404,10 +407,27 @@ impl<'a> Walk<'a> {
             let rests = self.is_still(brake, hold, &mut u) && self.rests(&u, hold)?;
             self.hold_until(&u, self.t + hold)?;
             if rests {
-                return Ok(self.witness);
+                return Ok(Witness { until: f64::INFINITY, ..self.witness });
             }
         }
         Err(Failure::NoRest)
+    }
+
+    /// Ends where `reference` does, without a rest, if that was still ahead. Its last input is held until then where samples
+    /// lie beside its own.
+    pub(super) fn end(mut self, reference: &Reference) -> Result<Witness, Failure> {
+        let (Some(&until), slack) = (reference.times.last(), self.grid.slack()) else {
+            return Err(Failure::NoRest);
+        };
+        if self.started >= until - slack || self.t < until - slack {
+            return Err(Failure::NoRest);
+        }
+        if self.t < until
+            && let Some((_, u)) = self.witness.inputs.pop()
+        {
+            self.hold(&u[..self.model.inputs()], until)?;
+        }
+        Ok(Witness { until, ..self.witness })
     }
 
     /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.

@@ -3,7 +3,8 @@
 //! A *plan* is a list of held inputs and a law that holds the plant at rest after them. It is a *witness* of the promise:
 //! run ahead in the model, it meets every [`Requirement`] at all times. A filter that applies at every sample either an
 //! input with a new witness behind it, or the next input of the witness it has, keeps every requirement for ever. The
-//! lemma and its proof are in `docs/theory.md#witness`.
+//! lemma and its proof are in `docs/theory.md#witness`. Where there is no rest, or a set moves, a plan may end at a
+//! [horizon](Planner::until): the requirements are kept until then.
 //!
 //! | module | owns |
 //! |---|---|
@@ -81,6 +82,11 @@ impl Plan {
         self.brake.as_ref().is_some_and(|brake| brake.stays())
     }
 
+    /// Whether it ends without a rest, at a time.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.brake.is_none()
+    }
+
     /// What is wrong with it as a plan of a plant with so many states and inputs; one from a file may be.
     pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
         let is_flawed = self.brake.as_ref().is_some_and(|brake| !brake.fits(states, inputs))
@@ -88,6 +94,11 @@ impl Plan {
             || self.witness.rates.len() != states
             || !all_finite(&self.witness.rates)
             || self.witness.inputs.is_empty()
+            || match (&self.brake, &self.reference) {
+                (Some(_), _) => self.witness.until != f64::INFINITY,
+                (None, Some(_)) => !self.witness.until.is_finite(),
+                (None, None) => true,
+            }
             || self.witness.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u));
         is_flawed.then_some("is of a plant of other dimensions, or not finite")
     }

@@ -48,6 +48,36 @@ const HALVINGS: u32 = 7;
 const ASKED: f64 = 16.0;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
 const GUESSES: [[f64; 2]; 3] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0]];
+/// How far a plan without a rest is sought, in units of how far it has to reach: the next search is that much later.
+const AMPLE: f64 = 1.5;
+
+/// What a first guess does where nothing else is wanted: the plant is stopped, or where there is no rest the input nearest
+/// to 0 is held.
+struct Guide(Option<Brake>);
+
+impl Guide {
+    fn stays(&self) -> bool {
+        self.0.as_ref().is_none_or(Brake::stays)
+    }
+
+    /// The input of the rest.
+    fn rest(&self, model: &Model<'_>) -> Vec<f64> {
+        let mut u = vec![0.0; model.inputs()];
+        match &self.0 {
+            Some(brake) => u.copy_from_slice(&brake.input),
+            None => model.clamp(&mut u),
+        }
+        u
+    }
+
+    /// Writes the input at `x`.
+    fn input(&self, model: &Model<'_>, x: &[f64], u: &mut [f64]) {
+        match &self.0 {
+            Some(brake) => brake.input(model, x, u),
+            None => u.copy_from_slice(&self.rest(model)),
+        }
+    }
+}
 
 /// The plant, its bounds and the requirements at a sample, from which plans are made.
 #[derive(Clone, Copy)]
@@ -64,6 +94,9 @@ pub struct Planner<'a> {
     regular: bool,
     integral: Option<Integral>,
     policies: &'a [Policy],
+    /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
+    horizon: Option<f64>,
+    before: Option<&'a Witness>,
 }
 
 impl<'a> Planner<'a> {
@@ -77,8 +110,19 @@ impl<'a> Planner<'a> {
         period: f64,
         size: f64,
     ) -> Self {
-        let policies = &[];
-        Self { plant, dims, bounds, requirements, period, size, regular: true, integral: None, policies }
+        Self {
+            plant,
+            dims,
+            bounds,
+            requirements,
+            period,
+            size,
+            regular: true,
+            integral: None,
+            policies: &[],
+            horizon: None,
+            before: None,
+        }
     }
 
     /// The same planner at a sample that did not come as those before did, or is held for another time.
@@ -99,6 +143,19 @@ impl<'a> Planner<'a> {
         Self { policies, ..self }
     }
 
+    /// The same planner, whose plans need not end at rest where they reach so many seconds, finite, > 0, past the last
+    /// deadline and the sample.
+    #[must_use]
+    pub fn until(self, horizon: Option<f64>) -> Self {
+        Self { horizon, ..self }
+    }
+
+    /// The same planner for plans that reach no less far than `before`, with which a search begins.
+    #[must_use]
+    pub fn beyond(self, before: &'a Witness) -> Self {
+        Self { before: Some(before), ..self }
+    }
+
     fn model(&self, step: f64) -> Model<'a> {
         let Self { plant, dims, bounds, integral, .. } = *self;
         Model { plant, dims, bounds, integral, step }
@@ -110,6 +167,17 @@ impl<'a> Planner<'a> {
     ///
     /// What the nearest trial fails at.
     pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
+        let to = |horizon| self.search_to(horizon, t, x);
+        match (self.horizon, self.before.map(|before| before.until.is_finite())) {
+            (None, _) | (_, Some(false)) => to(None),
+            (Some(_), None) => to(None).or_else(|_| to(self.horizon)),
+            // What went on without a rest most likely does so again.
+            (Some(_), Some(true)) => to(self.horizon).or_else(|failure| to(None).map_err(|_| failure)),
+        }
+    }
+
+    /// Searches for a plan that ends at rest, or at a horizon.
+    fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let mut failure = Failure::NoRest;
         for (part, holds) in GRIDS {
             let sooner = |r: &Requirement<'a>| {
@@ -117,7 +185,7 @@ impl<'a> Planner<'a> {
                 Requirement { from: t + part * (r.from - t), margin, ..*r }
             };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let Some((mut hold, mut times)) = self.grid(t, &requirements, holds) else {
+            let Some((mut hold, mut times)) = self.grid(t, &requirements, holds, horizon) else {
                 failure = Failure::TooLong;
                 continue;
             };
@@ -127,17 +195,23 @@ impl<'a> Planner<'a> {
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
-            let Some(mut guide) = Brake::around(&model, x, hold) else { continue };
+            let mut guide = Brake::around(&model, x, hold);
             // What is lost within a hold is led in shorter ones.
-            let finer = (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1;
+            let finer =
+                guide.as_ref().map_or(1, |guide| (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1);
             if finer > 1
-                && let Some(grid) = self.grid(t, &requirements, holds.map(|n| n * finer.min(FINEST)))
+                && let Some(grid) = self.grid(t, &requirements, holds.map(|n| n * finer.min(FINEST)), horizon)
             {
                 (hold, times) = grid;
-                guide = Brake::around(&model, x, hold).unwrap_or(guide);
+                guide = Brake::around(&model, x, hold).or(guide);
             }
-            let Some(brake) = guide.shorter(&model, self.period) else { continue };
-            let brake = Arc::new(brake);
+            let brake = guide.as_ref().and_then(|guide| guide.shorter(&model, self.period));
+            let ending = match (horizon, brake) {
+                (Some(_), _) => None,
+                (None, None) => continue,
+                (None, Some(brake)) => Some(Arc::new(brake)),
+            };
+            let guide = Guide(guide);
             let mut search = Search {
                 model: sketch,
                 requirements,
@@ -145,49 +219,76 @@ impl<'a> Planner<'a> {
                 times: &times,
                 x,
                 size: self.size,
+                rests: horizon.is_none(),
             };
+            if let Some(before) = self.before.filter(|_| horizon.is_some()) {
+                let held = |hold: &[f64]| before.mean(hold[0], hold[1])[..self.dims[1]].to_vec();
+                let mut inputs: Vec<Vec<f64>> = times.windows(2).map(held).collect();
+                inputs.push(guide.rest(&sketch));
+                let (descents, asked) =
+                    (vec![Descent::from(search.run(inputs))], search.requirements.clone());
+                if let Ok(plan) = self.descend(&mut search, descents, &ending) {
+                    return Ok(plan);
+                }
+                search.requirements = asked;
+            }
             let policies = self.policies.iter().map(|policy| self.follow(&sketch, policy, &guide, x, &times));
             let mut descents: Vec<Descent> = policies
                 .chain(self.guesses(&sketch, &guide, x, &times))
                 .map(|inputs| Descent::from(search.run(inputs)))
                 .collect();
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            // A few steps show which guesses lead somewhere.
-            for (most, iterations) in ROUNDS {
-                // What the user thinks of is never dropped.
-                let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
-                descents.sort_by(|a, b| {
-                    let (a, b) = (merit(a), merit(b));
-                    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-                });
-                descents.truncate(most);
-                let mut nearest = f64::INFINITY;
-                for descent in &mut descents {
-                    search.improve(descent, iterations);
-                    let violation = descent.best.violation;
-                    if violation > WORTH && violation >= nearest {
-                        continue;
+            match self.descend(&mut search, descents, &ending) {
+                Ok(plan) => return Ok(plan),
+                Err(found) => failure = found.unwrap_or(failure),
+            }
+        }
+        Err(failure)
+    }
+
+    /// The plan that one of `descents` leads to; or what the nearest fails at, where one was worth the check.
+    fn descend(
+        &self,
+        search: &mut Search<'_>,
+        mut descents: Vec<Descent>,
+        ending: &Option<Arc<Brake>>,
+    ) -> Result<Plan, Option<Failure>> {
+        let mut failure = None;
+        // A few steps show which guesses lead somewhere.
+        for (most, iterations) in ROUNDS {
+            // What the user thinks of is never dropped.
+            let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
+            descents.sort_by(|a, b| {
+                let (a, b) = (merit(a), merit(b));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            });
+            descents.truncate(most);
+            let mut nearest = f64::INFINITY;
+            for descent in &mut descents {
+                search.improve(descent, iterations);
+                let violation = descent.best.violation;
+                if violation > WORTH && violation >= nearest {
+                    continue;
+                }
+                // What is broken between the nodes is asked for with more margin at them.
+                for _ in 0..TIGHTENED {
+                    let gains = search.gains(descent);
+                    let found = match self.finish(search.times, &descent.best, gains, ending) {
+                        Ok(plan) => return Ok(plan),
+                        Err(found) => found,
+                    };
+                    if violation < nearest {
+                        (nearest, failure) = (violation, Some(found));
                     }
-                    // What is broken between the nodes is asked for with more margin at them.
-                    for _ in 0..TIGHTENED {
-                        let gains = search.gains(descent);
-                        let found = match self.finish(&times, &descent.best, gains, &brake) {
-                            Ok(plan) => return Ok(plan),
-                            Err(found) => found,
-                        };
-                        if violation < nearest {
-                            (nearest, failure) = (violation, found);
+                    match found {
+                        Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
+                            search.tighten(barrier, slack);
+                            let wanted = descent.is_wanted;
+                            *descent = Descent::from(search.run(descent.best.inputs.clone()));
+                            descent.is_wanted = wanted;
+                            search.improve(descent, TIGHTENING);
                         }
-                        match found {
-                            Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
-                                search.tighten(barrier, slack);
-                                let wanted = descent.is_wanted;
-                                *descent = Descent::from(search.run(descent.best.inputs.clone()));
-                                descent.is_wanted = wanted;
-                                search.improve(descent, TIGHTENING);
-                            }
-                            _ => break,
-                        }
+                        _ => break,
                     }
                 }
             }
@@ -196,12 +297,14 @@ impl<'a> Planner<'a> {
     }
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
-    /// deadline, `after` of them past it. The last sample before each deadline is a node. `None` for too many samples.
+    /// deadline, `after` of them past it; or both together to the end of a plan with a horizon. The last sample before each
+    /// deadline is a node. `None` for too many samples.
     fn grid(
         &self,
         t: f64,
         requirements: &[Requirement<'_>],
         [before, after]: [usize; 2],
+        horizon: Option<f64>,
     ) -> Option<(f64, Vec<f64>)> {
         // Round-off of a deadline that is a number of periods leaves it one.
         let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-5).max(0.0) as usize;
@@ -210,10 +313,20 @@ impl<'a> Planner<'a> {
         deadlines.sort_unstable();
         deadlines.dedup();
         let last = deadlines.last().copied().unwrap_or(0);
-        if last > MOST_SAMPLES {
+        // Past the last deadline as it is, not as it is asked for in the search.
+        let past = horizon.map(|horizon| {
+            let until = (self.last(t) + AMPLE * horizon).max(self.before.map_or(t, |before| before.until));
+            ((until - t) / self.period + 0.5) as usize + 1 - last
+        });
+        if last.saturating_add(past.unwrap_or(0)) > MOST_SAMPLES {
             return None;
         }
-        let hold = if last > 0 { last.div_ceil(before) } else { 5 };
+        let hold = match past {
+            Some(past) => (last + past).div_ceil(before + after),
+            None if last > 0 => last.div_ceil(before),
+            None => 5,
+        };
+        let after = past.map_or(after, |past| past.div_ceil(hold));
         let (mut samples, mut from) = (vec![0], 0);
         for deadline in deadlines {
             let (length, holds) = (deadline - from, (deadline - from).div_ceil(hold));
@@ -230,17 +343,14 @@ impl<'a> Planner<'a> {
         times: &[f64],
         found: &Trajectory,
         gains: Option<Vec<Gain>>,
-        brake: &Arc<Brake>,
+        ending: &Option<Arc<Brake>>,
     ) -> Result<Plan, Failure> {
         let (mut inputs, states) = (found.inputs.clone(), found.states.clone());
         inputs.pop();
         let gains = gains.ok_or(Failure::Singular)?;
         let reference = Reference { times: times.to_vec(), inputs, states, gains };
-        let mut plan = Plan {
-            reference: Some(Arc::new(reference)),
-            brake: Some(brake.clone()),
-            witness: Witness::default(),
-        };
+        let mut plan =
+            Plan { reference: Some(Arc::new(reference)), brake: ending.clone(), witness: Witness::default() };
         let grid = Grid { period: self.period, even: true };
         plan.witness = self.walk(&plan, 1.0, grid, (times[0], &found.states[0]), None, true)?;
         Ok(plan)
@@ -260,10 +370,21 @@ impl<'a> Planner<'a> {
             let strictness = if self.regular { 1.0 } else { WARY };
             let walk = |follows| self.walk(plan, strictness, grid, (t, x), Some(u), follows);
             match has_reference {
+                // What ends without a rest ends with its reference.
+                true if plan.is_finite() => walk(true),
                 true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
                 false => walk(false),
             }
         })
+    }
+
+    /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at rest, or at its horizon.
+    fn conclude(&self, walk: Walk<'a>, plan: &Plan) -> Result<Witness, Failure> {
+        match (&plan.brake, &plan.reference) {
+            (Some(brake), _) => walk.stop(brake),
+            (None, Some(reference)) => walk.end(reference),
+            (None, None) => Err(Failure::NoRest),
+        }
     }
 
     /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
@@ -273,7 +394,6 @@ impl<'a> Planner<'a> {
     ///
     /// What it fails at.
     pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(Witness, bool), Failure> {
-        let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
         let nu = self.dims[1];
         // As many of its holds as `held`, then the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
@@ -291,7 +411,7 @@ impl<'a> Planner<'a> {
             for (end, u) in left.take(held) {
                 if *end > at + grid.slack() {
                     // Not again what has come to its end, which grows by a hold at every sample.
-                    if walk.may_end(brake) {
+                    if plan.brake.as_ref().is_some_and(|brake| walk.may_end(brake)) {
                         break;
                     }
                     hold(&mut walk, *u, *end)?;
@@ -301,7 +421,7 @@ impl<'a> Planner<'a> {
             if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
                 walk.follow(reference)?;
             }
-            Ok((walk.stop(brake)?, at > t))
+            Ok((self.conclude(walk, plan)?, at > t))
         };
         self.on_a_grid(|grid| {
             let kept = match plan.stays() {
@@ -358,8 +478,7 @@ impl<'a> Planner<'a> {
             }
             walk.follow(reference)?;
         }
-        let Some(brake) = &plan.brake else { return Err(Failure::NoRest) };
-        walk.stop(brake)
+        self.conclude(walk, plan)
     }
 
     /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one.
@@ -397,7 +516,7 @@ impl<'a> Planner<'a> {
         &self,
         model: &Model<'_>,
         policy: &Policy,
-        brake: &Brake,
+        guide: &Guide,
         x: &[f64],
         times: &[f64],
     ) -> Vec<Vec<f64>> {
@@ -412,7 +531,7 @@ impl<'a> Planner<'a> {
                 let t = hold[0] + f64::from(k) * part;
                 match t < last {
                     true => policy(t, &x, &mut u),
-                    false => brake.input(model, &x, &mut u),
+                    false => guide.input(model, &x, &mut u),
                 }
                 model.clamp(&mut u);
                 model.flow(&mut x, &u, part);
@@ -421,12 +540,12 @@ impl<'a> Planner<'a> {
             mean
         };
         let mut inputs: Vec<Vec<f64>> = times.windows(2).map(mean).collect();
-        inputs.push(brake.input.clone());
+        inputs.push(guide.rest(model));
         inputs
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.
-    fn guesses(&self, model: &Model<'_>, brake: &Brake, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
+    fn guesses(&self, model: &Model<'_>, guide: &Guide, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
         let nu = model.inputs();
         let mut sides: Vec<Vec<f64>> = vec![vec![0.0; nu]];
         if nu <= 2 {
@@ -457,21 +576,21 @@ impl<'a> Planner<'a> {
                 if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
                 {
                     // What would fall is held upright meanwhile.
-                    match brake.stays() {
-                        true => u.copy_from_slice(&brake.input),
-                        false => brake.input(model, &x, &mut u),
+                    match guide.stays() {
+                        true => u.copy_from_slice(&guide.rest(model)),
+                        false => guide.input(model, &x, &mut u),
                     }
                     for i in 0..nu {
                         u[i] += side[i] * size * model.reach(i, self.size);
                     }
                     model.clamp(&mut u);
                 } else {
-                    brake.input(model, &x, &mut u);
+                    guide.input(model, &x, &mut u);
                 }
                 model.flow(&mut x, &u, times[k + 1] - times[k]);
                 inputs.push(u.clone());
             }
-            inputs.push(brake.input.clone());
+            inputs.push(guide.rest(model));
             inputs
         };
         let mut guesses = vec![run(&sides[0], GUESSES[0])];

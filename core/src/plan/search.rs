@@ -48,6 +48,8 @@ pub(super) struct Search<'a> {
     pub(super) x: &'a [f64],
     /// The size of each input, where it has no bounds.
     pub(super) size: f64,
+    /// Whether the plant has to rest at the end.
+    pub(super) rests: bool,
 }
 
 /// Inputs on the grid, one more for the rest at the end, and where they lead.
@@ -182,7 +184,7 @@ impl Search<'_> {
         let mut most = 0.0_f64;
         let missing = of.values.iter().map(|&(i, _, value)| -value / of.sizes[i].max(f64::MIN_POSITIVE));
         let moving = of.rate.iter().zip(&of.rates).map(|(r, scale)| r.abs() / scale - 0.01);
-        for part in missing.chain(moving) {
+        for part in missing.chain(moving.filter(|_| self.rests)) {
             violation += part.max(0.0);
             most = most.max(part);
         }
@@ -322,12 +324,12 @@ impl Search<'_> {
             entry(b.len(), first_slack + row, -1.0);
             b.push(value / size);
         }
-        // The rest at the end.
+        // The rest at the end, if there is to be one.
         let hold = self.hold(holds - 1);
         let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], hold);
         let a = (a - DMatrix::identity(nx, nx)) / hold;
         let by = by / hold;
-        for i in 0..nx {
+        for i in 0..if self.rests { nx } else { 0 } {
             for sign in [1.0, -1.0] {
                 let scale = sign / at.rates[i];
                 for j in 0..nx {

@@ -5,7 +5,7 @@ use punctual_core::lie::Direction;
 use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values};
-use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, updated};
+use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout, Reading};
 use crate::{FilterLoop, LoopState};
 
@@ -80,7 +80,7 @@ impl FilterBlock {
                 stepped.map(|()| filter.integrated())
             }
         };
-        let written = done.map(|integrated| self.write(values, integrated)).map_err(|e| e.to_string());
+        let written = done.map(|integrated| self.write(t, values, integrated)).map_err(|e| e.to_string());
         if step.is_some() {
             self.rearm_seen = values.booleans[self.rearm_index()];
         } else if rising {
@@ -94,6 +94,27 @@ impl FilterBlock {
     fn standing(&self) -> Option<(Standing, Option<Failure>)> {
         let refused = (Standing::Refused, None);
         self.configuration.is_assured().then(|| self.filter.standing().unwrap_or(refused))
+    }
+
+    /// The number of the output after those of the barriers.
+    fn after_barriers(&self) -> usize {
+        let barriers = self.configuration.barrier.len() * BARRIER_OUTPUTS.len();
+        self.layout.outputs + self.layout.inputs + 1 + barriers
+    }
+
+    /// The number of the output with the integral, which comes after what is said of plans.
+    fn integral(&self) -> usize {
+        let of_plans = usize::from(self.configuration.is_assured());
+        self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
+    }
+
+    /// Writes where the promise stands, and at `t` until when it does.
+    fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
+        let at = self.after_barriers();
+        values.integers[at] = standing as i32;
+        if self.configuration.ends_plans() {
+            values.reals[at + 1] = self.filter.assured_until().map_or(t, |until| until.min(UNBOUNDED));
+        }
     }
 
     /// The reason why there is no derivative, with the barrier by its name.
@@ -112,7 +133,7 @@ impl FilterBlock {
     }
 
     /// Writes the last sample to the outputs, in the order of the variable table.
-    fn write(&self, values: &mut Values, integrated: f64) {
+    fn write(&self, t: f64, values: &mut Values, integrated: f64) {
         let report = self.filter.filter().report();
         let mut at = self.layout.outputs;
         values.reals[at..][..self.u.len()].copy_from_slice(&self.u);
@@ -131,11 +152,10 @@ impl FilterBlock {
             at += BARRIER_OUTPUTS.len();
         }
         if let Some((standing, _)) = self.standing() {
-            values.integers[at] = standing as i32;
-            at += 1;
+            self.write_standing(standing, t, values);
         }
         if self.filter.integrated_input().is_some() {
-            values.reals[at] = integrated;
+            values.reals[self.integral()] = integrated;
         }
     }
 }
@@ -189,7 +209,7 @@ impl Block for FilterBlock {
             at += BARRIER_OUTPUTS.len();
         }
         if let Some(input) = self.filter.integrated_input() {
-            derivative[at] = 2.0 * self.change.u[input];
+            derivative[self.integral()] = 2.0 * self.change.u[input];
         }
         Ok(())
     }
@@ -203,8 +223,8 @@ impl Block for FilterBlock {
         if self.noticed.replace(standing) == Some(standing) {
             return None;
         }
-        let lost = matches!(standing, Standing::Refused | Standing::Withdrawn | Standing::Irregular);
-        lost.then(|| {
+        let stands = matches!(standing, Standing::Undecided | Standing::Assured);
+        (!stands).then(|| {
             let why = match failure {
                 Some(failure) => Some(self.configuration.failure(failure)),
                 None => self.configuration.unaccounted(),
@@ -278,7 +298,7 @@ impl Block for FilterBlock {
         }
         if let Some((standing, _)) = self.standing() {
             let shown = if self.filter.standing().is_some() { Standing::Undecided } else { standing };
-            values.integers[at] = shown as i32;
+            self.write_standing(shown, 0.0, values);
         }
     }
 }

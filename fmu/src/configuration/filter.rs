@@ -71,6 +71,7 @@ pub(super) struct RawFilter {
     sampling: Option<SamplingName>,
     #[serde(default = "auto")]
     assurance: AssuranceName,
+    plan_horizon: Option<f64>,
     #[serde(default)]
     actuation_delay: f64,
     #[serde(default)]
@@ -110,6 +111,10 @@ pub struct FilterConfiguration {
     /// Whether the filter promises only what a plan keeps.
     #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
+    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at rest; `None`:
+    /// every plan has to end at rest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plan_horizon: Option<f64>,
     /// Why no plan is followed, in words, as the file stands; empty where plans are.
     #[serde(skip)]
     unassured: String,
@@ -171,7 +176,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 20] = [
+        static KEYS: [Key; 21] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -199,6 +204,14 @@ pub(super) static SECTION: Section = Section {
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
                  promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`; `check` says which",
+            ),
+            Key::new(
+                "plan_horizon",
+                Number(Is("s"), Range::POSITIVE),
+                Some("none: every plan ends at rest"),
+                "where no plan ends at rest, such as of an aeroplane or in a set that moves for ever: how far one has to reach \
+                 past the last deadline and the present, to be promised until its end, `assured_until`. It is prolonged before \
+                 it ends, if a plan is found",
             ),
             Key::new(
                 "actuation_delay",
@@ -332,6 +345,7 @@ impl FilterConfiguration {
                 false => SamplingName::Measured,
             }),
             assurance: raw.assurance,
+            plan_horizon: raw.plan_horizon,
             unassured: String::new(),
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
@@ -367,10 +381,16 @@ impl FilterConfiguration {
         if let Some(policy) = &configuration.policy {
             configuration.plant.functions::<f64>("policy", policy)?;
         }
+        configuration.check_horizon()?;
         configuration.unassured = configuration.why_unassured();
-        if configuration.policy.is_some() && !configuration.is_assured() {
-            let message = format!("is for plans, of which there are none: {}", configuration.unassured);
-            return Err(ConfigurationError::new("policy", message));
+        for (key, is_given) in [
+            ("policy", configuration.policy.is_some()),
+            ("plan_horizon", configuration.plan_horizon.is_some()),
+        ] {
+            if is_given && !configuration.is_assured() {
+                let message = format!("is for plans, of which there are none: {}", configuration.unassured);
+                return Err(ConfigurationError::new(key, message));
+            }
         }
         let filter = configuration.build_loop()?;
         configuration.check_margins(filter.filter())?;
@@ -378,6 +398,18 @@ impl FilterConfiguration {
             configuration.alone()?;
         }
         Ok(configuration)
+    }
+
+    /// Refuses a horizon that is no time, or shorter than a step.
+    fn check_horizon(&self) -> Result<(), ConfigurationError> {
+        let (Some(horizon), step) = (self.plan_horizon, self.experiment.step_size) else { return Ok(()) };
+        match horizon.is_finite() && horizon >= step {
+            true => Ok(()),
+            false => {
+                let message = format!("is {horizon} s, must be finite, and at least a step ({step} s)");
+                Err(ConfigurationError::new("plan_horizon", message))
+            }
+        }
     }
 
     /// States the bounds of every input.
@@ -551,6 +583,11 @@ impl FilterConfiguration {
         self.unassured.is_empty()
     }
 
+    /// Whether its plans may end without a rest, so that it tells until when it promises.
+    pub fn ends_plans(&self) -> bool {
+        self.is_assured() && self.plan_horizon.is_some()
+    }
+
     /// Why the filter follows no plans, in words; empty where it does.
     pub fn unassured(&self) -> &str {
         &self.unassured
@@ -592,7 +629,11 @@ impl FilterConfiguration {
                 let name = self.barrier.get(barrier).map_or("a barrier", |section| &section.name);
                 format!("{name} came due while no plan was followed")
             }
-            Failure::NoRest => "the plant does not come to rest, or a set moves".to_owned(),
+            Failure::NoRest if self.plan_horizon.is_none() => {
+                "the plant does not come to rest, or a set moves; with `plan_horizon` a plan may end before"
+                    .to_owned()
+            }
+            Failure::NoRest => "no plan reaches as far as plan_horizon".to_owned(),
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
             Failure::TooLong => {
                 "there are too many samples until the deadline, or too long a step".to_owned()

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, SafetyFilter};
+use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, Pace, SafetyFilter};
 use punctual_models::is_in_name;
 use serde::{Deserialize, Serialize};
 
@@ -207,12 +207,12 @@ impl FilterConfiguration {
         if let Some(input) = self.barrier_inputs().first() {
             return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
         }
-        let period = self.experiment.step_size;
+        let pace = Pace { period: self.experiment.step_size, horizon: self.plan_horizon };
         let assured = match &self.integrator {
-            None => AssuredFilter::new(filter, period),
+            None => AssuredFilter::new(filter, pace),
             Some(section) => {
                 let integrated = self.integrated(filter, section).map_err(|e| e.to_string())?;
-                AssuredFilter::integrated(integrated, period)
+                AssuredFilter::integrated(integrated, pace)
             }
         }
         .map_err(|e| e.to_string())?;
