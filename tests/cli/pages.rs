@@ -73,7 +73,7 @@ fn the_tutorial_is_what_happens() {
 fn the_page_on_obstacles_is_what_happens() {
     let (workshop, text) = (Workshop::new(), document("obstacles.md"));
     let parts: Vec<_> = text.split("```toml\n").skip(1).collect();
-    assert_eq!(parts.len(), 6);
+    assert_eq!(parts.len(), 7);
     for part in parts {
         let (file, rest) = part.split_once("```").expect("its end");
         workshop.write("my.toml", file);

@@ -195,6 +195,23 @@ def test_what_is_not_promised_is_said():
         punctual.Filter(assured(8.0) | {"actuation_delay": 0.01})
 
 
+def test_a_promise_with_an_end_tells_it():
+    forever = punctual.Filter(assured(8.0))
+    assert forever.step(0.0, [0.0, 0.0, 1.0, 1.0]).assured_until == forever.plan.until == math.inf
+    moving = assured(9.0) | {"plan_horizon": 4.0}
+    moving["barrier"].append({"name": "forwards", "shape": "at_least", "state": "v", "bound": 0.5})
+    own, x, until = punctual.Filter(moving), np.array([0.0, 0.0, 1.0, 1.0]), 0.0
+    for k in range(320):
+        step = own.step(0.05 * k, x, [-4.0, 0.3])
+        assert step.assurance is punctual.Assurance.ASSURED and step.assured_until == own.plan.until >= until
+        until = step.assured_until
+        for _ in range(50):
+            x = x + 0.001 * np.array([x[3] * math.cos(x[2]), x[3] * math.sin(x[2]), step.u[1], step.u[0]])
+        assert x[3] >= 0.5 - 1e-9
+    assert until > 0.05 * 320 and repr(own.plan).startswith("Plan(until t=")
+    assert punctual.Filter(assured(2.0)).step(0.0, [0.0, 0.0, 1.0, 0.0]).assured_until is None
+
+
 CAR = ROOT / "examples" / "vehicles" / "car-filter.toml"
 KINDS = pytest.mark.parametrize("configuration", [FILTER, ASSURED, CAR], ids=["rows", "plans", "integrator"])
 
