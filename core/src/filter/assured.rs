@@ -206,8 +206,9 @@ impl From<f64> for Pace {
 /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
 /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
 /// is refused by [`Self::new`]. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
-/// gets: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. States must be
-/// those of the plant, not of something that others move.
+/// gets: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. With a
+/// [horizon](Pace::horizon) they may, and the plant needs no rest: the promise then has an [end](Assurance::until), which
+/// is put off. States must be those of the plant, not of something that others move.
 ///
 /// The search allocates, as do the plans.
 ///
