@@ -7,7 +7,8 @@
 //! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
 //! evaluated where the search ends.
 //!
-//! There are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
+//! Most rows are all but affine, and a few corrections from u_ref find the answer (`correction`). Where they do not, there
+//! are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
 //! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
 //! guess matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
 //! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
@@ -26,6 +27,7 @@
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
 //! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
+mod correction;
 mod wide;
 
 use super::errors::{MeasurementErrors, Uncertainty};
@@ -56,12 +58,6 @@ const PATIENT: [u32; 2] = [12, 8];
 const BACKED: [u32; 2] = [4, 2];
 /// The part of the foretold decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
-/// Corrections of an answer whose rows are all but affine.
-const CORRECTIONS: usize = 12;
-/// Length of a correction that is left out, as a part of what counts as met.
-const SKIPPED: f64 = 0.1;
-/// Largest ratio of each correction to the one before.
-const CONVERGING: f64 = 0.5;
 /// Largest ratio of each step of a search to the one before, for its answer to be the only one near.
 const CONTRACTION: f64 = 0.1;
 
@@ -278,137 +274,6 @@ impl PeriodProblem<'_> {
         Some((at.worst(RowSet::EMPTY) > 0.0).then_some(RowSet::EMPTY))
     }
 
-    /// The answer, written to `u`, where all hard rows can be met and are all but affine between u_ref and there. It is the
-    /// limit of the QP's answers, each for the rows linearised at the one before, from u_ref on. There the rows are
-    /// linearised but for `unseen` ones. `watched` are linearised all along, the others at the end. `None` where the
-    /// answers do not come nearer fast, or others may exist.
-    #[inline(always)]
-    fn correct(
-        &self,
-        u: &mut [f64],
-        last: Option<&[f64]>,
-        [mut watched, unseen]: [RowSet; 2],
-        against: Option<usize>,
-        at: &mut Linearised,
-        qp: &mut Workspace,
-    ) -> Option<Solution> {
-        let m = u.len();
-        if !self.soft().is_empty() {
-            return None;
-        }
-        let mut target = [0.0; MAX_INPUTS];
-        // Answer and way to it of the correction before.
-        let mut before: Option<([f64; MAX_INPUTS], [f64; MAX_INPUTS], f64)> = None;
-        let (mut ratio, mut iterations) = (0.0_f64, 0);
-        if !(watched & unseen).is_empty() {
-            self.linearise(u, watched & unseen, at)?;
-        }
-        for _ in 0..CORRECTIONS {
-            let solution = qp.solve(&self.problem(at.rows), &mut target[..m]);
-            iterations += solution.iterations;
-            if solution.outcome != Outcome::Optimal {
-                return None;
-            }
-            let mut way = [0.0; MAX_INPUTS];
-            let (mut size, mut length) = (1.0, 0.0);
-            for i in 0..m {
-                way[i] = target[i] - u[i];
-                size = f64::max(size, u[i].abs().max(target[i].abs()));
-                length = f64::max(length, way[i].abs());
-            }
-            let added = active(qp) - watched;
-            let grown = !added.is_empty();
-            if let Some((.., shorter)) = before {
-                if length > CONVERGING * shorter && !grown {
-                    return None;
-                }
-                ratio = ratio.max(length / shorter);
-            }
-            // The next correction would be shorter in the same ratio at least.
-            let ends = before.is_some() && ratio * length <= SKIPPED * MET * size && !grown;
-            // The method of secants, along the way of the last two.
-            let mut part = 0.0;
-            if let Some((_, way_before, _)) = before.filter(|_| !ends) {
-                let (mut product, mut square) = (0.0, 0.0);
-                for i in 0..m {
-                    let change = way[i] - way_before[i];
-                    product += way[i] * change;
-                    square += change * change;
-                }
-                part = if square > 0.0 { product / square } else { 0.0 };
-            }
-            let answer = target;
-            for i in 0..m {
-                let other = before.map_or(answer[i], |(answer, ..)| answer[i]);
-                u[i] = self.bounds.clamp(i, answer[i] - part * (answer[i] - other));
-            }
-            before = if grown { None } else { Some((answer, way, length)) };
-            watched |= added;
-            if !ends {
-                self.linearise(u, watched, at)?;
-                let violated = at.violated() - watched;
-                if !violated.is_empty() {
-                    self.linearise(u, violated, at)?;
-                    (watched, before) = (watched | violated, None);
-                }
-                continue;
-            }
-            // The others at the end.
-            self.linearise(u, RowSet::ALL - watched, at)?;
-            if at.worst(RowSet::EMPTY) > 0.0 {
-                let violated = at.violated();
-                if (violated - watched).is_empty() {
-                    return None;
-                }
-                (watched, before) = (watched | violated, None);
-                continue;
-            }
-            let distance = self.distance(u);
-            let known = self.u_ref.iter().chain(last.into_iter().flatten());
-            let limit = known.fold(1.0, |s: f64, v| s.max(v.abs()));
-            let is_sole = match last {
-                Some(last) => self.is_sole(u, last, ratio, watched, at, qp),
-                None => ratio <= CONTRACTION,
-            };
-            let settled = distance <= FAR * limit
-                && is_sole
-                && !against.is_some_and(|i| self.is_nearer_aside(u, i, at));
-            return settled.then_some(Solution { iterations, ..solution });
-        }
-        None
-    }
-
-    /// Whether there is no other answer near `u`, which corrections approached in `ratio`, or nearer to u_ref towards `last`.
-    fn is_sole(
-        &self,
-        u: &[f64],
-        last: &[f64],
-        ratio: f64,
-        watched: RowSet,
-        at: &mut Linearised,
-        qp: &mut Workspace,
-    ) -> bool {
-        let distance = self.distance(u);
-        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-        let near = distance <= (1.0 + MET) * self.distance(last);
-        if ratio <= CONTRACTION && (near || ratio * away <= CONTRACTION * distance) {
-            return true;
-        }
-        // A correction from there has to lead here.
-        let mut target = [0.0; MAX_INPUTS];
-        let target = &mut target[..u.len()];
-        if self.linearise(last, watched, at).is_none() {
-            return false;
-        }
-        let solution = qp.solve(&self.problem(at.rows), target);
-        let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
-        let left = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-        let leads_here = solution.outcome == Outcome::Optimal && left <= CONVERGING * away + SAME * size;
-        // The rows, and the last answer of the QP, have to be those at `u`.
-        let seen = leads_here && self.linearise(u, watched, at).is_some();
-        seen && qp.solve(&self.problem(at.rows), target).outcome == Outcome::Optimal
-    }
-
     /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is
     /// left out where the one before met every row by steps that contracted.
     fn descend(
@@ -589,26 +454,31 @@ impl PeriodProblem<'_> {
     fn is_nearer_aside(&self, u: &[f64], i: usize, at: &mut Linearised) -> bool {
         let (m, far, u_ref) = (u.len(), self.distance(u), &self.u_ref[..u.len()]);
         let normal = norm(at.rows[i].normal[..m].iter().copied());
-        let mut found = false;
         // The axis that is most along u − u_ref adds no direction aside to those of the others.
         let way = |i: usize| (u[i] - u_ref[i]).abs();
         let main = (0..m).fold(0, |main, i| if way(i) > way(main) { i } else { main });
-        for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        let mut direction = [0.0; MAX_INPUTS];
+        let mut aside = [0.0; MAX_INPUTS];
+        for axis in (0..m).filter(|axis| *axis != main) {
             // The axis without its part along u − u_ref.
             let along = (u[axis] - u_ref[axis]) / far;
-            let mut aside = [0.0; MAX_INPUTS];
-            for (j, v) in aside[..m].iter_mut().enumerate() {
-                *v = f64::from(u8::from(j == axis)) - along * (u[j] - u_ref[j]) / far;
+            for (j, d) in direction[..m].iter_mut().enumerate() {
+                *d = -along * (u[j] - u_ref[j]) / far;
             }
-            let way = sign * ASIDE * far / norm(aside[..m].iter().copied());
-            for (j, v) in aside[..m].iter_mut().enumerate() {
-                *v = self.bounds.clamp(j, u[j] + way * *v);
+            direction[axis] += 1.0;
+            let length = ASIDE * far / norm(direction[..m].iter().copied());
+            for way in [length, -length] {
+                for j in 0..m {
+                    aside[j] = self.bounds.clamp(j, u[j] + way * direction[j]);
+                }
+                let aside = &aside[..m];
+                let nearer = (self.distance(aside) - far) * normal;
+                if self.slack(&self.requirements[i], aside, &mut at.ahead).is_some_and(|s| s > nearer) {
+                    return true;
+                }
             }
-            let aside = &aside[..m];
-            let slack = self.slack(&self.requirements[i], aside, &mut at.ahead);
-            found |= slack.is_some_and(|slack| slack > (self.distance(aside) - far) * normal);
         }
-        found
+        false
     }
 
     /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that
