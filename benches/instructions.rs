@@ -3,18 +3,23 @@
 
 use std::hint::black_box;
 
-use punctual_core::filter::FilterBuilder;
+use punctual::coupling::{InProcess, Own, Simulation, System, alone};
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::{FilterBuilder, Sampling};
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
 use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
-use punctual_reference::plants::{PointMass, Unicycle};
-use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
+use punctual_fmu::configuration::{Configuration, FilterConfiguration};
+use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use support::{
+    ByHand, Drive, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, obstructed, promise,
+};
 
 mod support;
 
 /// A name and the work, to be done a number of times.
 type Case = (&'static str, fn(u32));
 
-const CASES: [Case; 13] = [
+const CASES: [Case; 33] = [
     ("by-hand", by_hand),
     ("step-point-mass", |times| step(goal(PointMass), [0.0; 2], times)),
     ("step-unicycle", |times| step(goal(Unicycle), [0.0; 2], times)),
@@ -29,6 +34,27 @@ const CASES: [Case; 13] = [
     ("promise-2", |times| advance(2, times)),
     ("promise-4", |times| advance(4, times)),
     ("promise-8", |times| advance(8, times)),
+    // The default: the constraint over the measured period, along a closed loop.
+    ("held-point-mass-1ms", |times| held(PointMass, 0, 1.0e-3, times)),
+    ("held-point-mass-10ms", |times| held(PointMass, 0, 10.0e-3, times)),
+    ("held-point-mass-50ms", |times| held(PointMass, 0, 50.0e-3, times)),
+    ("held-point-mass-1ms-10", |times| held(PointMass, 10, 1.0e-3, times)),
+    ("held-point-mass-10ms-10", |times| held(PointMass, 10, 10.0e-3, times)),
+    ("held-point-mass-50ms-10", |times| held(PointMass, 10, 50.0e-3, times)),
+    ("held-unicycle-1ms", |times| held(Unicycle, 0, 1.0e-3, times)),
+    ("held-unicycle-10ms", |times| held(Unicycle, 0, 10.0e-3, times)),
+    ("held-unicycle-50ms", |times| held(Unicycle, 0, 50.0e-3, times)),
+    ("held-unicycle-1ms-10", |times| held(Unicycle, 10, 1.0e-3, times)),
+    ("held-unicycle-10ms-10", |times| held(Unicycle, 10, 10.0e-3, times)),
+    ("held-unicycle-50ms-10", |times| held(Unicycle, 10, 50.0e-3, times)),
+    ("held-bicycle-1ms", |times| held(bicycle(), 0, 1.0e-3, times)),
+    ("held-bicycle-10ms", |times| held(bicycle(), 0, 10.0e-3, times)),
+    ("held-bicycle-50ms", |times| held(bicycle(), 0, 50.0e-3, times)),
+    ("held-bicycle-1ms-10", |times| held(bicycle(), 10, 1.0e-3, times)),
+    ("held-bicycle-10ms-10", |times| held(bicycle(), 10, 10.0e-3, times)),
+    ("held-bicycle-50ms-10", |times| held(bicycle(), 10, 50.0e-3, times)),
+    ("batch-row", batch_row),
+    ("campaign-step", campaign_step),
 ];
 
 fn by_hand(times: u32) {
@@ -45,6 +71,62 @@ fn step(builder: FilterBuilder, u_ref: [f64; 2], times: u32) {
         let report = filter.step(black_box(T), black_box(&X), black_box(&u_ref), &mut u);
         assert!(report.expect("right dimensions").status.is_satisfied());
     }
+}
+
+fn bicycle() -> Bicycle {
+    Bicycle::new(10.0).expect("valid bicycle")
+}
+
+fn held<P: ControlAffine<4, 2> + Copy + Send + 'static>(plant: P, obstacles: usize, period: f64, times: u32) {
+    let builder = obstructed(plant, obstacles).sampling(Sampling::default()).expect("valid settings");
+    let mut drive = Drive::recorded(builder, plant, period);
+    for _ in 0..times {
+        black_box(drive.step());
+    }
+}
+
+/// The filter of a unicycle with one goal, as a file describes it.
+fn described(stop_time: f64) -> FilterConfiguration {
+    let text = format!(
+        "kind = \"filter\"\nplant = {{ model = \"unicycle\" }}\n\
+         experiment = {{ step_size = 0.001, stop_time = {stop_time:?} }}\n\
+         [[barrier]]\nname = \"goal\"\ncentre = [45.0, 45.0]\nradius = 2.0\ndeadline = 10.0\nmargin = 0.02\n"
+    );
+    let configuration = Configuration::parse(&text);
+    match configuration.expect("a valid configuration") {
+        Configuration::Filter(filter) => filter,
+        _ => unreachable!("the kind is a filter"),
+    }
+}
+
+/// What a row of `punctual.FilterBatch` costs without Python: its memory goes into a loop and back.
+fn batch_row(times: u32) {
+    const ROWS: usize = 10;
+    let mut own = described(1.0).build_loop().expect("a filter");
+    let mut memories = vec![own.state(); ROWS];
+    let mut u = [0.0; 2];
+    for i in 0..times as usize {
+        let (row, sample) = (i % ROWS, i / ROWS);
+        let t = 0.001 * sample as f64;
+        let x = [6.0 * t, 0.1 * row as f64, 0.8, 6.0];
+        own.restore(&memories[row]).expect("its own memory");
+        own.step(black_box(t), 0.001, black_box(&x), &[0.0; 2], &mut u).expect("right dimensions");
+        own.save(&mut memories[row]);
+    }
+}
+
+/// So many steps of a filter and its plant in process.
+fn campaign_step(times: u32) {
+    let (text, configurations) =
+        alone(Configuration::Filter(described(0.001 * f64::from(times)))).expect("a filter that runs alone");
+    let system = System::parse(&text).expect("a valid system");
+    let models: Vec<_> = configurations.into_iter().map(|c| Own::new(c).expect("a product")).collect();
+    let descriptions: Vec<_> = models.iter().map(|model| &model.description).collect();
+    let instance = |c: usize| models[c].instance("it");
+    let mut simulation: Simulation<InProcess> =
+        Simulation::assembled(&system, &descriptions, instance).expect("a simulation");
+    let outcome = simulation.run_unrecorded(|_, row| _ = black_box(row)).expect("a run");
+    assert_eq!(outcome.statistics.steps, u64::from(times));
 }
 
 /// Solves for the references in turn.

@@ -6,8 +6,8 @@ pub(crate) mod sources;
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
-use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::filter::{BarrierSettings, FilterBuilder, FilterState, SafetyFilter, Sampling};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::PointMass;
@@ -40,12 +40,20 @@ where
 
 /// The goal of a point mass and `obstacles` discs beside its way.
 pub(crate) fn goal_and_obstacles(obstacles: usize) -> FilterBuilder {
-    (0..obstacles).fold(goal(PointMass), |builder, i| {
+    obstructed(PointMass, obstacles)
+}
+
+/// The goal of `plant` and `obstacles` discs beside its way.
+pub(crate) fn obstructed<P>(plant: P, obstacles: usize) -> FilterBuilder
+where
+    P: ControlAffine<4, 2> + Copy + Send + 'static,
+{
+    (0..obstacles).fold(goal(plant), |builder, i| {
         let (column, line) = ((i % 10) as f64, (i / 10) as f64);
         let disc = DistanceDisc::new([-20.0 + 8.0 * column, 60.0 + 8.0 * line], RADIUS, SMOOTHING);
         let obstacle = Outside(disc.expect("valid disc"));
         builder
-            .barrier(&format!("obstacle {i}"), PointMass, obstacle, BarrierSettings::within(DEADLINE))
+            .barrier(&format!("obstacle {i}"), plant, obstacle, BarrierSettings::within(DEADLINE))
             .expect("valid settings")
     })
 }
@@ -55,6 +63,52 @@ pub(crate) fn anchored(builder: FilterBuilder) -> SafetyFilter {
     let mut filter = builder.build().expect("valid filter");
     filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
     filter
+}
+
+/// A closed loop that was recorded and is stepped through again and again: samples of which each has the input of the one
+/// before behind it.
+pub(crate) struct Drive {
+    filter: SafetyFilter,
+    begin: FilterState,
+    samples: Vec<(f64, [f64; 4])>,
+    next: usize,
+}
+
+impl Drive {
+    /// The loop of a filter and `plant` at the `period` (s), without the first samples, in which the period is measured.
+    pub(crate) fn recorded<P: ControlAffine<4, 2>>(builder: FilterBuilder, plant: P, period: f64) -> Self {
+        const FIRST: usize = 5;
+        const SAMPLES: usize = 55;
+        let mut filter = builder.build().expect("valid filter");
+        let (mut x, mut u) = ([0.0, 0.0, X[2], X[3]], [0.0; 2]);
+        let (mut begin, mut samples) = (filter.state().clone(), Vec::new());
+        for k in 0..SAMPLES {
+            if k == FIRST {
+                begin = filter.state().clone();
+            }
+            let t = period * k as f64;
+            if k >= FIRST {
+                samples.push((t, x));
+            }
+            filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
+            x = rk4_step(&plant, &x.into(), &u.into(), period).into();
+        }
+        filter.restore(&begin).expect("its own state");
+        Self { filter, begin, samples, next: 0 }
+    }
+
+    /// The next sample.
+    pub(crate) fn step(&mut self) -> [f64; 2] {
+        let (t, x) = self.samples[self.next];
+        let mut u = [0.0; 2];
+        self.filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
+        self.next += 1;
+        if self.next == self.samples.len() {
+            self.next = 0;
+            self.filter.restore(&self.begin).expect("its own state");
+        }
+        u
+    }
 }
 
 /// A promise for relative degree `n` with its state on the way, and derivatives of h there.

@@ -183,8 +183,31 @@ where
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        let x = SVector::from_column_slice(x);
-        ahead::evaluate::<P, B, NX, NU, K>(&self.plant, &self.barrier, (t, duration), &x, u, out);
+        *out = Ahead::ZERO;
+        ahead::evaluate::<P, B, NX, NU, K>((&self.plant, &self.barrier), (t, duration), x, u, out);
+    }
+
+    fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        let model = (&self.plant, &self.barrier);
+        macro_rules! by_degree {
+            ($($n:literal => $k:literal),*) => {
+                $(if const { K == $k } {
+                    ahead::evaluate::<P, B, NX, NU, $n>(model, (t, duration), x, u, out);
+                })*
+            };
+        }
+        by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9);
+    }
+
+    fn values_ahead(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        ahead::values::<P, B, NX, NU, K>((&self.plant, &self.barrier), (t, duration), x, u, out);
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {

@@ -206,6 +206,7 @@ struct Cascade {
 }
 
 impl Cascade {
+    #[inline(always)]
     fn of(rates: &Rates, n: usize, time_left: f64) -> Self {
         match *rates {
             Rates::Each(rates) => {
@@ -213,9 +214,10 @@ impl Cascade {
                 Self { weights, last, attenuation: weights[0] }
             }
             Rates::Repeated(rate) => {
-                let mut weights = [0.0; MAX_RELATIVE_DEGREE];
-                for (k, weight) in weights[..n].iter_mut().enumerate() {
-                    *weight = binomial(n - 1, k) * elementary::powi(rate, (n - 1 - k) as i32);
+                let (mut weights, mut power) = ([0.0; MAX_RELATIVE_DEGREE], 1.0);
+                for k in (0..n).rev() {
+                    weights[k] = binomial(n - 1, k) * power;
+                    power *= rate;
                 }
                 Self { weights, last: rate, attenuation: attenuation(rate, n, time_left) }
             }
@@ -236,8 +238,29 @@ pub(super) fn over_period(
     period: f64,
     disturbance: f64,
 ) -> Option<PeriodBound> {
-    let n = at.degree();
-    let cascade = Cascade::of(&condition.rates(at)?, n, at.time_left(period));
+    // With n known to the compiler the short loops unroll.
+    match at.degree() {
+        1 => over_period_of_degree::<1>(condition, at, h, period, disturbance),
+        2 => over_period_of_degree::<2>(condition, at, h, period, disturbance),
+        3 => over_period_of_degree::<3>(condition, at, h, period, disturbance),
+        4 => over_period_of_degree::<4>(condition, at, h, period, disturbance),
+        5 => over_period_of_degree::<5>(condition, at, h, period, disturbance),
+        6 => over_period_of_degree::<6>(condition, at, h, period, disturbance),
+        7 => over_period_of_degree::<7>(condition, at, h, period, disturbance),
+        _ => over_period_of_degree::<8>(condition, at, h, period, disturbance),
+    }
+}
+
+/// [`over_period`] for n = `N`.
+fn over_period_of_degree<const N: usize>(
+    condition: &dyn Condition,
+    at: &Sample,
+    h: &[f64],
+    period: f64,
+    disturbance: f64,
+) -> Option<PeriodBound> {
+    let h: &[f64; N] = h.first_chunk()?;
+    let cascade = Cascade::of(&condition.rates(at)?, N, at.time_left(period));
     // The target of h: μ + r and its derivatives.
     let target = |elapsed: f64| {
         let mut r = condition.profile(at, elapsed);
@@ -246,8 +269,8 @@ pub(super) fn over_period(
     };
     let (now, then) = (target(at.elapsed), target(at.elapsed + period));
     let (decay, weights) = (cascade.decay(period), cascade.weights);
-    let undisturbed: f64 = (0..n).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
-    let floor = undisturbed + at.pull * period + disturbed(&weights[..n], disturbance, period);
+    let undisturbed: f64 = (0..N).map(|k| weights[k] * (then[k] + decay * (h[k] - now[k]))).sum();
+    let floor = undisturbed + at.pull * period + disturbed(&weights[..N], disturbance, period);
     Some(PeriodBound { weights, floor, attenuation: cascade.attenuation, decay })
 }
 
@@ -301,6 +324,9 @@ pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
 /// The most by which Σ `weights[k]` h⁽ᵏ⁾ at the end of the period, k < n, can fall below its prediction under
 /// disturbances of h⁽ⁿ⁾ up to `bound`: each h⁽ᵏ⁾ by up to W δ^{n−k}/(n−k)!.
 fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
+    if bound == 0.0 {
+        return 0.0;
+    }
     let (n, mut grown, mut sum) = (weights.len(), bound, 0.0);
     for k in (0..n).rev() {
         grown *= period / (n - k) as f64;

@@ -11,7 +11,7 @@
 
 use crate::MAX_RELATIVE_DEGREE;
 use crate::elementary;
-use crate::lie::{Ahead, Predict};
+use crate::lie::Predict;
 
 /// Parts of the first walk.
 const FEWEST: usize = 4;
@@ -94,7 +94,7 @@ impl Hold<'_> {
 
     /// h⁽⁰⁾ … h⁽ⁿ⁾ at an instant (s after the sample); `None` where the source cannot predict.
     pub(super) fn derivatives(&self, at: f64) -> Option<[f64; MAX_RELATIVE_DEGREE + 1]> {
-        self.source.map(|source| self.ahead(source, self.x, 0.0, at).value)
+        self.source.map(|source| self.ahead(source, self.x, 0.0, at))
     }
 
     /// Reads η and η̇ at `from`, `to` and between them.
@@ -121,13 +121,13 @@ impl Hold<'_> {
     /// η and η̇ at the instant `at`, at which the state is `x`.
     fn node(&self, source: &dyn Predict, x: &[f64], at: f64) -> Node {
         let ahead = self.ahead(source, x, at, 0.0);
-        Node { at, h: ahead.value[0], slope: ahead.value[1] }
+        Node { at, h: ahead[0], slope: ahead[1] }
     }
 
     /// Derivatives of h `later` s after the instant `at`, at which the state is `x`.
-    fn ahead(&self, source: &dyn Predict, x: &[f64], at: f64, later: f64) -> Ahead {
-        let mut ahead = Ahead::ZERO;
-        source.ahead(self.t + at, x, self.u, later, &mut ahead);
+    fn ahead(&self, source: &dyn Predict, x: &[f64], at: f64, later: f64) -> [f64; MAX_RELATIVE_DEGREE + 1] {
+        let mut ahead = [0.0; MAX_RELATIVE_DEGREE + 1];
+        source.values_ahead(self.t + at, x, self.u, later, &mut ahead);
         ahead
     }
 }

@@ -116,6 +116,7 @@ impl Outlook<'_> {
             Phase::Stay => 0.5 * promise.margin.min(self.drift[0]).max(0.0),
             _ => promise.margin,
         };
-        Some(Requirement { barrier, bound: PeriodBound { weights, floor, ..PeriodBound::ZERO }, ahead })
+        let bound = PeriodBound { weights, floor, ..PeriodBound::ZERO };
+        Some(Requirement::new(barrier, bound, ahead, self.n))
     }
 }

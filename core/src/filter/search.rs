@@ -7,7 +7,8 @@
 //! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
 //! evaluated where the search ends.
 //!
-//! There are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
+//! Most rows are all but affine, and a few corrections from u_ref find the answer (`correction`). Where they do not, there
+//! are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
 //! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
 //! guess matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
 //! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
@@ -26,6 +27,7 @@
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
 //! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
+mod correction;
 mod wide;
 
 use super::errors::{MeasurementErrors, Uncertainty};
@@ -36,7 +38,8 @@ use crate::lie::Ahead;
 use crate::qp::{
     Bounds, Constraint, Enforcement, Outcome, Problem, Row, RowSet, Solution, Solver, Workspace,
 };
-use crate::{MAX_INPUTS, MAX_ROWS};
+use crate::scalar::all_finite;
+use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
 /// Violations up to this part of a row's terms count as met: Newton's method leaves as much.
 const MET: f64 = 1e-9;
@@ -67,15 +70,17 @@ pub(super) struct Requirement {
     pub(super) bound: PeriodBound,
     /// The time in s until that instant, finite, > 0.
     pub(super) ahead: f64,
+    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
+    /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 it is δ.
+    divisor: f64,
 }
 
 impl Requirement {
-    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
-    /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 the
-    /// divisor is δ.
-    fn divisor(&self, n: usize) -> f64 {
-        let order = self.bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
-        (1..=n - order).fold(1.0, |product, i| product * (self.ahead / i as f64))
+    /// The requirement `ahead` s on, of a barrier of relative degree `n`.
+    pub(super) fn new(barrier: usize, bound: PeriodBound, ahead: f64, n: usize) -> Self {
+        let order = bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
+        let divisor = (1..=n - order).fold(1.0, |product, i| product * (ahead / i as f64));
+        Self { barrier, bound, ahead, divisor }
     }
 }
 
@@ -84,6 +89,8 @@ pub(super) struct PeriodProblem<'a> {
     pub(super) slots: &'a [BarrierSlot],
     /// Requirements, at most [`MAX_ROWS`]; each has a row.
     pub(super) requirements: &'a [Requirement],
+    /// Number of those at the end of the period; the others are instants within it.
+    pub(super) listed: usize,
     pub(super) t: f64,
     pub(super) bounds: &'a Bounds,
     pub(super) u_ref: &'a [f64],
@@ -101,6 +108,8 @@ pub(super) struct PeriodProblem<'a> {
 struct Linearised<'a> {
     rows: &'a mut [Row],
     violations: [f64; MAX_ROWS],
+    /// Room for one prediction.
+    ahead: Ahead,
 }
 
 impl Linearised<'_> {
@@ -122,6 +131,18 @@ impl Linearised<'_> {
     }
 }
 
+/// The length of the vector of these components.
+#[inline(always)]
+fn norm(components: impl Iterator<Item = f64> + Clone) -> f64 {
+    /// Squares in this range neither overflow nor lose digits.
+    const SQUARES: core::ops::Range<f64> = 1e-250..1e250;
+    let square = components.clone().fold(0.0, |sum, v| sum + v * v);
+    if SQUARES.contains(&square) {
+        return elementary::sqrt(square);
+    }
+    components.fold(0.0, |s: f64, v| elementary::hypot(s, v))
+}
+
 /// The rows that are active in the last answer of `qp`.
 fn active(qp: &Workspace) -> RowSet {
     let mut rows = RowSet::EMPTY;
@@ -134,7 +155,17 @@ fn active(qp: &Workspace) -> RowSet {
 }
 
 impl PeriodProblem<'_> {
-    /// Finds u from the pointwise `rows` and `last`, the input of the step before. On return `rows` are
+    /// The row from which the search starts: the pointwise one, or that of an instant to the order n.
+    fn first_row(&self, i: usize) -> Row {
+        let requirement = &self.requirements[i];
+        let slot = &self.slots[requirement.barrier];
+        match i < self.listed {
+            true => slot.now.row,
+            false => slot.outlook().row_at(requirement, &slot.now.row.normal),
+        }
+    }
+
+    /// Finds u from the pointwise rows and `last`, the input of the step before. On return `rows` are
     /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
     /// them, where a source cannot predict or its prediction is not finite.
     pub(super) fn solve(
@@ -144,19 +175,49 @@ impl PeriodProblem<'_> {
         qp: &mut Workspace,
         u: &mut [f64],
     ) -> Option<Solution> {
+        // With two inputs, as most vehicles have, known to the compiler the short loops unroll.
+        match u {
+            [a, b] => {
+                let mut two = [*a, *b];
+                let solution = self.solve_for(rows, last, qp, &mut two);
+                (*a, *b) = (two[0], two[1]);
+                solution
+            }
+            _ => self.solve_for(rows, last, qp, u),
+        }
+    }
+
+    #[inline(always)]
+    fn solve_for(
+        &self,
+        rows: &mut [Row],
+        last: Option<&[f64]>,
+        qp: &mut Workspace,
+        u: &mut [f64],
+    ) -> Option<Solution> {
         let m = u.len();
-        let mut at = Linearised { rows, violations: [0.0; MAX_ROWS] };
+        for (i, row) in rows.iter_mut().enumerate() {
+            *row = self.first_row(i);
+        }
+        let mut at = Linearised { rows, violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO };
         let mut pointwise = [0.0; MAX_INPUTS];
         let pointwise = &mut pointwise[..m];
         let first = qp.solve(&self.problem(at.rows), pointwise);
         // Nothing to do where u_ref meets the sampled rows.
         let doubtful = active(qp);
-        if self.is_met_by_reference(u, doubtful, &mut at)? {
+        let Some(unseen) = self.unmet_by_reference(u, doubtful, &mut at)? else {
             return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
-        }
-        // Newton's method from both guesses.
+        };
         let watched = doubtful | at.violated();
         let against = at.most_violated();
+        // All but affine rows: a few corrections from u_ref.
+        if let Some(solution) = self.correct(u, last, [watched, unseen], against, &mut at, qp) {
+            return Some(Solution { iterations: first.iterations + solution.iterations, ..solution });
+        }
+        for (i, row) in at.rows.iter_mut().enumerate() {
+            *row = self.first_row(i);
+        }
+        // Newton's method from both guesses.
         let Found { mut best, mut at_best, mut settled } =
             self.descend(u, [Some(&*pointwise), last], watched, &mut at, qp)?;
         // Is the answer settled? An input far out turns the plant by an angle: there the rows have other answers, which
@@ -191,18 +252,26 @@ impl PeriodProblem<'_> {
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
     }
 
-    /// Whether u_ref within its bounds, written to `u`, meets the sampled rows. The `doubtful` ones are looked at
-    /// first, and alone if one of them is violated.
-    fn is_met_by_reference(&self, u: &mut [f64], doubtful: RowSet, at: &mut Linearised) -> Option<bool> {
+    /// Whether u_ref within its bounds, written to `u`, fails the sampled rows: if so, the rows that are not linearised
+    /// there. The `doubtful` ones are looked at first, and alone if one of them is violated.
+    fn unmet_by_reference(
+        &self,
+        u: &mut [f64],
+        doubtful: RowSet,
+        at: &mut Linearised,
+    ) -> Option<Option<RowSet>> {
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, self.u_ref[i]);
         }
-        self.linearise(u, doubtful, at)?;
-        if !(at.violated() & doubtful).is_empty() {
-            return Some(false);
+        let others = RowSet::ALL - doubtful;
+        if !doubtful.is_empty() {
+            self.linearise(u, doubtful, at)?;
+            if !(at.violated() & doubtful).is_empty() {
+                return Some(Some(others));
+            }
         }
-        self.linearise(u, RowSet::ALL, at)?;
-        Some(at.worst(RowSet::EMPTY) <= 0.0)
+        self.linearise(u, others, at)?;
+        Some((at.worst(RowSet::EMPTY) > 0.0).then_some(RowSet::EMPTY))
     }
 
     /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is
@@ -257,20 +326,22 @@ impl PeriodProblem<'_> {
         RowSet::with(self.enforcement.len(), |i| matches!(self.enforcement[i], Enforcement::Soft { .. }))
     }
 
+    #[inline(always)]
     fn distance(&self, u: &[f64]) -> f64 {
-        u.iter().zip(self.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r))
+        norm(u.iter().zip(&self.u_ref[..u.len()]).map(|(v, r)| v - r))
     }
 
     /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
     /// `None` where there is no finite prediction.
     fn linearise(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
-        let rows = at.rows.iter_mut().zip(&mut at.violations);
+        let Linearised { rows, violations, ahead } = at;
+        let rows = rows.iter_mut().zip(violations);
         for (i, (requirement, (row, violation))) in self.requirements.iter().zip(rows).enumerate() {
             *violation = 0.0;
             if requirement.bound.is_zero() {
                 *row = Row::ZERO;
             } else if anew.contains(i) {
-                (*row, *violation) = self.linearised(requirement, u)?;
+                *violation = self.linearised(requirement, u, ahead, row)?;
             } else {
                 let (slack, terms) = (row.slack(u), row.size(u));
                 if slack < -MET * terms {
@@ -281,17 +352,20 @@ impl PeriodProblem<'_> {
         Some(())
     }
 
-    /// The row of a requirement linearised at `u`, and its violation there in units of its terms.
-    fn linearised(&self, requirement: &Requirement, u: &[f64]) -> Option<(Row, f64)> {
-        let (slot, mut ahead) = (&self.slots[requirement.barrier], Ahead::ZERO);
+    /// Writes the row of a requirement linearised at `u`. Returns its violation there in units of its terms.
+    fn linearised(
+        &self,
+        requirement: &Requirement,
+        u: &[f64],
+        ahead: &mut Ahead,
+        row: &mut Row,
+    ) -> Option<f64> {
+        let slot = &self.slots[requirement.barrier];
         let x = &slot.now.from[..];
-        slot.source.predict()?.ahead(self.t, x, u, requirement.ahead, &mut ahead);
-        if !ahead.is_finite() {
-            return None;
-        }
+        slot.source.predict()?.ahead_of_row(self.t, x, u, requirement.ahead, ahead);
         // A row on h⁽ⁿ⁾, as the pointwise one.
         let n = slot.degree();
-        let divisor = requirement.divisor(n);
+        let divisor = requirement.divisor;
         let Weighted { mut value, mut terms, mut normal } =
             requirement.bound.weighted(&ahead.value[..n], &ahead.gradient, u.len(), divisor);
         if !self.errors.is_exact() {
@@ -310,11 +384,27 @@ impl PeriodProblem<'_> {
             at_u += a * v;
             moved += (a * v).abs();
         }
-        let row = Row { normal, floor: at_u - value };
+        *row = Row { normal, floor: at_u - value };
         // Near a floor of 0 the value is a small difference of what the input moves.
         let terms = terms + moved;
         let violation = if value < -MET * terms { -value / terms } else { 0.0 };
-        row.floor.is_finite().then_some((row, violation))
+        // What is not finite in the prediction is not finite here either: a weight of 0 times it is no number.
+        let finite = row.floor.is_finite() & all_finite(&row.normal[..u.len()]);
+        finite.then_some(violation)
+    }
+
+    /// The slack at `u` of the row of a requirement. `None` where there is no prediction.
+    fn slack(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<f64> {
+        if !self.errors.is_exact() {
+            let mut row = Row::ZERO;
+            return self.linearised(requirement, u, ahead, &mut row).map(|_| row.slack(u));
+        }
+        let (slot, bound) = (&self.slots[requirement.barrier], &requirement.bound);
+        let held = (self.t, &slot.now.from, requirement.ahead);
+        slot.source.predict()?.values_ahead(held.0, held.1, u, held.2, &mut ahead.value);
+        let n = slot.degree();
+        let reached = (0..n).fold(-bound.floor, |sum, k| sum + bound.weights[k] * ahead.value[k]);
+        Some(reached / requirement.divisor)
     }
 
     /// Linearises all rows at `u`, with violations that are round-off counted as met.
@@ -348,47 +438,47 @@ impl PeriodProblem<'_> {
             let part = if i % 2 == 0 { PART } else { -PART };
             *moved = x * (1.0 + part * (1.0 + i as f64 / states as f64));
         }
-        let mut ahead = [Ahead::ZERO; 2];
-        let [here, there] = &mut ahead;
+        let mut values = [[0.0; MAX_RELATIVE_DEGREE + 1]; 2];
+        let [here, there] = &mut values;
         let (later, duration) = (self.t * (1.0 + 0.7 * PART), requirement.ahead);
-        source.ahead(self.t, x, u, duration, here);
-        source.ahead(later, &moved[..states], u, duration, there);
+        source.values_ahead(self.t, x, u, duration, here);
+        source.values_ahead(later, &moved[..states], u, duration, there);
         let (n, weights) = (slot.degree(), &requirement.bound.weights);
-        let change = |k: usize| (weights[k] * (there.value[k] - here.value[k])).abs() / PART;
-        let size = (0..n).map(change).sum::<f64>() / requirement.divisor(n);
+        let change = |k: usize| (weights[k] * (there[k] - here[k])).abs() / PART;
+        let size = (0..n).map(change).sum::<f64>() / requirement.divisor;
         if size.is_finite() { size } else { 0.0 }
     }
 
     /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.
+    #[inline(always)]
     fn is_nearer_aside(&self, u: &[f64], i: usize, at: &mut Linearised) -> bool {
-        let (m, far) = (u.len(), self.distance(u));
-        let kept = (at.rows[i], at.violations[i]);
-        let mut found = false;
+        let (m, far, u_ref) = (u.len(), self.distance(u), &self.u_ref[..u.len()]);
+        let normal = norm(at.rows[i].normal[..m].iter().copied());
         // The axis that is most along u − u_ref adds no direction aside to those of the others.
-        let way = |i: usize| (u[i] - self.u_ref[i]).abs();
+        let way = |i: usize| (u[i] - u_ref[i]).abs();
         let main = (0..m).fold(0, |main, i| if way(i) > way(main) { i } else { main });
-        for (axis, sign) in (0..m).filter(|axis| *axis != main).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        let mut direction = [0.0; MAX_INPUTS];
+        let mut aside = [0.0; MAX_INPUTS];
+        for axis in (0..m).filter(|axis| *axis != main) {
             // The axis without its part along u − u_ref.
-            let along = (u[axis] - self.u_ref[axis]) / far;
-            let mut aside: [f64; MAX_INPUTS] = core::array::from_fn(|j| {
-                if j < m {
-                    f64::from(u8::from(j == axis)) - along * (u[j] - self.u_ref[j]) / far
-                } else {
-                    0.0
-                }
-            });
-            let size = aside.iter().fold(0.0, |s: f64, v| elementary::hypot(s, *v));
-            for (j, v) in aside[..m].iter_mut().enumerate() {
-                *v = self.bounds.clamp(j, u[j] + sign * ASIDE * far * *v / size);
+            let along = (u[axis] - u_ref[axis]) / far;
+            for (j, d) in direction[..m].iter_mut().enumerate() {
+                *d = -along * (u[j] - u_ref[j]) / far;
             }
-            let aside = &aside[..m];
-            if self.linearise(aside, RowSet::of(i), at).is_some() {
-                let normal = at.rows[i].normal.iter().fold(0.0, |s: f64, a| elementary::hypot(s, *a));
-                found |= at.rows[i].slack(aside) > (self.distance(aside) - far) * normal;
+            direction[axis] += 1.0;
+            let length = ASIDE * far / norm(direction[..m].iter().copied());
+            for way in [length, -length] {
+                for j in 0..m {
+                    aside[j] = self.bounds.clamp(j, u[j] + way * direction[j]);
+                }
+                let aside = &aside[..m];
+                let nearer = (self.distance(aside) - far) * normal;
+                if self.slack(&self.requirements[i], aside, &mut at.ahead).is_some_and(|s| s > nearer) {
+                    return true;
+                }
             }
         }
-        (at.rows[i], at.violations[i]) = kept;
-        found
+        false
     }
 
     /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that

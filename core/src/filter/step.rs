@@ -128,7 +128,7 @@ impl SafetyFilter {
                 report.remember(&promises[i]);
             }
             if let Some(ahead) = moment.period {
-                requirements.push(Requirement { barrier: i, bound: slot.now.period_bound, ahead });
+                requirements.push(Requirement::new(i, slot.now.period_bound, ahead, slot.degree()));
             }
         }
         found?;
@@ -149,7 +149,7 @@ impl SafetyFilter {
         let room = MAX_ROWS - self.slots.len();
         for (i, (slot, promise)) in self.slots.iter().zip(&next.barriers).enumerate().take(room) {
             if let Some(bound) = slot.over(promise, moment, self.period_max) {
-                requirements.push(Requirement { barrier: i, bound, ahead: self.period_max });
+                requirements.push(Requirement::new(i, bound, self.period_max, slot.degree()));
             }
         }
     }
@@ -193,12 +193,7 @@ impl SafetyFilter {
         // Over the period.
         if !requirements.is_empty() {
             for (i, requirement) in requirements.iter().enumerate() {
-                let now = &self.slots[requirement.barrier].now;
-                enforcement[i] = now.enforcement;
-                rows[i] = match i < listed {
-                    true => now.row,
-                    false => self.slots[requirement.barrier].outlook().row_at(requirement, &now.row.normal),
-                };
+                enforcement[i] = self.slots[requirement.barrier].now.enforcement;
             }
             // Where rows have not been met for some steps, looking far around at every one would find nothing new.
             let widens =
@@ -206,6 +201,7 @@ impl SafetyFilter {
             let problem = PeriodProblem {
                 slots: &self.slots,
                 requirements,
+                listed,
                 t: moment.begin,
                 bounds,
                 u_ref,

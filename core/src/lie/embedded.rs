@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use super::{
     Ahead, COURSE, Course, DerivativeSource, Derivatives, Direction, Directional, Predict, PredictDirectional,
 };
+use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length};
 
 /// Most states that a picked source may have.
@@ -80,6 +81,23 @@ impl Predict for Embedded {
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let Some(source) = self.source.predict() else { return };
         source.ahead(t, &self.picked(x)[..self.picks.len()], u, duration, out);
+    }
+
+    fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        let Some(source) = self.source.predict() else { return };
+        source.ahead_of_row(t, &self.picked(x)[..self.picks.len()], u, duration, out);
+    }
+
+    fn values_ahead(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        let Some(source) = self.source.predict() else { return };
+        source.values_ahead(t, &self.picked(x)[..self.picks.len()], u, duration, out);
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {

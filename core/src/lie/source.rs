@@ -1,6 +1,7 @@
 //! The derivatives of a barrier as the filter asks for them, whoever gives them.
 
 use super::{Ahead, Derivatives};
+use crate::MAX_RELATIVE_DEGREE;
 
 /// A supplier of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
 /// [`external`](super::external()) takes the derivatives from whoever computes them, and a user's own code can be another.
@@ -14,7 +15,7 @@ use super::{Ahead, Derivatives};
 /// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and errors of the measurement |
 /// | [`highest`](Self::highest) | deadlines that are lost ([`reach`](crate::reach)) |
 pub trait DerivativeSource: Send {
-    /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`](crate::MAX_RELATIVE_DEGREE).
+    /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
 
     /// Number of states.
@@ -56,6 +57,26 @@ pub trait Predict {
     /// Writes the derivatives of h `duration` ≥ 0 seconds after `t` and `x` under the held input `u`; at time
     /// `t + duration`.
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead);
+
+    /// Writes what [`Self::ahead`] does for k < n, which is what a row over the period takes. The other numbers of `out`
+    /// mean nothing.
+    fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        self.ahead(t, x, u, duration, out);
+    }
+
+    /// Writes the values that [`Self::ahead`] does for k ≤ n, without gradients.
+    fn values_ahead(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        let mut ahead = Ahead::ZERO;
+        self.ahead(t, x, u, duration, &mut ahead);
+        *out = ahead.value;
+    }
 
     /// Writes ẋ at `x` under `u`.
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
