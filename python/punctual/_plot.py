@@ -77,7 +77,7 @@ def _plan(pyplot: Any, plan: Plan, barriers: tuple[str, ...]) -> Figure:
     kept, plane = list(plan.barriers), _plane(plan)
     count = len(barriers) + len(plan.inputs)
     columns = 1 if plane is None else 2
-    figure = pyplot.figure(figsize=(7.0 * columns, max(2.0 * count, 5.0 * (columns - 1))), layout="constrained")
+    figure: Figure = pyplot.figure(figsize=(7.0 * columns, max(2.0 * count, 5.0 * (columns - 1))), layout="constrained")
     grid = figure.add_gridspec(count, columns)
     panels: list[Any] = []
     for row in range(count):
