@@ -7,9 +7,10 @@ use std::path::Path;
 
 use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
-use serde::de::{Deserializer, MapAccess, Visitor};
+use serde::de::{Deserializer, Error as _, MapAccess, Visitor};
 
 use crate::error::Error;
+use crate::outlines::Outline;
 use crate::text;
 
 /// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
@@ -170,8 +171,7 @@ impl Default for Record {
 }
 
 /// A picture drawn from the recording after the run.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub enum Picture {
     /// Paths in a plane.
     Path(PathPicture),
@@ -189,9 +189,93 @@ impl Picture {
     }
 }
 
-/// Paths in a plane, with equal axes.
-#[derive(Clone, Debug, Deserialize)]
+/// The kinds of a [`Picture`].
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PictureKind {
+    Path,
+    Time,
+}
+
+/// The keys of both kinds. A tagged enum would lose the key of a value that is refused.
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+struct RawPicture {
+    kind: PictureKind,
+    name: Option<String>,
+    title: Option<String>,
+    x: Option<String>,
+    y: Option<String>,
+    label: Option<String>,
+    arrival: Option<String>,
+    more: Option<Vec<PathEntry>>,
+    discs: Option<Vec<DiscEntry>>,
+    signals: Option<Vec<String>>,
+    dashed: Option<Vec<String>>,
+    ylabel: Option<String>,
+    deadline: Option<f64>,
+    bounds: Option<Vec<f64>>,
+    scale: Option<Variant>,
+}
+
+impl<'de> Deserialize<'de> for Picture {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        /// The keys of each kind.
+        const OF_PATH: &[&str] = &["kind", "name", "title", "x", "y", "label", "arrival", "more", "discs"];
+        const OF_TIME: &[&str] =
+            &["kind", "name", "title", "signals", "dashed", "ylabel", "deadline", "bounds", "scale"];
+        let raw = RawPicture::deserialize(deserializer)?;
+        let of_path = [
+            ("x", raw.x.is_some()),
+            ("y", raw.y.is_some()),
+            ("label", raw.label.is_some()),
+            ("arrival", raw.arrival.is_some()),
+            ("more", raw.more.is_some()),
+            ("discs", raw.discs.is_some()),
+        ];
+        let of_time = [
+            ("signals", raw.signals.is_some()),
+            ("dashed", raw.dashed.is_some()),
+            ("ylabel", raw.ylabel.is_some()),
+            ("deadline", raw.deadline.is_some()),
+            ("bounds", raw.bounds.is_some()),
+            ("scale", raw.scale.is_some()),
+        ];
+        let (others, own) = match raw.kind {
+            PictureKind::Path => (of_time, OF_PATH),
+            PictureKind::Time => (of_path, OF_TIME),
+        };
+        if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
+            return Err(D::Error::unknown_field(key, own));
+        }
+        Ok(match raw.kind {
+            PictureKind::Path => Self::Path(PathPicture {
+                name: raw.name,
+                title: raw.title,
+                x: raw.x.ok_or_else(|| D::Error::missing_field("x"))?,
+                y: raw.y.ok_or_else(|| D::Error::missing_field("y"))?,
+                label: raw.label,
+                arrival: raw.arrival,
+                more: raw.more.unwrap_or_default(),
+                discs: raw.discs.unwrap_or_default(),
+                outlines: Vec::new(),
+            }),
+            PictureKind::Time => Self::Time(TimePicture {
+                name: raw.name,
+                title: raw.title,
+                signals: raw.signals.ok_or_else(|| D::Error::missing_field("signals"))?,
+                dashed: raw.dashed.unwrap_or_default(),
+                ylabel: raw.ylabel,
+                deadline: raw.deadline,
+                bounds: raw.bounds.unwrap_or_default(),
+                scale: raw.scale.unwrap_or_default(),
+            }),
+        })
+    }
+}
+
+/// Paths in a plane, with equal axes.
+#[derive(Clone, Debug)]
 pub struct PathPicture {
     /// Its file is `<system>-<name>.svg`; default the number of the picture.
     pub name: Option<String>,
@@ -206,11 +290,11 @@ pub struct PathPicture {
     /// A signal; the path is marked where it is first true (not 0).
     pub arrival: Option<String>,
     /// Further paths.
-    #[serde(default)]
     pub more: Vec<PathEntry>,
     /// Discs drawn beneath.
-    #[serde(default)]
     pub discs: Vec<DiscEntry>,
+    /// Other sets drawn beneath, which no file can give.
+    pub outlines: Vec<Outline>,
 }
 
 /// A further path of a [`PathPicture`].
@@ -243,8 +327,7 @@ pub struct DiscEntry {
 }
 
 /// Signals over time.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub struct TimePicture {
     /// Its file is `<system>-<name>.svg`; default the number of the picture.
     pub name: Option<String>,
@@ -253,17 +336,14 @@ pub struct TimePicture {
     /// The signals drawn as lines, as `component.variable`.
     pub signals: Vec<String>,
     /// Signals drawn as dashed lines.
-    #[serde(default)]
     pub dashed: Vec<String>,
     /// The label of the y axis; default the unit, where all signals share one.
     pub ylabel: Option<String>,
     /// A vertical line at this time in seconds, finite.
     pub deadline: Option<f64>,
     /// Horizontal lines at these values, finite.
-    #[serde(default)]
     pub bounds: Vec<f64>,
     /// Whether the y axis is linear, cut to the bulk of the values, or logarithmic; default linear.
-    #[serde(default)]
     pub scale: Variant,
 }
 
