@@ -115,7 +115,7 @@ impl Outline {
         Ok((!rings.is_empty() && !is_everywhere).then_some(Self { label, rings, obstacle, endless }))
     }
 
-    /// The least and the greatest of x and of y, unless it is endless.
+    /// Its corners, unless it is endless.
     pub fn points(&self) -> impl Iterator<Item = &[f64; 2]> {
         self.rings.iter().filter(|_| !self.endless).flatten()
     }

@@ -26,13 +26,16 @@ const fn slot(n: VOffsetT) -> VOffsetT {
     4 + 2 * n
 }
 
-/// The schema of `columns`, as the metadata have it.
-pub(super) fn schema(columns: &[Column]) -> String {
+/// The schema of `columns`, as the metadata have it. Readers that find one take the other `texts` of the file from it too.
+pub(super) fn schema(columns: &[Column], texts: &[(String, String)]) -> String {
     let mut to = FlatBufferBuilder::new();
+    let texts: Vec<_> = texts.iter().map(|(key, text)| pair(&mut to, key, text)).collect();
+    let texts = to.create_vector(&texts);
     let fields: Vec<_> = columns.iter().map(|column| field(&mut to, column)).collect();
     let fields = to.create_vector(&fields);
     let table = to.start_table();
     to.push_slot_always(slot(1), fields);
+    to.push_slot_always(slot(2), texts);
     let schema = to.end_table(table);
     let table = to.start_table();
     // From the largest to the smallest, so that each lies where its size wants it.
@@ -49,18 +52,21 @@ pub(super) fn schema(columns: &[Column]) -> String {
     STANDARD.encode([&CONTINUATION, &length.to_le_bytes()[..], &message].concat())
 }
 
+/// A text with its name.
+fn pair(to: &mut FlatBufferBuilder<'_>, key: &str, text: &str) -> WIPOffset<TableFinishedWIPOffset> {
+    let (key, text) = (to.create_string(key), to.create_string(text));
+    let table = to.start_table();
+    to.push_slot_always(slot(0), key);
+    to.push_slot_always(slot(1), text);
+    to.end_table(table)
+}
+
 fn field(to: &mut FlatBufferBuilder<'_>, column: &Column) -> WIPOffset<TableFinishedWIPOffset> {
     let texts = [("unit", &column.unit), ("description", &column.description)];
     let texts: Vec<_> = texts
         .into_iter()
         .filter(|(_, text)| !text.is_empty())
-        .map(|(key, text)| {
-            let (key, text) = (to.create_string(key), to.create_string(text));
-            let table = to.start_table();
-            to.push_slot_always(slot(0), key);
-            to.push_slot_always(slot(1), text);
-            to.end_table(table)
-        })
+        .map(|(key, text)| pair(to, key, text))
         .collect();
     let texts = to.create_vector(&texts);
     let name = to.create_string(&column.name);

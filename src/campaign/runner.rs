@@ -72,12 +72,13 @@ fn metadata(source: &Source, measures: &Measures) -> Vec<(String, String)> {
         (key::FINGERPRINT.to_owned(), source.fingerprint()),
         (key::VERSION.to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         (key::COLUMNS.to_owned(), columns),
-        (arrow::KEY.to_owned(), arrow::schema(measures.columns())),
         (key::FILE.to_owned(), source.file.clone()),
     ];
     texts.extend(source.system.iter().map(|text| (key::SYSTEM.to_owned(), text.clone())));
     let configurations = source.configurations.iter().enumerate();
     texts.extend(configurations.map(|(i, text)| (format!("{}{i}", key::CONFIGURATION), text.clone())));
+    let schema = arrow::schema(measures.columns(), &texts);
+    texts.push((arrow::KEY.to_owned(), schema));
     texts
 }
 
