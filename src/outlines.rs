@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use punctual_core::filter::SafetyFilter;
 use punctual_fmu::configuration::{BarrierSection, FilterConfiguration, Shape, mentions};
 
 use crate::error::Error;
@@ -13,6 +14,8 @@ const CORNERS: usize = 96;
 const FAR: f64 = 1e3;
 /// Cells along each side of the square in which h = 0 is looked for.
 const CELLS: usize = 160;
+/// How far that square goes from the middle of the picture, in sizes of what else is in it.
+const REACHES: [f64; 3] = [1.0, 2.0, 4.0];
 
 /// The edge of a set.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,9 +73,9 @@ impl Outline {
         self
     }
 
-    /// The outline of barrier `index` of `filter`, an expression of the place alone, in the square around `ranges` and as far
-    /// again to each side. The place is the states `plane`; the others have the values of `x`, which do not matter. `None`
-    /// where h = 0 is nowhere there.
+    /// The outline of barrier `index` of `filter`, an expression of the place alone, in the square around `ranges` and beyond,
+    /// until all of it is seen, within [`REACHES`]. The place is the states `plane`; the others have the values of `x`, which
+    /// do not matter. `None` where h = 0 is nowhere there.
     ///
     /// # Errors
     ///
@@ -86,7 +89,25 @@ impl Outline {
         let mut alone = filter.clone();
         alone.barrier = vec![filter.barrier[index].clone()];
         let built = alone.build()?;
-        let reach = ranges.map(|(low, high)| high - low).into_iter().fold(0.0, f64::max);
+        let size = ranges.map(|(low, high)| high - low).into_iter().fold(0.0, f64::max);
+        let mut found = None;
+        for reach in REACHES {
+            found = Self::within(&built, (plane, x), filter.experiment.start_time, (ranges, reach * size))?
+                .or(found);
+            if found.as_ref().is_some_and(|outline| !outline.endless) {
+                break;
+            }
+        }
+        Ok(found.map(|outline| Self { label: filter.barrier[index].name.clone(), ..outline }))
+    }
+
+    /// The outline of the one barrier of `built` in the square that goes `reach` to each side from the middle of `ranges`.
+    fn within(
+        built: &SafetyFilter,
+        (plane, x): ([usize; 2], &[f64]),
+        t: f64,
+        (ranges, reach): ([(f64, f64); 2], f64),
+    ) -> Result<Option<Self>, Error> {
         let step = 2.0 * reach / CELLS as f64;
         let from = ranges.map(|(low, high)| low / 2.0 + high / 2.0 - reach);
         let (mut x, mut h) = (x.to_vec(), [0.0]);
@@ -95,9 +116,12 @@ impl Outline {
             for column in 0..=CELLS {
                 x[plane[0]] = from[0] + step * column as f64;
                 x[plane[1]] = from[1] + step * row as f64;
-                built.barrier_values(filter.experiment.start_time, &x, &mut h).map_err(Error::from)?;
+                built.barrier_values(t, &x, &mut h).map_err(Error::from)?;
                 values.push(h[0]);
             }
+        }
+        if !values.iter().any(|h| *h >= 0.0) || !values.iter().any(|h| *h < 0.0) {
+            return Ok(None);
         }
         let side = CELLS + 1;
         let is_edge = |k: usize| [0, CELLS].contains(&(k % side)) || [0, CELLS].contains(&(k / side));
@@ -110,9 +134,7 @@ impl Outline {
         let place = |[x, y]: [f64; 2]| [from[0] + step * x, from[1] + step * y];
         let rings: Vec<Vec<_>> =
             rings(&values, side).into_iter().map(|ring| ring.into_iter().map(place).collect()).collect();
-        let label = filter.barrier[index].name.clone();
-        let is_everywhere = values.iter().all(|h| *h >= 0.0);
-        Ok((!rings.is_empty() && !is_everywhere).then_some(Self { label, rings, obstacle, endless }))
+        Ok(Some(Self { label: String::new(), rings, obstacle, endless }))
     }
 
     /// Its corners, unless it is endless.

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
-use serde::de::{Deserializer, Error as _, MapAccess, Visitor};
+use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
 
 use crate::error::Error;
 use crate::outlines::Outline;
@@ -197,80 +197,101 @@ enum PictureKind {
     Time,
 }
 
-/// The keys of both kinds. A tagged enum would lose the key of a value that is refused.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// The keys of both kinds, as far as they are given.
+#[derive(Default)]
 struct RawPicture {
-    kind: PictureKind,
+    kind: Option<PictureKind>,
     name: Option<String>,
     title: Option<String>,
     x: Option<String>,
     y: Option<String>,
     label: Option<String>,
     arrival: Option<String>,
-    more: Option<Vec<PathEntry>>,
-    discs: Option<Vec<DiscEntry>>,
+    more: Vec<PathEntry>,
+    discs: Vec<DiscEntry>,
     signals: Option<Vec<String>>,
-    dashed: Option<Vec<String>>,
+    dashed: Vec<String>,
     ylabel: Option<String>,
     deadline: Option<f64>,
-    bounds: Option<Vec<f64>>,
-    scale: Option<Variant>,
+    bounds: Vec<f64>,
+    scale: Variant,
+}
+
+/// Reads a [`Picture`] key by key. A tagged enum would lose the key of a value that is refused.
+struct PictureVisitor;
+
+impl<'de> Visitor<'de> for PictureVisitor {
+    type Value = Picture;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a table")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Picture, A::Error> {
+        const PATH: &[&str] = &["name", "title", "x", "y", "label", "arrival", "more", "discs"];
+        const TIME: &[&str] =
+            &["name", "title", "signals", "dashed", "ylabel", "deadline", "bounds", "scale"];
+        let (mut raw, mut given) = (RawPicture::default(), Vec::new());
+        while let Some(key) = map.next_key::<String>()? {
+            match key.as_str() {
+                "kind" => raw.kind = Some(map.next_value()?),
+                "name" => raw.name = Some(map.next_value()?),
+                "title" => raw.title = Some(map.next_value()?),
+                "x" => raw.x = Some(map.next_value()?),
+                "y" => raw.y = Some(map.next_value()?),
+                "label" => raw.label = Some(map.next_value()?),
+                "arrival" => raw.arrival = Some(map.next_value()?),
+                "more" => raw.more = map.next_value()?,
+                "discs" => raw.discs = map.next_value()?,
+                "signals" => raw.signals = Some(map.next_value()?),
+                "dashed" => raw.dashed = map.next_value()?,
+                "ylabel" => raw.ylabel = Some(map.next_value()?),
+                "deadline" => raw.deadline = Some(map.next_value()?),
+                "bounds" => raw.bounds = map.next_value()?,
+                "scale" => raw.scale = map.next_value()?,
+                _ => {
+                    map.next_value::<IgnoredAny>()?;
+                }
+            }
+            given.push(key);
+        }
+        let kind = raw.kind.ok_or_else(|| A::Error::missing_field("kind"))?;
+        let own = match kind {
+            PictureKind::Path => PATH,
+            PictureKind::Time => TIME,
+        };
+        if let Some(key) = given.iter().find(|key| *key != "kind" && !own.contains(&key.as_str())) {
+            return Err(A::Error::unknown_field(key, own));
+        }
+        Ok(match kind {
+            PictureKind::Path => Picture::Path(PathPicture {
+                name: raw.name,
+                title: raw.title,
+                x: raw.x.ok_or_else(|| A::Error::missing_field("x"))?,
+                y: raw.y.ok_or_else(|| A::Error::missing_field("y"))?,
+                label: raw.label,
+                arrival: raw.arrival,
+                more: raw.more,
+                discs: raw.discs,
+                outlines: Vec::new(),
+            }),
+            PictureKind::Time => Picture::Time(TimePicture {
+                name: raw.name,
+                title: raw.title,
+                signals: raw.signals.ok_or_else(|| A::Error::missing_field("signals"))?,
+                dashed: raw.dashed,
+                ylabel: raw.ylabel,
+                deadline: raw.deadline,
+                bounds: raw.bounds,
+                scale: raw.scale,
+            }),
+        })
+    }
 }
 
 impl<'de> Deserialize<'de> for Picture {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        /// The keys of each kind.
-        const OF_PATH: &[&str] = &["kind", "name", "title", "x", "y", "label", "arrival", "more", "discs"];
-        const OF_TIME: &[&str] =
-            &["kind", "name", "title", "signals", "dashed", "ylabel", "deadline", "bounds", "scale"];
-        let raw = RawPicture::deserialize(deserializer)?;
-        let of_path = [
-            ("x", raw.x.is_some()),
-            ("y", raw.y.is_some()),
-            ("label", raw.label.is_some()),
-            ("arrival", raw.arrival.is_some()),
-            ("more", raw.more.is_some()),
-            ("discs", raw.discs.is_some()),
-        ];
-        let of_time = [
-            ("signals", raw.signals.is_some()),
-            ("dashed", raw.dashed.is_some()),
-            ("ylabel", raw.ylabel.is_some()),
-            ("deadline", raw.deadline.is_some()),
-            ("bounds", raw.bounds.is_some()),
-            ("scale", raw.scale.is_some()),
-        ];
-        let (others, own) = match raw.kind {
-            PictureKind::Path => (of_time, OF_PATH),
-            PictureKind::Time => (of_path, OF_TIME),
-        };
-        if let Some((key, _)) = others.iter().find(|(_, given)| *given) {
-            return Err(D::Error::unknown_field(key, own));
-        }
-        Ok(match raw.kind {
-            PictureKind::Path => Self::Path(PathPicture {
-                name: raw.name,
-                title: raw.title,
-                x: raw.x.ok_or_else(|| D::Error::missing_field("x"))?,
-                y: raw.y.ok_or_else(|| D::Error::missing_field("y"))?,
-                label: raw.label,
-                arrival: raw.arrival,
-                more: raw.more.unwrap_or_default(),
-                discs: raw.discs.unwrap_or_default(),
-                outlines: Vec::new(),
-            }),
-            PictureKind::Time => Self::Time(TimePicture {
-                name: raw.name,
-                title: raw.title,
-                signals: raw.signals.ok_or_else(|| D::Error::missing_field("signals"))?,
-                dashed: raw.dashed.unwrap_or_default(),
-                ylabel: raw.ylabel,
-                deadline: raw.deadline,
-                bounds: raw.bounds.unwrap_or_default(),
-                scale: raw.scale.unwrap_or_default(),
-            }),
-        })
+        deserializer.deserialize_map(PictureVisitor)
     }
 }
 

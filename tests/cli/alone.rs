@@ -227,7 +227,8 @@ fn an_expression_of_the_place_has_an_outline() {
         let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
         rings[0].as_array().expect("corners").iter().map(corner).collect()
     };
-    // On a straight line between two points h bends by the square of a cell, which is less than 0.1 m.
+    // On a straight line between two points h bends by the square of a cell, which is less than 0.1 m. What lies beside the path
+    // is seen as a whole.
     for [x, y] in corners(1) {
         assert!((1.5_f64.powi(2) - (x - 3.0).powi(2) - y.powi(2)).abs() < 0.1_f64.powi(2), "{x}, {y}");
     }

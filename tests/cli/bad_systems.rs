@@ -34,7 +34,7 @@ fn a_picture_with_a_wrong_value() {
         ),
         (
             "kind = \"time\"\nsignals = []\nx = \"a.b\"",
-            "x: is no key here; the keys are kind, name, title, signals, ",
+            "x: is no key here; the keys are name, title, signals, ",
         ),
         ("kind = \"path\"\nx = \"a.b\"", "y: missing, it must be given"),
         ("kind = \"path\"\nx = \"a.b\"\ny = 1.5", "y: is 1.5, must be a text in quotes"),
