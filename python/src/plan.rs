@@ -1,6 +1,6 @@
 //! `Plan`: what keeps the promise of a filter that follows plans.
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use punctual_core::plan::Witness;
 use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::FilterConfiguration;
@@ -143,7 +143,7 @@ impl Plan {
         &self,
         py: Python<'py>,
         t: f64,
-        x: PyReadonlyArray2<'py, f64>,
+        x: &Bound<'py, PyArray2<f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let [count, states] = [x.shape()[0], self.states.len()];
         if x.shape()[1] != states {
@@ -156,7 +156,7 @@ impl Plan {
         }
         let filter = self.configuration.build().map_err(|e| refused(&e))?;
         let (mut h, mut values) = (Vec::new(), vec![0.0; self.configuration.barrier.len()]);
-        for row in x.as_array().rows() {
+        for row in x.readonly().as_array().rows() {
             filter.barrier_values(t, &row.to_vec(), &mut values).map_err(|e| refused(&e))?;
             h.extend(self.kept.iter().map(|(i, _)| values[*i]));
         }
