@@ -11,6 +11,7 @@
 //! isolation            FMUs in a child process, which may crash
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! recording            the rows of a run; CSV
+//! outlines             the edges of safe sets in a plane
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
 //! page                 a page of HTML with charts
@@ -31,6 +32,7 @@ pub mod error;
 #[expect(unsafe_code, reason = "FMUs are shared libraries called through C")]
 pub mod host;
 pub mod isolation;
+pub mod outlines;
 pub mod output;
 pub mod package;
 pub mod page;

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use punctual_fmu::configuration::{BarrierSection, Configuration, FilterConfiguration, RESOURCE, UNBOUNDED};
+use punctual_fmu::configuration::{
+    BarrierSection, Configuration, FilterConfiguration, RESOURCE, Shape, UNBOUNDED,
+};
 
 use crate::coupling::{
     Component, DiscEntry, Model, Outcome, PathEntry, PathPicture, Picture, StartValue, System, TimePicture,
@@ -10,6 +12,7 @@ use crate::coupling::{
 };
 use crate::error::Error;
 use crate::host::Causality;
+use crate::outlines::{self, Outline, Reads};
 use crate::plot::{self, Disc, Mark, PathPlot, Scale, Series, Style, TimePlot};
 use crate::recording::Recording;
 
@@ -26,7 +29,7 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Pictur
     let components = parts(system, models);
     let is_recorded = |signal: &String| recorded.iter().any(|column| column.name == *signal);
     let mut pictures: Vec<Picture> =
-        plane(&components, &is_recorded).into_iter().map(Picture::Path).collect();
+        plane(&components, &outcome.recording).into_iter().map(Picture::Path).collect();
     for part in &components {
         let all = |names: Vec<String>| Some(names).filter(|names| names.iter().all(is_recorded));
         for Group { name, unit, barriers } in part.barriers() {
@@ -110,16 +113,22 @@ impl Part<'_> {
         self.component.start.get(variable).map_or(start, StartValue::number)
     }
 
-    /// The filter, where it is one of this program.
+    /// The filter, where it is one of this program, with the start values of its entry.
     pub fn filter(&self) -> Option<FilterConfiguration> {
-        match self.model {
+        let mut filter = match self.model {
             Model::Own(own, _) => Some(own.configuration.clone()),
             Model::Fmu(fmu) => fmu.resource(RESOURCE).and_then(|text| Configuration::parse(&text).ok()),
         }
         .and_then(|configuration| match configuration {
             Configuration::Filter(filter) => Some(filter),
             _ => None,
-        })
+        })?;
+        for row in filter.parameters() {
+            if let Some(value) = self.component.start.get(&row.name).and_then(StartValue::number) {
+                row.set(&mut filter, value);
+            }
+        }
+        Some(filter)
     }
 
     /// Its barriers, by the unit of h.
@@ -162,18 +171,53 @@ impl Part<'_> {
         let outputs = variables.iter().filter(|v| v.causality == Causality::Output);
         let states: Vec<_> =
             outputs.filter_map(|v| Some((v.name.strip_prefix("x.")?, v.kind.unit()))).collect();
-        let beside = |&(x, unit): &(&str, Option<&str>)| {
-            let named = PLANES.iter().find(|axes| axes[0] == x).map(|axes| axes[1].to_owned());
-            // Such as xa and ya, or x and z: lengths whose names differ in that letter.
-            let letters = ["y", "z"].map(|letter| x.replacen('x', letter, 1));
-            let lengths = letters.into_iter().filter(|_| x.contains('x') && unit == Some("m"));
-            named.into_iter().chain(lengths).find(|y| states.contains(&(y.as_str(), unit)))
-        };
-        let planes: Vec<_> = states.iter().filter_map(|x| Some((x.0, beside(x)?))).collect();
+        let planes = planes(&states);
         let component = &self.component.name;
         let label = |x: &str| if planes.len() == 1 { component.clone() } else { format!("{component} {x}") };
         let signal = |axis: &str| self.signal(&format!("x.{axis}"));
-        planes.iter().map(|(x, y)| (label(x), [signal(x), signal(y)])).collect()
+        planes
+            .iter()
+            .map(|&[x, y]| (label(states[x].0), [signal(states[x].0), signal(states[y].0)]))
+            .collect()
+    }
+
+    /// The outlines of its barriers that are expressions of the place alone, as far as they come near `ranges` of the plane; and
+    /// the names of those that read more than the place, and so have none.
+    pub fn expressions(&self, ranges: [(f64, f64); 2]) -> (Vec<Outline>, Vec<String>) {
+        let (mut outlines, mut left_out) = (Vec::new(), Vec::new());
+        let Some(filter) = self.filter() else { return (outlines, left_out) };
+        let states = filter.plant.states();
+        let named: Vec<_> =
+            states.iter().map(|state| (state.name.as_str(), Some(state.unit.as_str()))).collect();
+        let (planes, rest) = (planes(&named), vec![0.0; states.len()]);
+        for (index, section) in filter.barrier.iter().enumerate() {
+            let all: Vec<_> = planes.iter().map(|plane| outlines::reads(&filter, section, *plane)).collect();
+            let found =
+                planes.iter().zip(&all).find(|(_, reads)| **reads == Reads::Place).map(|(plane, _)| plane);
+            if let Some(plane) = found {
+                // A filter that runs can be built.
+                let outline = Outline::of_expression(&filter, index, (*plane, &rest), ranges);
+                outlines.extend(outline.ok().flatten());
+            } else if all.contains(&Reads::More) {
+                left_out.push(section.name.clone());
+            }
+        }
+        (outlines, left_out)
+    }
+
+    /// The outlines of its barriers that stay where they are and are no discs. `size` is that of what else is in the plane.
+    fn shapes(&self, size: f64) -> Vec<Outline> {
+        let filter = self.filter();
+        let shape = |section: &BarrierSection| {
+            let number = |field: &str| self.number(&format!("{}.{field}", section.name));
+            let centre = [number("centre[1]")?, number("centre[2]")?];
+            let is_disc = matches!(
+                section.shape,
+                Shape::Disc { .. } | Shape::QuadraticDisc { .. } | Shape::Obstacle { .. }
+            );
+            Some(Outline::of_shape(section, number, size).filter(|_| !is_disc)?.moved(centre))
+        };
+        filter.iter().flat_map(|filter| &filter.barrier).filter_map(shape).collect()
     }
 
     /// The discs of its barriers that stay where they are.
@@ -183,9 +227,9 @@ impl Part<'_> {
         let disc = |section: &BarrierSection| {
             let number = |field: &str| self.number(&format!("{}.{field}", section.name));
             let still = ["velocity[1]", "velocity[2]"].iter().all(|v| number(v).unwrap_or(0.0) == 0.0);
-            let obstacle = match section.shape.name() {
-                "disc" | "quadratic_disc" => false,
-                "obstacle" => true,
+            let obstacle = match section.shape {
+                Shape::Disc { at, .. } | Shape::QuadraticDisc { at, .. } if !at.centre_input => false,
+                Shape::Obstacle { at, .. } if !at.centre_input => true,
                 _ => return None,
             };
             let label = Some(section.name.clone()).filter(|_| !obstacle);
@@ -202,18 +246,57 @@ impl Part<'_> {
     }
 }
 
-/// The paths of all components that move in a plane, with the discs of all filters.
-fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<PathPicture> {
+/// The positions of two signals, given by name and unit, that are the axes of a plane; of all such pairs.
+fn planes(signals: &[(&str, Option<&str>)]) -> Vec<[usize; 2]> {
+    let beside = |(x, unit): (&str, Option<&str>)| {
+        let named = PLANES.iter().find(|axes| axes[0] == x).map(|axes| axes[1].to_owned());
+        // Such as xa and ya, or x and z: lengths whose names differ in that letter.
+        let letters = ["y", "z"].map(|letter| x.replacen('x', letter, 1));
+        let lengths = letters.into_iter().filter(|_| x.contains('x') && unit == Some("m"));
+        named.into_iter().chain(lengths).find_map(|y| signals.iter().position(|other| *other == (&*y, unit)))
+    };
+    signals.iter().enumerate().filter_map(|(i, x)| Some([i, beside(*x)?])).collect()
+}
+
+/// The paths of all components that move in a plane, with the sets of all filters.
+fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<PathPicture> {
+    let is_recorded = |signal: &String| recording.index_of(signal).is_some();
     let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
     let arrival = arrival.filter(is_recorded);
-    let mut paths = parts.iter().flat_map(Part::places).filter(|(_, place)| place.iter().all(is_recorded));
+    let paths = parts.iter().flat_map(Part::places).filter(|(_, place)| place.iter().all(is_recorded));
+    let paths: Vec<_> = paths.collect();
+    let seen =
+        |axis: usize| paths.iter().filter_map(move |(_, place)| recording.series(&place[axis])).flatten();
+    let ranges = [plot::extent(seen(0)), plot::extent(seen(1))];
+    let mut paths = paths.iter().cloned();
     let (label, [x, y]) = paths.next()?;
     let entry =
         |(label, [x, y]): (String, [String; 2])| PathEntry { x, y, label: Some(label), arrival: None };
     let more: Vec<_> = paths.map(entry).collect();
     let mut discs: Vec<_> = parts.iter().flat_map(Part::discs).collect();
+    let mut outlines = Vec::new();
+    if let [Some(x), Some(y)] = ranges {
+        let size = (x.1 - x.0).max(y.1 - y.0).max(1.0);
+        outlines.extend(parts.iter().flat_map(|part| part.shapes(size)));
+        let discs = discs.iter().map(|disc| (disc.centre, disc.radius));
+        let reach = |axis: usize, (low, high): (f64, f64)| {
+            let discs =
+                discs.clone().flat_map(|(centre, radius)| [centre[axis] - radius, centre[axis] + radius]);
+            let shapes = outlines.iter().flat_map(Outline::points).map(|point| point[axis]);
+            plot::extent(discs.chain(shapes).chain([low, high])).unwrap_or((low, high))
+        };
+        let ranges = [reach(0, x), reach(1, y)];
+        outlines.extend(parts.iter().flat_map(|part| part.expressions(ranges).0));
+        // What covers all else lies beneath.
+        outlines.sort_by_key(|outline| !outline.endless);
+    }
+    // One word for all that is to be kept out of.
+    let obstacles = outlines.iter_mut().filter(|outline| outline.obstacle).map(|outline| &mut outline.label);
+    obstacles.for_each(String::clear);
     if let Some(first) = discs.iter_mut().find(|disc| disc.obstacle) {
         first.label = Some("obstacle".to_owned());
+    } else if let Some(first) = outlines.iter_mut().find(|outline| outline.obstacle) {
+        first.label = "obstacle".to_owned();
     }
     Some(PathPicture {
         name: Some("path".to_owned()),
@@ -225,6 +308,7 @@ fn plane(parts: &[Part<'_>], is_recorded: &dyn Fn(&String) -> bool) -> Option<Pa
         label: Some(label),
         more,
         discs,
+        outlines,
     })
 }
 
@@ -274,6 +358,7 @@ fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error>
                 obstacle: disc.obstacle,
             })
             .collect(),
+        outlines: picture.outlines.clone(),
     })
 }
 

@@ -15,6 +15,11 @@ const OTHERS: [(&[u8], &str); 3] = [
     (b"\xfe\xff", "it is in UTF-16, must be in UTF-8; editors save it so"),
 ];
 
+/// Whether the name of the file ends in `.toml`.
+pub fn is_toml(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
 /// The text of the file at `path`.
 ///
 /// # Errors

@@ -88,6 +88,13 @@ impl Judgement {
         limit.is_some_and(by)
     }
 
+    /// By how many seconds it arrived later than its deadline; infinite where it was late and has not arrived. `None` where it
+    /// was not late.
+    pub fn late_by(&self) -> Option<f64> {
+        let (_, deadline) = (self.late?, self.deadline?);
+        Some(self.arrival.map_or(f64::INFINITY, |arrival| arrival - deadline))
+    }
+
     /// Whether h ≥ 0 held at all instants at which it was to be inside, and there was one.
     pub fn inside(&self) -> bool {
         self.reached && !self.outside
@@ -121,6 +128,7 @@ impl Judgement {
 /// }
 /// let seen = judge.judgement();
 /// assert_eq!((seen.verdict(), seen.late), (Verdict::Broken, Some(10.0)));
+/// assert!(seen.late_by().is_some_and(|late| (late - 0.2).abs() < 1e-9));
 /// assert!(seen.least.is_some_and(|h| (h + 0.38).abs() < 1e-12));
 /// ```
 #[derive(Clone, Debug)]

@@ -68,7 +68,7 @@ pub use error::Error;
 pub use functions::Functions;
 pub use model::{Barrier, Model};
 pub use names::nearest;
-pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved};
+pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved, mentions};
 pub use units::{Unit, unit_of};
 
 /// Most states of a model.

@@ -81,6 +81,11 @@ pub fn is_in_name(character: char) -> bool {
     character.is_ascii_alphanumeric() || character == '_'
 }
 
+/// Whether `name` stands in the text of an expression.
+pub fn mentions(expression: &str, name: &str) -> bool {
+    expression.split(|c| !is_in_name(c)).any(|word| word == name)
+}
+
 /// Whether `name` is a C identifier: ASCII letters, digits and underscores, not starting with a digit.
 pub(crate) fn is_identifier(name: &str) -> bool {
     name.starts_with(is_first_in_name) && name.chars().all(is_in_name)

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 def to_pandas(result: NDArray[np.void] | Plan) -> _DataFrame:
     """A result of `simulate`, or a `Plan`, as a frame of pandas: the time in s is its index, called `time`.
 
-    A result has a column for each of its fields, in its type; a plan has `x.<state>` and `u.<input>`, as results have.
+    A result has a column for each of its fields, in its type; a plan has `x.<state>`, `u.<input>` and
+    `<barrier>.h`, as results have.
 
     Raises `ImportError` without pandas (`pip install pandas`); `TypeError` for anything else.
     """
@@ -26,6 +27,7 @@ def to_pandas(result: NDArray[np.void] | Plan) -> _DataFrame:
     if isinstance(result, Plan):
         columns = {f"x.{name}": result.x[:, i] for i, name in enumerate(result.states)}
         columns |= {f"u.{name}": result.u[:, i] for i, name in enumerate(result.inputs)}
+        columns |= {f"{name}.h": result.h[:, i] for i, name in enumerate(result.barriers)}
         return pandas.DataFrame(columns, index=pandas.Index(result.times, name="time"))
     names = getattr(getattr(result, "dtype", None), "names", None) or ()
     if "time" not in names:

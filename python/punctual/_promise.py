@@ -31,6 +31,8 @@ class Promise:
     """First time in s with h >= 0."""
     late: float | None
     """Time in s at which it became certain that the deadline is missed."""
+    late_by: float | None
+    """By how many seconds it arrived later than its deadline: `inf` where it was late and never arrived, `None` if on time."""
     left: float | None
     """Time in s at which it was left, after it had been inside and was to stay so."""
     least_h: float | None

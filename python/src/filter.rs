@@ -116,7 +116,7 @@ impl Filter {
     #[getter]
     fn plan(&mut self, py: Python<'_>) -> PyResult<Option<Plan>> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), &self.interface)
+        Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), &self.configuration)
     }
 
     /// Why there is no plan, where the promise was refused or withdrawn, or has come to its end.

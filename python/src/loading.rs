@@ -68,9 +68,14 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    fn new(signals: impl Iterator<Item = (String, String)>) -> Self {
+    pub(crate) fn new(signals: impl Iterator<Item = (String, String)>) -> Self {
         let (names, units) = signals.unzip();
         Self { names, units }
+    }
+
+    /// Those of a configuration.
+    pub(crate) fn of(variables: Vec<VariableSection>) -> Self {
+        Self::new(variables.into_iter().map(|variable| (variable.name, variable.unit)))
     }
 
     /// Number of signals.
@@ -103,11 +108,10 @@ impl Interface {
     pub(crate) fn of(configuration: &FilterConfiguration) -> Self {
         let measured = configuration.measured_states().into_iter().map(|s| (s.name, s.unit));
         let handed = configuration.barrier_inputs().into_iter().map(|s| (s.name, s.unit));
-        let commanded = configuration.commanded().into_iter().map(|s| (s.name, s.unit));
         let barriers = configuration.barrier.iter().map(|b| (b.name.clone(), b.unit(&configuration.plant)));
         Self {
             states: Signals::new(measured.chain(handed)),
-            inputs: Signals::new(commanded),
+            inputs: Signals::of(configuration.commanded()),
             barriers: Signals::new(barriers),
         }
     }

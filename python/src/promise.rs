@@ -50,6 +50,7 @@ pub(crate) fn judge<'py>(
     said.set_item("inside", seen.inside())?;
     said.set_item("arrival", seen.arrival)?;
     said.set_item("late", seen.late)?;
+    said.set_item("late_by", seen.late_by())?;
     said.set_item("left", seen.left)?;
     said.set_item("least_h", seen.least)?;
     Ok(said)

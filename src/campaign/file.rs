@@ -342,7 +342,7 @@ impl Campaign {
 
 /// Reads the configuration of the component at `path`; an FMU carries its own.
 fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
-    if path.extension().is_some_and(|ending| ending == "toml") {
+    if text::is_toml(path) {
         return package::read_configuration(path);
     }
     if !path.exists() {

@@ -4,6 +4,7 @@
 //! which thread, or where a campaign was interrupted. The blocks are those of the FMUs, coupled by the same
 //! master. So a row is what `punctual run` would find, bit for bit.
 
+mod arrow;
 mod distribution;
 mod file;
 mod measures;
@@ -16,7 +17,7 @@ mod table;
 pub use distribution::{Distribution, VarySection};
 pub use file::{Campaign, Choice, Source, Success, Varied};
 pub use measures::Measures;
-pub use runner::{Options, Progress, recorded, run, version};
+pub use runner::{Options, Progress, kept, recorded, run, version};
 pub use sampling::{Sampler, Sampling};
 pub use summary::{Case, Lack, Rate, Spread, Summary, summary};
 pub use table::{Cell, Column, GROUP, Kind, Reader, Row};

@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::arrow;
 use super::file::{Campaign, Source};
 use super::measures::Measures;
 use super::table::{GROUP, Reader, Row, Writer};
@@ -76,6 +77,8 @@ fn metadata(source: &Source, measures: &Measures) -> Vec<(String, String)> {
     texts.extend(source.system.iter().map(|text| (key::SYSTEM.to_owned(), text.clone())));
     let configurations = source.configurations.iter().enumerate();
     texts.extend(configurations.map(|(i, text)| (format!("{}{i}", key::CONFIGURATION), text.clone())));
+    let schema = arrow::schema(measures.columns(), &texts);
+    texts.push((arrow::KEY.to_owned(), schema));
     texts
 }
 
@@ -282,6 +285,21 @@ pub fn run(
         parts.remove()?;
     }
     Ok(Progress { done, before, wall_time })
+}
+
+/// The rows of an interrupted campaign that are kept beside `output`; `None` where there are none.
+///
+/// # Errors
+///
+/// Another process has gone on with it; a file that cannot be read or written.
+pub fn kept(campaign: &Campaign, output: &Path) -> Result<Option<Reader>, Error> {
+    let parts = Parts::open(output, campaign.source().fingerprint())?;
+    let segments = parts.segments()?;
+    if segments.is_empty() {
+        return Ok(None);
+    }
+    join(campaign, &Measures::new(campaign), &parts, &segments)?;
+    Reader::open(&parts.unfinished()).map(Some)
 }
 
 /// Writes all rows into one file, a group at a time.

@@ -121,14 +121,19 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     // Sum up.
     let complete = progress.done == campaign.runs();
     let (mut summary, mut pages) = (None, Vec::new());
-    if complete {
-        let (reader, _) = campaign::recorded(&output)?;
+    let reader = match complete {
+        true => Some(campaign::recorded(&output)?.0),
+        // The page of what there is.
+        false if arguments.report => campaign::kept(&campaign, &output)?,
+        false => None,
+    };
+    if let Some(reader) = reader {
         let measures = Measures::new(&campaign);
         let found = campaign::summary(&reader, &measures, arguments.worst)?;
         if arguments.report {
             pages = report_files(&arguments.campaign, &output, &campaign, &measures, &reader, &found)?;
         }
-        summary = Some(found);
+        summary = Some(found).filter(|_| complete);
     }
     let seconds = progress.wall_time.as_secs_f64();
     let report = Report {
@@ -152,8 +157,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         output::result(&text(&report, summary));
     }
     if !complete {
+        let page = match &report.report[..] {
+            [] => String::new(),
+            files => format!("; of these there is {}", files.join(", ")),
+        };
         output::note(&format!(
-            "interrupted with {} of {} runs kept; the same command goes on from there",
+            "interrupted with {} of {} runs kept; the same command goes on from there{page}",
             progress.done,
             campaign.runs()
         ));

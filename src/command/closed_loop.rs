@@ -157,6 +157,7 @@ pub(super) struct LoopBarrier {
     pub(super) promise: Kept,
     arrival: Option<f64>,
     late: Option<f64>,
+    late_by: Option<f64>,
     left: Option<f64>,
     least_h: Option<f64>,
     pub(super) unmet: usize,
@@ -221,13 +222,14 @@ impl LoopReport {
 
     pub(super) fn text(&self) -> String {
         let head =
-            ["barrier", "promise", "arrival s", "late s", "left s", "least h", "steps not met", "from s"];
+            ["barrier", "promise", "arrival s", "late by s", "left s", "least h", "steps not met", "from s"];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), number);
         rows.extend(self.barriers.iter().map(|b| {
             let promise = super::run::shown(b.promise);
-            let times = [b.arrival, b.late, b.left, b.least_h].map(shown);
-            let [arrival, late, left, least] = times;
+            let [arrival, left, least] = [b.arrival, b.left, b.least_h].map(shown);
+            // A promise that is lost is not followed until it is reached.
+            let late = super::run::lateness(b.late_by, "not seen");
             let unmet = b.unmet.to_string();
             vec![b.name.clone(), promise, arrival, late, left, least, unmet, shown(b.first_unmet)]
         }));
@@ -274,6 +276,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         promise: seen.judgement.verdict().into(),
         arrival: seen.judgement.arrival,
         late: seen.judgement.late,
+        late_by: seen.judgement.late_by(),
         left: seen.judgement.left,
         least_h: seen.judgement.least,
         unmet: seen.unmet,

@@ -224,6 +224,7 @@ pub(super) fn plan(
             y_label: label(1),
             paths: vec![path],
             discs: discs(c),
+            ..PathPlot::default()
         };
         plot::path(&picture, &files[1])?;
     }

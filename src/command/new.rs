@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use super::run::stem;
 use crate::error::Error;
 use crate::output;
+use crate::text;
 
 /// Arguments of `punctual new`.
 #[derive(Debug, clap::Args)]
@@ -37,7 +38,7 @@ enum Start {
 /// A name without the ending .toml, a file that is there already or cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.file;
-    if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+    if !text::is_toml(file) {
         let message = format!("is {:?}, must end in .toml", file.display().to_string());
         return Err(Error::configuration("FILE", message));
     }

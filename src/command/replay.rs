@@ -23,6 +23,9 @@ pub struct Arguments {
     /// Write the CSV file and the pictures into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write the unit of each column as the second line of the CSV file
+    #[arg(long, requires = "out")]
+    units: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -99,13 +102,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 Some(folder) => {
                     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
                     let pictures = pictures(campaign.system(), &measures, &outcome.recording);
-                    write_files(
-                        &pictures,
-                        &format!("{}-{run}", stem(path)),
-                        folder,
-                        &outcome.recording,
-                        false,
-                    )?
+                    let stem = format!("{}-{run}", stem(path));
+                    write_files(&pictures, &stem, folder, &outcome.recording, arguments.units)?
                 }
                 None => Vec::new(),
             };

@@ -384,6 +384,15 @@ pub(super) fn shown(promise: Kept) -> String {
     }
 }
 
+/// By how many seconds a deadline was missed; `never` where what it is for was not reached.
+pub(super) fn lateness(late_by: Option<f64>, never: &str) -> String {
+    match late_by {
+        Some(late) if late.is_finite() => output::number(late),
+        Some(_) => never.to_owned(),
+        None => "-".to_owned(),
+    }
+}
+
 /// A row for each promise and an empty line; nothing where there is no promise.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
@@ -393,7 +402,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
         "barrier",
         "promise",
         "arrival s",
-        "late s",
+        "late by s",
         "left s",
         "constraint",
         "samples not met",
@@ -407,7 +416,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
             p.barrier.clone(),
             shown(p.promise),
             time(p.arrival),
-            time(p.late),
+            lateness(p.late_by, "never"),
             time(p.left),
             if p.constraint_met { "met" } else { "not met" }.to_owned(),
             p.unmet.to_string(),

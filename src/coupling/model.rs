@@ -10,6 +10,7 @@ use punctual_fmu::product::Product;
 use super::{InProcess, Participant};
 use crate::error::Error;
 use crate::host::{Description, Fmu, Slave};
+use crate::text;
 
 /// A configuration with what an FMU of it would say.
 pub struct Own {
@@ -64,7 +65,7 @@ impl Model {
     ///
     /// A file that is not there or cannot be used.
     pub(super) fn open(path: &Path, shared: &[Self], read: Reader) -> Result<Self, Error> {
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        if text::is_toml(path) {
             let own = Own::new(read(path)?)?;
             return Ok(Self::Own(Box::new(own), path.to_owned()));
         }

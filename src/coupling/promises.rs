@@ -77,6 +77,8 @@ pub struct Promise {
     pub arrival: Option<f64>,
     /// Time in s at which it became certain that the deadline is missed.
     pub late: Option<f64>,
+    /// By how many seconds it arrived later than its deadline; infinite (`null` in JSON) where it was late and never arrived.
+    pub late_by: Option<f64>,
     /// Time in s at which it was left, after it had been inside and was to stay so.
     pub left: Option<f64>,
     /// Least h while it was to be inside.
@@ -101,6 +103,7 @@ impl Promise {
         (self.deadline, self.began_inside) = (seen.deadline, seen.began_inside);
         (self.on_time, self.inside) = (seen.on_time(), seen.inside());
         (self.arrival, self.late, self.left) = (seen.arrival, seen.late, seen.left);
+        self.late_by = seen.late_by();
         self.least_h = seen.least;
     }
 }
@@ -362,6 +365,7 @@ impl Watched {
             inside: false,
             arrival: None,
             late: None,
+            late_by: None,
             left: None,
             least_h: None,
             unmet: run.unmet,

@@ -7,9 +7,10 @@ use std::path::Path;
 
 use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
-use serde::de::{Deserializer, MapAccess, Visitor};
+use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
 
 use crate::error::Error;
+use crate::outlines::Outline;
 use crate::text;
 
 /// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
@@ -170,8 +171,7 @@ impl Default for Record {
 }
 
 /// A picture drawn from the recording after the run.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub enum Picture {
     /// Paths in a plane.
     Path(PathPicture),
@@ -189,9 +189,114 @@ impl Picture {
     }
 }
 
+/// The kinds of a [`Picture`].
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PictureKind {
+    Path,
+    Time,
+}
+
+/// The keys of both kinds, as far as they are given.
+#[derive(Default)]
+struct RawPicture {
+    kind: Option<PictureKind>,
+    name: Option<String>,
+    title: Option<String>,
+    x: Option<String>,
+    y: Option<String>,
+    label: Option<String>,
+    arrival: Option<String>,
+    more: Vec<PathEntry>,
+    discs: Vec<DiscEntry>,
+    signals: Option<Vec<String>>,
+    dashed: Vec<String>,
+    ylabel: Option<String>,
+    deadline: Option<f64>,
+    bounds: Vec<f64>,
+    scale: Variant,
+}
+
+/// Reads a [`Picture`] key by key. A tagged enum would lose the key of a value that is refused.
+struct PictureVisitor;
+
+impl<'de> Visitor<'de> for PictureVisitor {
+    type Value = Picture;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a table")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Picture, A::Error> {
+        const PATH: &[&str] = &["name", "title", "x", "y", "label", "arrival", "more", "discs"];
+        const TIME: &[&str] =
+            &["name", "title", "signals", "dashed", "ylabel", "deadline", "bounds", "scale"];
+        let (mut raw, mut given) = (RawPicture::default(), Vec::new());
+        while let Some(key) = map.next_key::<String>()? {
+            match key.as_str() {
+                "kind" => raw.kind = Some(map.next_value()?),
+                "name" => raw.name = Some(map.next_value()?),
+                "title" => raw.title = Some(map.next_value()?),
+                "x" => raw.x = Some(map.next_value()?),
+                "y" => raw.y = Some(map.next_value()?),
+                "label" => raw.label = Some(map.next_value()?),
+                "arrival" => raw.arrival = Some(map.next_value()?),
+                "more" => raw.more = map.next_value()?,
+                "discs" => raw.discs = map.next_value()?,
+                "signals" => raw.signals = Some(map.next_value()?),
+                "dashed" => raw.dashed = map.next_value()?,
+                "ylabel" => raw.ylabel = Some(map.next_value()?),
+                "deadline" => raw.deadline = Some(map.next_value()?),
+                "bounds" => raw.bounds = map.next_value()?,
+                "scale" => raw.scale = map.next_value()?,
+                _ => {
+                    map.next_value::<IgnoredAny>()?;
+                }
+            }
+            given.push(key);
+        }
+        let kind = raw.kind.ok_or_else(|| A::Error::missing_field("kind"))?;
+        let own = match kind {
+            PictureKind::Path => PATH,
+            PictureKind::Time => TIME,
+        };
+        if let Some(key) = given.iter().find(|key| *key != "kind" && !own.contains(&key.as_str())) {
+            return Err(A::Error::unknown_field(key, own));
+        }
+        Ok(match kind {
+            PictureKind::Path => Picture::Path(PathPicture {
+                name: raw.name,
+                title: raw.title,
+                x: raw.x.ok_or_else(|| A::Error::missing_field("x"))?,
+                y: raw.y.ok_or_else(|| A::Error::missing_field("y"))?,
+                label: raw.label,
+                arrival: raw.arrival,
+                more: raw.more,
+                discs: raw.discs,
+                outlines: Vec::new(),
+            }),
+            PictureKind::Time => Picture::Time(TimePicture {
+                name: raw.name,
+                title: raw.title,
+                signals: raw.signals.ok_or_else(|| A::Error::missing_field("signals"))?,
+                dashed: raw.dashed,
+                ylabel: raw.ylabel,
+                deadline: raw.deadline,
+                bounds: raw.bounds,
+                scale: raw.scale,
+            }),
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Picture {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(PictureVisitor)
+    }
+}
+
 /// Paths in a plane, with equal axes.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub struct PathPicture {
     /// Its file is `<system>-<name>.svg`; default the number of the picture.
     pub name: Option<String>,
@@ -206,11 +311,11 @@ pub struct PathPicture {
     /// A signal; the path is marked where it is first true (not 0).
     pub arrival: Option<String>,
     /// Further paths.
-    #[serde(default)]
     pub more: Vec<PathEntry>,
     /// Discs drawn beneath.
-    #[serde(default)]
     pub discs: Vec<DiscEntry>,
+    /// Other sets drawn beneath, which no file can give.
+    pub outlines: Vec<Outline>,
 }
 
 /// A further path of a [`PathPicture`].
@@ -243,8 +348,7 @@ pub struct DiscEntry {
 }
 
 /// Signals over time.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug)]
 pub struct TimePicture {
     /// Its file is `<system>-<name>.svg`; default the number of the picture.
     pub name: Option<String>,
@@ -253,17 +357,14 @@ pub struct TimePicture {
     /// The signals drawn as lines, as `component.variable`.
     pub signals: Vec<String>,
     /// Signals drawn as dashed lines.
-    #[serde(default)]
     pub dashed: Vec<String>,
     /// The label of the y axis; default the unit, where all signals share one.
     pub ylabel: Option<String>,
     /// A vertical line at this time in seconds, finite.
     pub deadline: Option<f64>,
     /// Horizontal lines at these values, finite.
-    #[serde(default)]
     pub bounds: Vec<f64>,
     /// Whether the y axis is linear, cut to the bulk of the values, or logarithmic; default linear.
-    #[serde(default)]
     pub scale: Variant,
 }
 

@@ -12,6 +12,7 @@ use tempfile::TempDir;
 use zip::ZipArchive;
 
 use crate::error::{Error, FmuProblem};
+use crate::text;
 
 /// The greatest size of an `.fmu` file, in bytes.
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
@@ -76,7 +77,7 @@ impl Archive {
         }
         let size = metadata.len();
         limit("the file has", size, "bytes", MAX_FILE_BYTES).map_err(problem)?;
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        if text::is_toml(path) {
             let message =
                 "a TOML file is none; `punctual build` makes an FMU from one, `punctual check` checks it";
             return Err(problem(FmuProblem::Archive(message.into())));

@@ -13,6 +13,7 @@ use punctual_modeldescription::{
 use crate::coupling::{self, Link, Port, StartValue, System};
 use crate::error::Error;
 use crate::host::{Description, Fmu, Variable, VariableKind};
+use crate::text;
 use crate::whole;
 
 /// The parameter set with the start values, in the archive.
@@ -50,7 +51,7 @@ pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
 /// The FMU at `path`, or the one that the configuration there becomes, and its bytes.
 fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>), Error> {
     let read = |file: &Path| std::fs::read(file).map_err(|e| Error::io("read", file, e));
-    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+    if !text::is_toml(path) {
         return Ok((Rc::new(Fmu::open(path)?), read(path)?));
     }
     let configuration = super::read_configuration(path)?;

@@ -1,8 +1,9 @@
 //! A rectangle with two axes: grid, frame, ticks, labels; and curves inside it.
 
-use super::Disc;
 use super::canvas::{Anchor, Canvas, FRAME, GRID, INK, Pen, Point, text_width};
 use super::scale::Axis;
+use super::{Disc, set_colour};
+use crate::outlines::Outline;
 
 /// Size of tick labels in pixels.
 const TICK_SIZE: f64 = 12.0;
@@ -62,16 +63,21 @@ impl Axes {
         self.y.ticks.iter().map(|(_, label)| text_width(label, TICK_SIZE)).fold(0.0, f64::max)
     }
 
-    /// Draws discs, cut to the rectangle. A pixel must mean the same on both axes.
-    pub(super) fn discs(&self, canvas: &mut Canvas, discs: &[Disc]) {
-        if discs.is_empty() {
+    /// Draws sets, cut to the rectangle. For discs a pixel must mean the same on both axes.
+    pub(super) fn sets(&self, canvas: &mut Canvas, discs: &[Disc], outlines: &[Outline]) {
+        if discs.is_empty() && outlines.is_empty() {
             return;
         }
         let pixels = (self.area[2] - self.area[0]) / (self.x.high - self.x.low);
         canvas.clipped(self.area, |canvas| {
+            for outline in outlines {
+                let rings = outline.rings.iter().map(|ring| ring.iter().map(|&[x, y]| self.place(x, y)));
+                let colour = set_colour(outline.obstacle);
+                canvas.area(rings, (colour, 0.18), Pen::solid(colour, 1.2));
+            }
             for disc in discs {
                 let centre = self.place(disc.centre[0], disc.centre[1]);
-                let colour = disc.colour();
+                let colour = set_colour(disc.obstacle);
                 canvas.circle(centre, disc.radius * pixels, (colour, 0.18), Pen::solid(colour, 1.2));
             }
         });

@@ -135,6 +135,25 @@ impl Canvas {
         self.add(filled(circle, fill.0, fill.1));
     }
 
+    /// The area within an odd number of closed lines: filled, then drawn around.
+    pub(super) fn area(
+        &mut self,
+        rings: impl Iterator<Item = impl Iterator<Item = Point>>,
+        fill: ([u8; 3], f64),
+        pen: Pen,
+    ) {
+        let ring = |points: &mut dyn Iterator<Item = Point>| {
+            let points: Vec<_> = points.map(|(x, y)| format!("{} {}", fine(x), fine(y))).collect();
+            format!("M{}Z", points.join("L"))
+        };
+        let strokes = Strokes::new()
+            .set("d", rings.map(|mut points| ring(&mut points)).collect::<String>())
+            .set("fill-rule", "evenodd")
+            .set("stroke", hex(pen.colour))
+            .set("stroke-width", pen.width);
+        self.add(filled(strokes, fill.0, fill.1));
+    }
+
     /// A text of this size in pixels.
     pub(super) fn text(&mut self, text: &str, at: Point, size: f64, anchor: Anchor, colour: [u8; 3]) {
         self.add(written(text, at, size, anchor, colour));

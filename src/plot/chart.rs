@@ -171,7 +171,7 @@ pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
     if !chart.title.is_empty() {
         canvas.text(&chart.title, ((area[0] + area[2]) / 2.0, 20.0), 16.0, Anchor::Middle, INK);
     }
-    axes.discs(canvas, &chart.discs);
+    axes.sets(canvas, &chart.discs, &[]);
     marks(chart, &axes, canvas);
     for curve in curves() {
         let points = || curve.x.iter().copied().zip(curve.y.iter().copied());

@@ -55,7 +55,7 @@ pub(super) fn draw(plot: &MapPlot, canvas: &mut Canvas) -> Result<(), String> {
             }
         }
     });
-    axes.discs(canvas, &plot.discs);
+    axes.sets(canvas, &plot.discs, &[]);
     legend::draw(canvas, &legend, (area[2] + 18.0, area[1]));
     Ok(())
 }

@@ -16,6 +16,7 @@ use std::path::Path as File;
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::outlines::Outline;
 use canvas::Canvas;
 pub use chart::{Chart, Curve, Scaling, seven_digits};
 pub use decimate::decimate;
@@ -52,6 +53,8 @@ pub struct PathPlot {
     pub paths: Vec<Path>,
     /// Discs beneath the paths.
     pub discs: Vec<Disc>,
+    /// Other sets beneath the paths.
+    pub outlines: Vec<Outline>,
 }
 
 /// A path: a start marker, a line, and a marker where it arrives.
@@ -82,10 +85,9 @@ pub struct Disc {
     pub obstacle: bool,
 }
 
-impl Disc {
-    fn colour(&self) -> [u8; 3] {
-        if self.obstacle { colour(1) } else { canvas::SAFE }
-    }
+/// The colour of a set that is to be kept out of, or to be in.
+fn set_colour(obstacle: bool) -> [u8; 3] {
+    if obstacle { colour(1) } else { canvas::SAFE }
 }
 
 /// Cells of a plane in the colours of what was found there.

@@ -5,7 +5,8 @@ use super::canvas::{Anchor, Canvas, INK, Pen};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent};
-use super::{POINTS, PathPlot, Style, colour};
+use super::{POINTS, PathPlot, Style, colour, set_colour};
+use crate::outlines::Outline;
 
 /// Size of the sheet in pixels.
 pub(super) const WIDTH: f64 = 860.0;
@@ -23,14 +24,15 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
     let discs = |axis: usize| {
         plot.discs.iter().flat_map(move |d| [d.centre[axis] - d.radius, d.centre[axis] + d.radius])
     };
-    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)));
-    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)));
+    let outlines = |axis: usize| plot.outlines.iter().flat_map(Outline::points).map(move |point| point[axis]);
+    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)).chain(outlines(0)));
+    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)).chain(outlines(1)));
     let axes = equal_axes([x, y], area)?;
     axes.frame(canvas, &plot.x_label, &plot.y_label, true);
     if !plot.title.is_empty() {
         canvas.text(&plot.title, ((area[0] + area[2]) / 2.0, 24.0), 16.0, Anchor::Middle, INK);
     }
-    axes.discs(canvas, &plot.discs);
+    axes.sets(canvas, &plot.discs, &plot.outlines);
     for (i, path) in plot.paths.iter().enumerate() {
         let pen = pen(i, path.style);
         let kept = decimate(&[&path.x, &path.y], POINTS);
@@ -66,10 +68,12 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     if plot.paths.iter().any(|path| path.arrival.is_some()) {
         entries.push((Key::Arrival, "arrival".to_owned()));
     }
-    for disc in plot.discs.iter().filter(|disc| !disc.label.is_empty()) {
-        if !entries.iter().any(|(_, text)| *text == disc.label) {
-            entries
-                .push((Key::Patch(disc.colour(), 0.18, Pen::solid(disc.colour(), 1.2)), disc.label.clone()));
+    let discs = plot.discs.iter().map(|disc| (&disc.label, disc.obstacle));
+    let outlines = plot.outlines.iter().map(|outline| (&outline.label, outline.obstacle));
+    for (label, obstacle) in discs.chain(outlines).filter(|(label, _)| !label.is_empty()) {
+        if !entries.iter().any(|(_, text)| text == label) {
+            let colour = set_colour(obstacle);
+            entries.push((Key::Patch(colour, 0.18, Pen::solid(colour, 1.2)), label.clone()));
         }
     }
     entries

@@ -50,6 +50,8 @@ struct Scene {
     runs: Vec<u64>,
     /// Whether they succeeded.
     good: Vec<bool>,
+    /// How many of them are the first ones.
+    first: usize,
     /// The command that makes a run again, before its number and after it.
     again: [String; 2],
     arrivals: Vec<Arrivals>,
@@ -163,8 +165,9 @@ pub fn pages(
     body += &numbers(summary);
     body +=
         "<noscript><p>The charts need JavaScript. The picture beside this page does not.</p></noscript>\n";
+    let first = sample.first();
     let Sample { runs, good, .. } = sample;
-    let scene = Scene { axes, shown, runs, good, again, arrivals };
+    let scene = Scene { axes, shown, runs, good, first, again, arrivals };
     let script = format!("const scene = {};\n{SCRIPT}", json(&scene));
     let title = format!("{file}: campaign");
     let charts: [(); 0] = [];
@@ -409,8 +412,16 @@ fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
         Sampling::Random => "",
         _ => " That holds for independent runs; these are spread, so it is a rough guide.",
     };
+    let unfinished = match campaign.runs() {
+        runs if runs == summary.runs => String::new(),
+        runs => format!(
+            "<p class=\"verdict\"><span class=\"word open\">Interrupted: the first {} of {runs} runs.</span></p>\n<p>The same command \
+             goes on from there, and <code>replay</code> takes the results once all runs are made.</p>\n",
+            summary.runs
+        ),
+    };
     let mut html = format!(
-        "<h1>{}</h1>\n<p>{}: {} runs from {} s to {} s.</p>\n\
+        "<h1>{}</h1>\n{unfinished}<p>{}: {} runs from {} s to {} s.</p>\n\
          <p class=\"verdict\"><span class=\"word {class}\">{sentence}</span></p>\n\
          <p>The rate of success is {} to {}, with a confidence of 95\u{202f}%.{guide} A run succeeds if {wanted}.</p>\n",
         escape(file),
@@ -461,13 +472,15 @@ fn over_two(axes: &[Axis], shown: Option<[usize; 2]>, summary: &Summary, sample:
         String::new()
     };
     format!(
-        "<h2>Success over two quantities</h2>\n<p class=\"choose\">{}{}</p>\n\
+        "<h2>Success over two quantities</h2>\n<p class=\"choose\">{}{}{}</p>\n\
          <div class=\"chart\" data-chart=\"runs\"></div>\n\
          <p class=\"hint\">A dot is a run with success, a cross one without.{left_out} Point at one to read it off; click on it for \
-         the command that makes it again. Drag to zoom (two fingers on a phone), double-click to see all again.</p>\n\
+         the command that makes it again. Drag to zoom (two fingers on a phone), double-click to see all again. By cell: how many of \
+         the first {first} runs in each part of the plane succeed. A rate of few runs says little.</p>\n\
          <p id=\"again\" class=\"command\" hidden=\"\"></p>\n",
         choose("across", "across", x),
         choose("up", "up", y),
+        select("how", "shown", ["each run", "rate of success by cell"].into_iter().enumerate(), 0),
     )
 }
 

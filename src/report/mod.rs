@@ -31,6 +31,9 @@ struct Scene {
     outlines: Vec<Outline>,
     /// The status of filters, by the key of its place.
     strips: Vec<(String, Strip)>,
+    /// Barriers without an outline, since they read more than the place.
+    #[serde(skip)]
+    left_out: Vec<String>,
 }
 
 /// The page of the run of `system`, the file `file`. Its components are made of `models`.
@@ -55,7 +58,14 @@ pub fn document(
         let _ = writeln!(
             drawn,
             "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
-             <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.</p>"
+             <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.{}</p>",
+            match &scene.left_out[..] {
+                [] => String::new(),
+                names => format!(
+                    " Without an outline, for more than the place is in them: {}.",
+                    escape(&names.join(", "))
+                ),
+            }
         );
         charts.push(("path".to_owned(), chart));
     }
@@ -256,8 +266,23 @@ fn plane(parts: &[Part<'_>], outcome: &Outcome, scene: &mut Scene) -> Option<Cha
     let moved: Vec<_> = vehicles.iter().map(Vehicle::extent).collect();
     let size = [0, 1].into_iter().filter_map(|axis| all(moved.clone(), axis)).map(|(low, high)| high - low);
     let size = size.fold(1.0, f64::max);
-    let outlines: Vec<Outline> = parts.iter().flat_map(|part| Outline::all(part, recording, size)).collect();
-    let extents: Vec<_> = moved.into_iter().chain(outlines.iter().map(Outline::extent)).collect();
+    let mut outlines: Vec<Outline> =
+        parts.iter().flat_map(|part| Outline::all(part, recording, size)).collect();
+    let mut extents: Vec<_> = moved.into_iter().chain(outlines.iter().map(Outline::extent)).collect();
+    if let (Some(x), Some(y)) = (all(extents.clone(), 0), all(extents.clone(), 1)) {
+        for part in parts {
+            let (expressions, left_out) = part.expressions([x, y]);
+            extents.extend(
+                expressions.iter().map(|outline| {
+                    [0, 1].map(|axis| plot::extent(outline.points().map(|point| point[axis])))
+                }),
+            );
+            outlines.extend(expressions.into_iter().map(Outline::still));
+            scene.left_out.extend(left_out.iter().map(|name| shown(parts, &part.signal(name)).to_owned()));
+        }
+        // What covers all else lies beneath.
+        outlines.sort_by_key(|outline| !outline.endless);
+    }
     let [x, y] = [0, 1].map(|axis| {
         let (low, high) = all(extents.clone(), axis)?;
         let room = ROOM * (high - low).max(1e-9 * size);

@@ -33,19 +33,20 @@
   const path = views.get("path");
   if (path) {
     const outline = (o) => {
-      const node = make("path", { class: o.obstacle ? "obstacle" : "safe" }, path.beneath);
+      const node = make("path", { class: o.obstacle ? "obstacle" : "safe", "fill-rule": "evenodd" }, path.beneath);
       const name = o.endless ? null : make("text", { class: "name", "text-anchor": "middle" }, path.beneath);
       if (name) name.textContent = o.label;
       make("title", {}, node).textContent = o.label;
       return (t) => {
         const [x, y] = between(o.centre[0], o.centre.slice(1), t);
-        const corners = o.corners.map((c) => [path.X(x + c[0]), path.Y(y + c[1])]);
-        node.setAttribute("d", `M${corners.map((c) => c.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`);
+        const rings = o.rings.map((ring) => ring.map((c) => [path.X(x + c[0]), path.Y(y + c[1])]));
+        const line = (ring) => `M${ring.map((c) => c.map((v) => v.toFixed(1)).join(" ")).join("L")}Z`;
+        node.setAttribute("d", rings.map(line).join(""));
         if (name) {
-          const [across, down] = [0, 1].map((i) => corners.map((c) => c[i]));
+          const [across, down] = [0, 1].map((i) => rings.flat().map((c) => c[i]));
           const top = Math.min(...down), large = Math.max(...down) - top > 150;
           // Above a shape, so that a vehicle in it is seen; within a large one.
-          name.setAttribute("x", large ? across[down.indexOf(top)] : path.X(x));
+          name.setAttribute("x", large ? across[down.indexOf(top)] : (Math.max(...across) + Math.min(...across)) / 2);
           name.setAttribute("y", large ? top + 16 : top - 4);
           // Where there are many, only those with room.
           const room = scene.outlines.length <= 12 || Math.max(...across) - Math.min(...across) > 6 * o.label.length;

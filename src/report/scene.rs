@@ -1,19 +1,14 @@
 //! What moves on the page: vehicles, the outlines of barriers, and the status of filters over time.
 
-use std::f64::consts::TAU;
-
 use punctual_core::filter::Status;
 use punctual_fmu::configuration::{BarrierSection, Shape};
 use serde::Serialize;
 
+use crate::outlines;
 use crate::pictures::Part;
 use crate::plot::{self, POINTS};
 use crate::recording::Recording;
 
-/// Points of the outline of a round shape.
-const CORNERS: usize = 96;
-/// Length of the line of a half-plane, in sizes of what else is in the plane.
-const FAR: f64 = 1e3;
 /// The states that are a heading, in rad from the x axis.
 const HEADING: &str = "x.theta";
 
@@ -69,76 +64,46 @@ pub(super) struct Outline {
     pub(super) label: String,
     /// Whether its outside is the safe set.
     obstacle: bool,
-    /// Its corners, seen from its centre.
-    corners: Vec<[f64; 2]>,
+    /// Its closed lines, seen from its centre.
+    rings: Vec<Vec<[f64; 2]>>,
     /// Times, and x and y of its centre at them; one of each where it stays.
     centre: [Vec<f64>; 3],
     /// Whether it goes on for ever, as a half-plane.
-    endless: bool,
+    pub(super) endless: bool,
 }
 
 impl Outline {
-    /// The outlines of the barriers of `part`. `size` is that of what else is in the plane.
+    /// The outlines of the shapes of `part`. `size` is that of what else is in the plane.
     pub(super) fn all(part: &Part<'_>, recording: &Recording, size: f64) -> Vec<Self> {
         let Some(filter) = part.filter() else { return Vec::new() };
-        filter.barrier.iter().filter_map(|section| Self::new(part, section, recording, size)).collect()
+        let outline = |section: &BarrierSection| {
+            let number = |field: &str| part.number(&format!("{}.{field}", section.name));
+            let shape = outlines::Outline::of_shape(section, number, size)?;
+            Some(Self::at(shape, centre(part, section, recording)?))
+        };
+        filter.barrier.iter().filter_map(outline).collect()
     }
 
-    fn new(part: &Part<'_>, section: &BarrierSection, recording: &Recording, size: f64) -> Option<Self> {
-        let number = |field: &str| part.number(&format!("{}.{field}", section.name));
-        let pair = |field: &str| Some([number(&format!("{field}[1]"))?, number(&format!("{field}[2]"))?]);
-        let (corners, obstacle) = match section.shape {
-            Shape::Disc { .. } | Shape::QuadraticDisc { .. } => (round([number("radius")?; 2], 1.0), false),
-            Shape::Obstacle { .. } => (round([number("radius")?; 2], 1.0), true),
-            Shape::Ellipse { .. } => (round(pair("half_axes")?, 1.0), false),
-            Shape::EllipticObstacle { .. } => (round(pair("half_axes")?, 1.0), true),
-            // (x/A)⁴ + (y/B)⁴ = 1, within the rectangle; the obstacle is enlarged until it contains it.
-            Shape::Rectangle { .. } => (round(pair("half_sides")?, 0.5), false),
-            Shape::RectangularObstacle { .. } => {
-                (round(pair("half_sides")?.map(|side| side * 2.0_f64.powf(0.25)), 0.5), true)
-            }
-            Shape::HalfPlane { .. } => (beside(pair("normal")?, FAR * size), false),
-            Shape::AtMost { .. }
-            | Shape::AtLeast { .. }
-            | Shape::SpeedLimit { .. }
-            | Shape::Expression { .. }
-            | Shape::Plugin { .. }
-            | Shape::External { .. } => return None,
-        };
-        let (sin, cos) = number("angle").unwrap_or(0.0).sin_cos();
-        let corners = corners.into_iter().map(|[x, y]| [cos * x - sin * y, sin * x + cos * y]);
-        Some(Self {
-            label: section.name.clone(),
-            obstacle,
-            corners: corners.map(|corner| corner.map(plot::seven_digits)).collect(),
-            centre: centre(part, section, recording)?,
-            endless: matches!(section.shape, Shape::HalfPlane { .. }),
-        })
+    /// The outline of an expression, where it is.
+    pub(super) fn still(outline: outlines::Outline) -> Self {
+        Self::at(outline, [vec![0.0], vec![0.0], vec![0.0]])
+    }
+
+    fn at(outline: outlines::Outline, centre: [Vec<f64>; 3]) -> Self {
+        let outlines::Outline { label, mut rings, obstacle, endless } = outline;
+        rings.iter_mut().flatten().for_each(|corner| *corner = corner.map(plot::seven_digits));
+        Self { label, obstacle, rings, centre, endless }
     }
 
     /// The least and the greatest x and y at all times; of an endless one, of the point that its line is given by.
     pub(super) fn extent(&self) -> [Option<(f64, f64)>; 2] {
         [0, 1].map(|axis| {
             let (low, high) = plot::extent(self.centre[axis + 1].iter().copied())?;
-            let reach = plot::extent(self.corners.iter().map(|corner| corner[axis]));
+            let reach = plot::extent(self.rings.iter().flatten().map(|corner| corner[axis]));
             let reach = reach.filter(|_| !self.endless).unwrap_or_default();
             Some((low + reach.0, high + reach.1))
         })
     }
-}
-
-/// (x/a)^(2/p) + (y/b)^(2/p) = 1: an ellipse for p = 1, a rounded rectangle for p = 1/2.
-fn round([a, b]: [f64; 2], power: f64) -> Vec<[f64; 2]> {
-    let bent = |part: f64| part.signum() * part.abs().powf(power);
-    let corner = |k: usize| (TAU * k as f64 / CORNERS as f64).sin_cos();
-    (0..CORNERS).map(corner).map(|(sin, cos)| [a * bent(cos), b * bent(sin)]).collect()
-}
-
-/// The side of a line through 0 to which `normal` shows, `far` long.
-fn beside(normal: [f64; 2], far: f64) -> Vec<[f64; 2]> {
-    let length = normal[0].hypot(normal[1]);
-    let [x, y] = normal.map(|part| part / length * far);
-    vec![[-y, x], [y, -x], [y + x, -x + y], [-y + x, x + y]]
 }
 
 /// Where the centre of a barrier is in the course of the run: as recorded where it is an input, else as it moves by
@@ -252,15 +217,5 @@ mod tests {
         assert_eq!(graver, [&(77_750.0, Status::Infeasible as i32)]);
         assert_eq!(found.len(), 3);
         assert_eq!(changes(&times[..4], &seen[..4]).len(), 4, "a short run is drawn as it is");
-    }
-
-    #[test]
-    fn a_half_plane_is_where_its_normal_shows() {
-        let normal = [3.0, 4.0];
-        let side = |[x, y]: [f64; 2]| (x * normal[0] + y * normal[1]) / 5.0;
-        // Round-off of products of 10.
-        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        let depths: Vec<f64> = beside(normal, 10.0).into_iter().map(side).collect();
-        assert!(depths.iter().zip([0.0, 0.0, 10.0, 10.0]).all(|(a, b)| near(*a, b)), "{depths:?}");
     }
 }

@@ -161,7 +161,7 @@ fn a_report_draws_what_has_an_outline_and_escapes_names() {
     assert_eq!(numbers(&outline("goal")["centre"][1]), [8.0, 8.5]);
     let corners = |name: &str| -> Vec<[f64; 2]> {
         let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
-        outline(name)["corners"].as_array().expect("corners").iter().map(corner).collect()
+        outline(name)["rings"][0].as_array().expect("a ring").iter().map(corner).collect()
     };
     // Seven digits of each coordinate are kept.
     for [x, y] in corners("pond") {
@@ -178,6 +178,71 @@ fn a_report_draws_what_has_an_outline_and_escapes_names() {
         "{above:?}"
     );
     assert_eq!(scene["outlines"].as_array().map(Vec::len), Some(5), "a speed limit has none");
+    // The picture has those that stay where they are, the obstacles under one word.
+    let picture = workshop.text("out/system-path.svg");
+    for (word, is_there) in
+        [("hall", true), ("wall", true), ("obstacle", true), ("goal", false), ("pond", false)]
+    {
+        assert_eq!(
+            picture.contains(&format!(">{word}<")) || picture.contains(&format!("\n{word}\n")),
+            is_there,
+            "{word}"
+        );
+    }
+}
+
+/// A point among sets that are expressions, with a number that the system file changes.
+#[test]
+fn an_expression_of_the_place_has_an_outline() {
+    let workshop = Workshop::new();
+    let plant = "[plant]\nstates = [{ name = \"x\", unit = \"m\" }, { name = \"y\", unit = \"m\" }]\n\
+                 inputs = [{ name = \"vx\", unit = \"m/s\" }, { name = \"vy\", unit = \"m/s\" }]\n\
+                 derivatives = { x = \"vx\", y = \"vy\" }\n\
+                 parameters = [{ name = \"r\", start = 1.0, min = 0.1, unit = \"m\" }, { name = \"w\", start = 0.1, unit = \"m/s\" }]\n";
+    let barrier = |name: &str, expression: &str| {
+        format!("[[barrier]]\nname = \"{name}\"\nexpression = \"{expression}\"\nunit = \"m2\"\n")
+    };
+    let filter = format!("kind = \"filter\"\n{plant}")
+        + &barrier("goal", "r^2 - (x - 3)^2 - y^2")
+        + "deadline = 1.5\n"
+        + &barrier("rock", "(x - 2)^2 + 4 * (y - 4)^2 - 1")
+        + &barrier("wall", "9 * (y + 3)")
+        + &barrier("gate", "100 - (x + w * t)^2");
+    workshop.write("filter.toml", filter);
+    workshop.write("plant.toml", format!("kind = \"plant\"\n{plant}"));
+    let system = "[experiment]\nstop_time = 2.0\nstep = 0.01\n[[component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
+                  start = { r = 1.5 }\n[[component]]\nname = \"plant\"\nfmu = \"plant.toml\"\n\
+                  [[connect_by_name]]\ncomponents = [\"filter\", \"plant\"]\n";
+    workshop.write("system.toml", system);
+    workshop.punctual(["run", "system.toml", "--report", "--out", "out"]).success();
+    let page = workshop.text("out/system.html");
+    assert!(page.contains("Without an outline, for more than the place is in them: gate."), "the gate moves");
+    let scene = data(&page, "scene");
+    let outlines = scene["outlines"].as_array().expect("outlines");
+    assert_eq!(outlines.iter().map(|o| &o["label"]).collect::<Vec<_>>(), ["wall", "goal", "rock"]);
+    assert_eq!(outlines.iter().map(|o| &o["obstacle"]).collect::<Vec<_>>(), [false, false, true]);
+    let corners = |k: usize| -> Vec<[f64; 2]> {
+        let rings = outlines[k]["rings"].as_array().expect("rings");
+        assert_eq!(rings.len(), 1);
+        let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
+        rings[0].as_array().expect("corners").iter().map(corner).collect()
+    };
+    // On a straight line between two points h bends by the square of a cell, which is less than 0.1 m. What lies beside the path
+    // is seen as a whole.
+    for [x, y] in corners(1) {
+        assert!((1.5_f64.powi(2) - (x - 3.0).powi(2) - y.powi(2)).abs() < 0.1_f64.powi(2), "{x}, {y}");
+    }
+    for [x, y] in corners(2) {
+        assert!(
+            ((x - 2.0).powi(2) + 4.0 * (y - 4.0).powi(2) - 1.0).abs() < 4.0 * 0.1_f64.powi(2),
+            "{x}, {y}"
+        );
+    }
+    // The wall is endless: all that the square around the path has of it, one edge of which is h = 0.
+    let lowest = corners(0).into_iter().map(|[_, y]| y).fold(f64::INFINITY, f64::min);
+    assert!((lowest + 3.0).abs() < 1e-5, "{lowest}");
+    let picture = workshop.text("out/system-path.svg");
+    assert_eq!(picture.matches("evenodd").count(), 3);
 }
 
 #[test]

@@ -17,6 +17,40 @@ fn an_unknown_key() {
     done.fails(2, "system.toml: experiment.stop: is no key here (did you mean stop_time?) (line 7)");
 }
 
+/// Whatever is wrong with a picture, the key is named, with what is allowed.
+#[test]
+fn a_picture_with_a_wrong_value() {
+    let cases = [
+        ("", "kind: missing, it must be given"),
+        ("kind = \"pie\"", "kind: is \"pie\", must be \"path\" or \"time\""),
+        ("kind = 4", "kind: is 4, must be \"path\" or \"time\""),
+        ("kind = \"time\"", "signals: missing, it must be given"),
+        ("kind = \"time\"\nsignals = 3", "signals: is 3, must be a list"),
+        ("kind = \"time\"\nsignals = [3]", "signals[0]: is 3, must be a text in quotes"),
+        ("kind = \"time\"\nsignals = []\ndeadline = \"3\"", "deadline: is \"3\", must be a number"),
+        (
+            "kind = \"time\"\nsignals = []\nscale = \"lg\"",
+            "scale: is \"lg\", must be \"linear\", \"clipped\" or \"log\"",
+        ),
+        (
+            "kind = \"time\"\nsignals = []\nx = \"a.b\"",
+            "x: is no key here; the keys are name, title, signals, ",
+        ),
+        ("kind = \"path\"\nx = \"a.b\"", "y: missing, it must be given"),
+        ("kind = \"path\"\nx = \"a.b\"\ny = 1.5", "y: is 1.5, must be a text in quotes"),
+        (
+            "kind = \"path\"\nx = \"a.b\"\ny = \"a.c\"\ndiscs = [{ centre = [1.0], radius = 2.0 }]",
+            "discs[0].centre: has 1 entry, must have 2",
+        ),
+    ];
+    let workshop = Workshop::with_fmus();
+    for (keys, message) in cases {
+        workshop.write("system.toml", system(&[]) + &format!("\n[[plot]]\n{keys}\n"));
+        let begins = format!("system.toml: plot[0].{message}");
+        workshop.punctual(["run", "system.toml"]).fails_like(2, &begins, &["(line "]);
+    }
+}
+
 #[test]
 fn a_connection_from_an_unknown_variable() {
     run("plant.x.v", "plant.x.w")

@@ -202,7 +202,8 @@ fn a_campaign_can_be_ended_at_any_point() {
         Duration::from_micros(u64::from(now.subsec_nanos()) % 20_000)
     };
     for (threads, ending) in [("1", "-KILL"), ("2", "-INT"), ("2", "-KILL")] {
-        let mut child = begin(&workshop, &["--threads", threads]);
+        let report: &[&str] = if ending == "-INT" { &["--report"] } else { &[] };
+        let mut child = begin(&workshop, &[&["--threads", threads], report].concat());
         wait(&workshop, &mut child, before, moment());
         let sent = Command::new("kill").args([ending, &child.id().to_string()]).status().expect("kill");
         assert!(sent.success());
@@ -210,6 +211,14 @@ fn a_campaign_can_be_ended_at_any_point() {
         assert_eq!(code, (ending == "-INT").then_some(130));
         before = kept(&workshop);
         assert!(before > 0 && before < MANY, "{before}");
+        // A page of the rows there are, and of no others.
+        assert_eq!(workshop.path("cut.html").exists(), ending == "-INT" || threads == "2");
+        if ending == "-INT" {
+            let page = workshop.text("cut.html");
+            assert!(page.contains(&format!("Interrupted: the first {before} of {MANY} runs.")), "{before}");
+            let runs = data(&page, "scene")["runs"].as_array().map_or(0, Vec::len) as u64;
+            assert!(runs > 0 && runs <= before, "{runs} of {before}");
+        }
     }
     // Another campaign does not go on from there.
     workshop.write("c.toml", file(MANY, "random") + "# another\n");
@@ -277,12 +286,14 @@ fn a_row_that_was_changed_is_told() {
     sorted.sort_by(f64::total_cmp);
     let value = sorted[10];
     let run = rows.iter().position(|row| number(&row[column]) == Some(value)).expect("a row").to_string();
-    let same = workshop.punctual(["replay", "c.parquet", "--run", &run, "--out", "out"]).success();
+    let same = workshop.punctual(["replay", "c.parquet", "--run", &run, "--out", "out", "--units"]).success();
     assert!(same.contains("the row is as recorded, bit for bit"), "{same}");
     assert!(
         workshop.text(&format!("out/c-{run}-filter.goal.svg")).trim_end().ends_with("</svg>"),
         "a picture of h"
     );
+    let table = workshop.text(&format!("out/c-{run}.csv"));
+    assert!(table.lines().nth(1).is_some_and(|units| units.starts_with("s,")), "the units");
     // The last bit of the number.
     let mut bytes = workshop.bytes("c.parquet");
     let old = value.to_le_bytes();
@@ -410,6 +421,9 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     let picture = workshop.text("c.svg");
     // A mark for each run that fails, and one in the legend.
     assert_eq!(picture.matches("l6 6m0 -6l-6 6").count(), 40 - count("success") + 1);
+    // All are first ones, so cells count them all; whoever reads says how they are shown.
+    assert_eq!(scene["first"], 40);
+    assert!(page.contains(">rate of success by cell</option>"), "a choice");
     // The bars count what the rows say, on the side of the deadline where it was.
     let arrivals = &scene["arrivals"][0];
     let (on_time, arrived) =

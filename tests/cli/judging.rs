@@ -197,7 +197,7 @@ fn promise_and_constraint_are_told_apart() {
     assert_eq!(run(&workshop, "kept").0, 1);
     let text = workshop.punctual(["run", "system.toml"]).success();
     let head = text.lines().find(|line| line.starts_with("barrier")).expect("a heading");
-    for word in ["promise", "constraint", "arrival s", "late s", "left s"] {
+    for word in ["promise", "constraint", "arrival s", "late by s", "left s"] {
         assert!(head.contains(word), "{head}");
     }
     let row = text.lines().find(|line| line.starts_with("filter.goal ")).expect("a row");

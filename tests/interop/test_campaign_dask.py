@@ -67,6 +67,18 @@ def campaign(tmp_path_factory):
     return folder / "c.toml", pyarrow.parquet.read_table(folder / "c.parquet").to_pylist()
 
 
+def test_every_column_has_its_unit_and_meaning_as_metadata(campaign):
+    schema = pyarrow.parquet.read_schema(campaign[0].with_suffix(".parquet"))
+    columns = json.loads(schema.metadata[b"punctual.columns"])
+    assert [field.name for field in schema] == [column["name"] for column in columns]
+    for field, column in zip(schema, columns):
+        told = {key.encode(): column[key].encode() for key in ("unit", "description") if column[key]}
+        assert field.metadata == told, field
+    assert schema.field("plant.x0.v").metadata[b"unit"] == b"m/s"
+    kinds = [str(schema.field(name).type) for name in ("run", "plant.x0.v", "success", "failure")]
+    assert kinds == ["int64", "double", "bool", "string"]
+
+
 def script(path, output, *more):
     """The command that runs the campaign at `path`."""
     binary = os.environ.get("PUNCTUAL", ROOT / "target" / "release" / "punctual")

@@ -51,6 +51,15 @@ svg.dispatchEvent(new MouseEvent("click", at));
 seen.again = document.getElementById("again").textContent;
 svg.dispatchEvent(new PointerEvent("pointermove", { ...at, pointerId: 1, pointerType: "mouse" }));
 seen.read = place.querySelector("output").textContent;
+// The rate by cell, with the number of runs.
+const how = document.getElementById("how");
+how.value = "1";
+how.dispatchEvent(new Event("change"));
+seen.cells = String(place.querySelectorAll("rect.cell").length);
+seen.counted = [...place.querySelectorAll("g text")].map((text) => text.textContent).filter((words) => words.startsWith("of ")).join("|");
+how.value = "0";
+how.dispatchEvent(new Event("change"));
+seen.back = String(place.querySelectorAll("rect.cell").length);
 const bars = document.querySelector('[data-chart="arrivals"]');
 seen.bars = String(bars.querySelectorAll("g path.curve").length);
 seen.filled = getComputedStyle(bars.querySelector("g path.curve")).fill;
@@ -88,5 +97,10 @@ def test_the_reader_chooses_what_runs_are_drawn_over(campaign, width, tmp_path):
     assert seen["read"].startswith(f"run {run}, ")
     done = punctual(*seen["again"].split()[1:], cwd=campaign)
     assert "the row is as recorded, bit for bit" in done.stdout
+    assert 1 < int(seen["cells"]) <= 9 and seen["back"] == "0"
+    if width > 1000:
+        # Every cell has room for its count.
+        counts = [int(words.removeprefix("of ")) for words in seen["counted"].split("|")]
+        assert (len(counts), sum(counts)) == (int(seen["cells"]), 60)
     assert int(seen["bars"]) >= 1
     assert seen["filled"].startswith("rgb")

@@ -296,6 +296,8 @@ fn each_dependency_is_named_in_one_place() {
         (&["svg", ":", ":"], &["src/plot/canvas.rs"]),
         (&["indicatif", ":", ":"], &["src/output.rs"]),
         (&["parquet", ":", ":"], &["src/campaign/table.rs"]),
+        (&["flatbuffers", ":", ":"], &["src/campaign/arrow.rs"]),
+        (&["base64", ":", ":"], &["src/campaign/arrow.rs"]),
         (&["rand_chacha", ":", ":"], &["src/campaign/sampling.rs"]),
         (
             &["rayon", ":", ":"],

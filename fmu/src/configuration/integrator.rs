@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, Pace, SafetyFilter};
-use punctual_models::is_in_name;
+use punctual_models::mentions;
 use serde::{Deserialize, Serialize};
 
 use super::adding::Uneven;
@@ -82,8 +82,8 @@ impl IntegratorSection {
         let (states, inputs, derivatives) = (plant.states(), plant.inputs(), plant.derivatives());
         let rate = |i: usize| {
             let input = inputs.iter().position(|input| input.name == derivatives[i].trim())?;
-            let moves = |text: &str| text.split(|c| !is_in_name(c)).any(|name| name == inputs[input].name);
-            let alone = derivatives.iter().enumerate().all(|(k, text)| k == i || !moves(text));
+            let name = &inputs[input].name;
+            let alone = derivatives.iter().enumerate().all(|(k, text)| k == i || !mentions(text, name));
             alone.then_some(input)
         };
         let rates: Vec<_> = (0..derivatives.len()).filter_map(|i| Some((i, rate(i)?))).collect();

@@ -18,14 +18,6 @@ pub(super) fn draw(vehicle: Vehicle, paper: &Run, ours: &Run, folder: &Path) -> 
     Ok(())
 }
 
-/// Number of samples shown: up to the arrival for a run of the paper's method, whose rest would hide everything
-/// else, and the whole of another run.
-fn shown(run: &Run) -> usize {
-    let len = run.recording.len();
-    let end = arrival(run).filter(|_| run.case.is_the_papers());
-    end.map_or(len, |k| (k + 1).min(len))
-}
-
 fn arrival(run: &Run) -> Option<usize> {
     let at = run.summary.arrival?;
     run.recording.times().iter().position(|&t| t >= at)
@@ -41,13 +33,10 @@ fn deadline() -> Vec<Mark> {
 
 fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
     let mut lines = Vec::new();
-    for (run, style, suffix) in [(ours, Style::Solid, ""), (paper, Style::Dashed, ", to its arrival")] {
-        let mut x = series(&run.recording, "plant.x.x_p")?;
-        let mut y = series(&run.recording, "plant.x.y_p")?;
-        x.truncate(shown(run));
-        y.truncate(shown(run));
-        let label = format!("{}{suffix}", run.case.title);
-        lines.push(plot::Path { label, x, y, arrival: arrival(run), style });
+    for (run, style) in [(ours, Style::Solid), (paper, Style::Dashed)] {
+        let x = series(&run.recording, "plant.x.x_p")?;
+        let y = series(&run.recording, "plant.x.y_p")?;
+        lines.push(plot::Path { label: run.case.title.into(), x, y, arrival: arrival(run), style });
     }
     Ok(PathPlot {
         title: format!("{}: from rest at the origin into the disc", vehicle.title()),
@@ -55,6 +44,7 @@ fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
         y_label: "y_p (m)".into(),
         paths: lines,
         discs: vec![Disc { label: "safe set".into(), centre: CENTRE, radius: RADIUS, obstacle: false }],
+        ..PathPlot::default()
     })
 }
 
@@ -63,17 +53,9 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
     let mut plots = Vec::new();
     // h with its bound, a panel for each method.
     for run in [ours, paper] {
-        let time = run.recording.times()[..shown(run)].to_vec();
         let line = |label: &str, name: &str, style, colour| {
-            let mut values = series(&run.recording, name)?;
-            values.truncate(time.len());
-            Ok::<_, Error>(Series {
-                label: label.into(),
-                time: time.clone(),
-                values,
-                style,
-                colour: Some(colour),
-            })
+            let (time, values) = (run.recording.times().to_vec(), series(&run.recording, name)?);
+            Ok::<_, Error>(Series { label: label.into(), time, values, style, colour: Some(colour) })
         };
         plots.push(TimePlot {
             title: format!("{}: {}", run.case.vehicle.title(), run.case.title),
@@ -119,8 +101,7 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
 
 /// The two inputs of a run, one panel each: their units differ.
 fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
-    let end = shown(run);
-    let time = run.recording.times()[..end].to_vec();
+    let time = run.recording.times();
     // The paper's inputs go from rest to tens of thousands: only a logarithm shows more than the last sample.
     let logarithmic = run.case.is_the_papers();
     let mut plots = Vec::new();
@@ -131,20 +112,18 @@ fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
             [("safe input u", "u", Style::Steps, 0), ("nominal input", "u_ref", Style::Dashed, 1)]
         {
             // An unconnected reference is not recorded: it stays 0.
-            let Some(mut values) = run.recording.series(&format!("filter.{variable}.{name}")) else {
+            let Some(values) = run.recording.series(&format!("filter.{variable}.{name}")) else {
                 continue;
             };
-            values.truncate(end);
             lines.push(Series {
                 label: label.into(),
-                time: time.clone(),
+                time: time.to_vec(),
                 values,
                 style,
                 colour: Some(colour),
             });
         }
-        let to = if end < run.recording.len() { ", to its arrival" } else { "" };
-        let title = format!("{}: inputs, {}{to}", run.case.vehicle.title(), run.case.title);
+        let title = format!("{}: inputs, {}", run.case.vehicle.title(), run.case.title);
         plots.push(TimePlot {
             title: if i == 0 { title } else { String::new() },
             y_label: if logarithmic { format!("|{name}| ({unit})") } else { format!("{name} ({unit})") },
