@@ -138,7 +138,7 @@ impl Sampler {
 }
 
 /// A number in (0, 1) from 52 bits: neither end is ever drawn.
-fn unit(bits: u64) -> f64 {
+pub(super) fn unit(bits: u64) -> f64 {
     ((bits >> 12) as f64 + 0.5) / (1_u64 << 52) as f64
 }
 
