@@ -633,25 +633,34 @@ fn shards_join_to_the_campaign_of_one_machine() {
         &["of this program, this is version"],
     );
     // Other campaigns.
-    let all = |name: &str, message: &str| {
+    let other = |name: &str| {
         workshop.punctual(["campaign", "other.toml", "--shard", "6..13", "-o", name]).success();
+    };
+    let refused = |name: &str, message: &str| {
         let expected = format!("--join: {name} is a part of another campaign: {message}");
         join(&[first, name, third]).fails(2, &expected);
     };
-    workshop.write("other.toml", file(20, "latin_hypercube").replace("seed = 7", "seed = 8"));
-    all("seed.parquet", "its seed is 8, must be 7");
-    workshop.write("other.toml", file(21, "latin_hypercube"));
-    all("runs.parquet", "it is one of 21 runs, must be of 20");
-    workshop.write("other.toml", file(20, "latin_hypercube").replace("deviation = 2", "deviation = 3"));
-    all("file.parquet", "its campaign file has another text");
-    workshop.write("other.toml", file(20, "latin_hypercube"));
-    let (system, plant) = (workshop.text("system.toml"), workshop.text("plant.toml"));
-    workshop.write("system.toml", format!("{system}# another"));
-    all("system.parquet", "its system file has another text");
-    workshop.write("system.toml", system);
-    workshop.write("plant.toml", format!("{plant}\n[x0]\nv = 1.0\n"));
-    all("plant.parquet", "its component \"plant\" has another configuration");
-    workshop.write("plant.toml", plant);
+    let of_file = |name: &str, text: String, message: &str| {
+        workshop.write("other.toml", text);
+        other(name);
+        refused(name, message);
+    };
+    let text = file(20, "latin_hypercube");
+    of_file("seed.parquet", text.replace("seed = 7", "seed = 8"), "its seed is 8, must be 7");
+    of_file("runs.parquet", file(21, "latin_hypercube"), "it is one of 21 runs, must be of 20");
+    let wider = text.replace("deviation = 2", "deviation = 3");
+    of_file("file.parquet", wider, "its campaign file has another text");
+    let of_part = |name: &str, part: &str, more: &str, message: &str| {
+        let before = workshop.text(part);
+        workshop.write(part, format!("{before}{more}"));
+        other(name);
+        workshop.write(part, before);
+        refused(name, message);
+    };
+    workshop.write("other.toml", text);
+    of_part("system.parquet", "system.toml", "# another\n", "its system file has another text");
+    let message = "its component \"plant\" has another configuration";
+    of_part("plant.parquet", "plant.toml", "[disturbance]\nperiod = 0.1\ninputs = { a = 0.1 }\n", message);
     assert!(!workshop.path("joined.parquet").exists() && !workshop.path("joined.parquet.parts").exists());
 
     // A folder stands for its files. The rows are those of one machine, and what is told of them too.
@@ -738,7 +747,7 @@ fn drifting(workshop: &Workshop, d: f64) -> String {
     let varied = states[1..].iter().map(|state| {
         format!("[vary.\"plant.x0.{state}\"]\ndistribution = \"normal\"\nmean = 0\ndeviation = 1\n")
     });
-    let system = "[system.experiment]\nstop_time = 2.0\nstep = 0.2\n\
+    let system = "[system.experiment]\nstop_time = 2.0\nstep = 1.0\n\
                   [[system.component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
                   [[system.component]]\nname = \"plant\"\nfmu = \"plant.toml\"\n\
                   start = { \"u.u\" = 0.0, inner_step = 0.1 }\n";
@@ -750,22 +759,22 @@ fn drifting(workshop: &Workshop, d: f64) -> String {
 #[test]
 fn a_rare_failure_is_estimated_and_shown() {
     let workshop = Workshop::new();
-    // 3.0902 deviations, 2 (1 - exp(-2)) m each: one in a thousand, by tables of the normal distribution.
-    let text = drifting(&workshop, 3.090_232 * 2.0 * (1.0 - (-2.0_f64).exp()));
+    // 2.17009 deviations, 2 (1 - exp(-2)) m each: fifteen in a thousand, by tables of the normal distribution.
+    let text = drifting(&workshop, 2.170_090 * 2.0 * (1.0 - (-2.0_f64).exp()));
     workshop.write("c.toml", &text);
     let rare = |more: &[&str]| workshop.punctual([&["campaign", "c.toml"], more].concat());
     let report: Value = serde_json::from_str(&rare(&["--rare=5", "--json"]).success()).expect("JSON");
     let interval = numbers(&report["interval"]);
-    assert!(interval[0] < 1e-3 && 1e-3 < interval[1], "{report}");
-    assert!(interval[0] > 0.5e-3 && interval[1] < 2e-3, "{report}");
+    assert!(interval[0] < 0.015 && 0.015 < interval[1], "{report}");
+    assert!(interval[0] > 0.0075 && interval[1] < 0.03, "{report}");
     let levels = numbers(&report["levels"]);
-    assert!(levels.len() == 4 && levels.is_sorted_by(|a, b| a > b) && levels[3] >= 0.0, "{levels:?}");
+    assert!(levels.len() == 2 && levels.is_sorted_by(|a, b| a > b) && levels[1] >= 0.0, "{levels:?}");
     // Where it says, and as bad as it says.
     let values = report["worst"]["values"].as_array().expect("a list");
     let sum: f64 = values.iter().filter_map(|value| value["value"].as_f64()).sum();
     let least = report["worst"]["least_h"].as_f64().expect("a number");
     assert!(least < 0.0 && values.len() == 4);
-    let expected = (3.090_232 * 2.0 - sum) * (1.0 - (-2.0_f64).exp());
+    let expected = (2.170_090 * 2.0 - sum) * (1.0 - (-2.0_f64).exp());
     assert!((least - expected).abs() < 1e-3, "{least}, not {expected}");
     let again = workshop.punctual(["replay", "c-worst.parquet", "--run", "0"]).success();
     assert!(again.contains("the row is as recorded, bit for bit") && again.contains("not kept"), "{again}");
