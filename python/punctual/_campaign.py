@@ -176,10 +176,10 @@ def _spread(client: Client, kept: _Kept, batch: int | None) -> None:
     with _batches(client) as flying:
         while missing or flying:
             threads = max(sum(client.nthreads().values()), 1) if client.status == "running" else 1
-            # Two for each thread, so that none waits for the next; smaller ones at the end.
+            # Two for each thread, so that none waits for the next; smaller ones at the end, of a second or so.
             while missing and not lost and len(flying) < 2 * threads:
                 first, end = missing[0]
-                count = batch or max(min(size, math.ceil(left / (2 * threads))), 1)
+                count = batch or max(min(size, math.ceil(left / (2 * threads))), size // 5, 1)
                 cut = min(first + count, end)
                 missing[:1] = [(cut, end)] if cut < end else []
                 left -= cut - first

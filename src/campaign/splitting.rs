@@ -16,14 +16,12 @@
 
 use std::f64::consts::TAU;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::sampling::unit;
+use super::sampling::Sequence;
 
 /// Points of the pilot, and of each repeat, at every level.
 const POINTS: usize = 500;
@@ -36,20 +34,16 @@ const WANTED: f64 = 0.4;
 const STEERING: f64 = 1.5;
 /// The most levels: the part of the points beyond them would be below 1e-15, where doubles just below 1 end.
 const MOST_LEVELS: usize = 21;
-/// The first stream of the generator here. Those of the runs are below.
-const STREAMS: u64 = 1 << 62;
 
 /// Draws one sequence for each key.
-fn generator(seed: u64, repeat: usize, level: usize, point: usize) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(STREAMS + ((repeat as u64) << 32) + ((level as u64) << 16) + point as u64);
-    rng
+fn generator(seed: u64, repeat: usize, level: usize, point: usize) -> Sequence {
+    Sequence::new(seed, ((repeat as u64) << 32) + ((level as u64) << 16) + point as u64)
 }
 
 /// Fills `z` with standard normal numbers: G. E. P. Box and M. E. Muller (1958).
-fn normal(rng: &mut ChaCha8Rng, z: &mut [f64]) {
+fn normal(rng: &mut Sequence, z: &mut [f64]) {
     for pair in z.chunks_mut(2) {
-        let (radius, angle) = ((-2.0 * unit(rng.next_u64()).ln()).sqrt(), TAU * unit(rng.next_u64()));
+        let (radius, angle) = ((-2.0 * rng.unit().ln()).sqrt(), TAU * rng.unit());
         pair[0] = radius * angle.cos();
         if let Some(second) = pair.get_mut(1) {
             *second = radius * angle.sin();
@@ -119,7 +113,7 @@ impl Problem<'_> {
 
     /// Tries to move the point `moves` times by steps of width `width`, and stays at or below `level`. Returns how often
     /// it moved.
-    fn moved(&self, point: &mut Point, rng: &mut ChaCha8Rng, level: f64, width: f64, moves: usize) -> usize {
+    fn moved(&self, point: &mut Point, rng: &mut Sequence, level: f64, width: f64, moves: usize) -> usize {
         let mut step = vec![0.0; self.dimensions];
         let (mut made, keep) = (0, (1.0 - width * width).sqrt());
         for _ in 0..moves {
@@ -222,11 +216,11 @@ fn worse(a: Point, b: Point) -> Point {
 
 /// As many points, drawn evenly from those at or below `level`: each as often as any other, but for a rest that is drawn
 /// without repetition.
-fn resampled(mut points: Vec<Point>, level: f64, rng: &mut ChaCha8Rng) -> Vec<Point> {
+fn resampled(mut points: Vec<Point>, level: f64, rng: &mut Sequence) -> Vec<Point> {
     points.retain(|point| point.margin <= level);
     // Fisher and Yates.
     for i in (1..points.len()).rev() {
-        points.swap(i, (unit(rng.next_u64()) * (i + 1) as f64) as usize);
+        points.swap(i, (rng.unit() * (i + 1) as f64) as usize);
     }
     (0..POINTS).map(|i| points[i % points.len()].clone()).collect()
 }
@@ -313,11 +307,6 @@ mod tests {
         let (limit, truth) = limit(1e-9);
         let times = std::env::var("PUNCTUAL_REPEATS").map_or(4, |n| n.parse().expect("a number"));
         let (covered, mean, part) = judged(truth, times, &|z| least_distance(limit, z), STEPS);
-        println!(
-            "{truth:e}: {covered} of {times} cover it, mean {}, 1/{:e} of the steps",
-            mean / truth,
-            1.0 / part
-        );
         // One in twenty may miss it. Of 4 three do so once in 2000 times, of 100 thirteen likewise.
         assert!(times - covered <= 2 + times / 10, "{covered} of {times}");
         assert!((mean / truth - 1.0).abs() < 0.6 / (times as f64).sqrt(), "{mean}");

@@ -326,7 +326,7 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
     let stop = super::interruption()?;
     let counter = Counter::new("repeats", 0, repeats as u64);
     let found = campaign::rare(campaign, &output, arguments.threads, repeats, &stop, &|done| {
-        counter.update(done as u64)
+        counter.update(done as u64);
     })?;
     drop(counter);
     let Some(found) = found else {
