@@ -9,9 +9,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::distribution::Distribution;
+use super::distribution::{Distribution, below};
 use super::file::{Campaign, Choice, Success};
 use super::measures::Measures;
 use super::runner::{self, Crew, Options};
@@ -148,9 +147,8 @@ fn stalled(Stalled { margin, part, made }: Stalled) -> Error {
 
 /// What is drawn at a standard normal point.
 fn choice(campaign: &Campaign, z: &[f64]) -> Choice {
-    let normal = Normal::standard();
     let value = |(z, varied): (&f64, &super::file::Varied)| {
-        let u = normal.cdf(*z).clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0);
+        let u = below(*z).clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0);
         varied.distribution.value(u, 0)
     };
     Choice { seed: 0, values: z.iter().zip(campaign.varied()).map(value).collect() }

@@ -19,8 +19,8 @@ use std::f64::consts::TAU;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::distribution::student;
 use super::sampling::Sequence;
 
 /// Points of the pilot, and of each repeat, at every level.
@@ -200,8 +200,7 @@ impl Problem<'_> {
         // Where none arrives, nothing is known of it.
         let deviation = if probability > 0.0 { (variance / n).sqrt() / probability } else { f64::INFINITY };
         // Of the logarithm, since estimates of rare events are skewed to the right.
-        let student = StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975));
-        let factor = (student * deviation).exp();
+        let factor = (student(n - 1.0) * deviation).exp();
         let made = (repeats * POINTS * (1 + MOVES * plan.levels.len())) as u64;
         let high = if probability > 0.0 { (probability * factor).min(1.0) } else { 1.0 };
         let interval = [probability / factor, high];
@@ -228,6 +227,7 @@ fn resampled(mut points: Vec<Point>, level: f64, rng: &mut Sequence) -> Vec<Poin
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::campaign::distribution::below;
 
     /// Length of a run of the plant below, in steps.
     const STEPS: usize = 50;
@@ -251,15 +251,14 @@ mod tests {
     /// by step on a grid (Chapman and Kolmogorov, trapezoid rule), and what leaves by the tail of the normal
     /// distribution.
     fn passing(limit: f64) -> f64 {
-        let normal = statrs::distribution::Normal::standard();
         let n = 600;
         let (low, width) = (-limit, 2.0 * limit / f64::from(n));
         let grid: Vec<f64> = (0..=n).map(|i| low + width * f64::from(i)).collect();
         let weight = |i: usize| if i == 0 || i == grid.len() - 1 { 0.5 * width } else { width };
         let mut of_x: Vec<f64> = grid.iter().map(|x| density(*x)).collect();
-        let mut passed = normal.sf(limit);
+        let mut passed = below(-limit);
         for _ in 1..STEPS {
-            let leaving = |(i, x): (usize, &f64)| weight(i) * of_x[i] * normal.sf(limit - 0.9 * x);
+            let leaving = |(i, x): (usize, &f64)| weight(i) * of_x[i] * below(0.9 * x - limit);
             passed += grid.iter().enumerate().map(leaving).sum::<f64>();
             let at = |y: &f64| {
                 grid.iter().enumerate().map(|(i, x)| weight(i) * of_x[i] * density(y - 0.9 * x)).sum()
