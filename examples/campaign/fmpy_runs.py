@@ -1,6 +1,6 @@
 """Runs of a campaign with its FMUs under FMPy: the calls of `punctual run` and the rows of `punctual campaign`.
 
-For any pool of processes; ../campaign_dask.py uses it on a cluster.
+For any pool of processes, with any importer in the place of FMPy. `punctual.campaign` is faster by far.
 """
 
 import ctypes

@@ -5,11 +5,13 @@
 - `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there, `plot` draws it, `to_pandas`
   makes a frame of it.
 - In a dict a Python function may stand in the place of an expression: it is called once, with symbols.
+- `campaign` makes many runs from drawn starts, on this machine or on a Dask cluster.
 - `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI. The module `punctual.gymnasium` wraps
   environments of Gymnasium with them.
 - `run_cli` runs the command line, which is installed as `punctual` too.
 """
 
+from ._campaign import campaign
 from ._command import run_cli
 from ._configuration import Configuration, to_toml
 from ._enumerations import Assurance, Phase, Status
@@ -37,6 +39,7 @@ __all__ = [
     "Variable",
     "__version__",
     "build",
+    "campaign",
     "check",
     "plan",
     "plot",

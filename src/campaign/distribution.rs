@@ -4,7 +4,7 @@ use std::fmt;
 
 use punctual_fmu::configuration::{ConfigurationError, Range};
 use serde::Deserialize;
-use statrs::distribution::{ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::statistics::Distribution as _;
 
 /// `[vary."component.variable"]`: the keys that its `distribution` needs, and no other.
@@ -212,6 +212,16 @@ impl Distribution {
             Self::Seed => seed as f64,
         }
     }
+}
+
+/// The part of the standard normal distribution below `z`.
+pub(super) fn below(z: f64) -> f64 {
+    Normal::standard().cdf(z)
+}
+
+/// The 0.975 quantile of Student's distribution with `freedom` > 0 degrees of freedom.
+pub(super) fn student(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
 }
 
 #[cfg(test)]

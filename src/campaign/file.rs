@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use punctual_fmu::configuration::{Configuration, ConfigurationError, FileKind, RESOURCE, Range, read_toml};
+use punctual_fmu::configuration::{
+    Configuration, ConfigurationError, FileKind, RESOURCE, Range, read_toml, write_toml,
+};
 use punctual_fmu::product::Product;
-use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, MapAccess, Visitor};
+use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
@@ -92,7 +94,7 @@ pub enum Success {
 }
 
 /// The texts that a campaign is made of. Its rows depend on them and this program alone.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Source {
     /// The campaign file.
     pub file: String,
@@ -112,6 +114,18 @@ impl Source {
         parts.for_each(|part| text += &format!("\n{} {part}", part.len()));
         Uuid::new_v5(&Uuid::NAMESPACE_OID, text.as_bytes()).to_string()
     }
+}
+
+/// A campaign in one file, with all that other machines need to run it; as JSON.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Packed {
+    /// The version that packed it.
+    version: String,
+    /// [`Source::fingerprint`].
+    fingerprint: String,
+    runs: u64,
+    source: Source,
 }
 
 /// A variable that differs from run to run.
@@ -155,13 +169,18 @@ pub struct Campaign {
 
 impl Campaign {
     /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
-    /// components' FMUs of this program (or configurations that these are built from, `.toml`).
+    /// components' FMUs of this program (or configurations that these are built from, `.toml`). What
+    /// [`Campaign::packed`] gave stands for all of them.
     ///
     /// # Errors
     ///
     /// A file that cannot be read; a key or value that cannot be used; an FMU of another program.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source_text = text::read(path)?;
+        // No text of TOML begins so.
+        if source_text.starts_with('{') {
+            return Self::unpacked(&source_text, path);
+        }
         let file: File = read_toml(&source_text)
             .map_err(|e| Error::from(FileKind::Campaign.instead(&source_text).unwrap_or(e)).in_file(path))?;
         let system_path = match &file.system {
@@ -198,6 +217,35 @@ impl Campaign {
             system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
         let configurations = configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
         Self::of(Source { file: source_text, system: system_text, configurations }, path, &system_path)
+    }
+
+    /// Reads a campaign that [`Campaign::packed`] packed.
+    fn unpacked(text: &str, path: &Path) -> Result<Self, Error> {
+        let wrong = |message: String| Error::configuration("", format!("{}: {message}", path.display()));
+        let Packed { version, fingerprint, source, .. } = serde_json::from_str(text)
+            .map_err(|e| wrong(format!("is no whole campaign that `--pack` wrote: {e}")))?;
+        let ours = env!("CARGO_PKG_VERSION");
+        if version != ours {
+            return Err(wrong(format!(
+                "was packed by version {version} of this program, this is version {ours}"
+            )));
+        }
+        if fingerprint != source.fingerprint() {
+            return Err(wrong("was changed after `--pack` wrote it; pack the campaign anew".to_owned()));
+        }
+        Self::of(source, path, path)
+    }
+
+    /// The campaign with all that it needs, as one text.
+    pub fn packed(&self) -> String {
+        let packed = Packed {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            fingerprint: self.source.fingerprint(),
+            runs: self.runs,
+            source: self.source.clone(),
+        };
+        // Texts and numbers alone are always written.
+        serde_json::to_string_pretty(&packed).unwrap_or_default() + "\n"
     }
 
     /// Checks a campaign whose texts are given; errors name `path` or `system_path`.
@@ -308,6 +356,21 @@ impl Campaign {
     /// The condition on a successful run.
     pub fn success(&self) -> Success {
         self.success
+    }
+
+    /// The campaign of one run, that from `choice`.
+    ///
+    /// # Errors
+    ///
+    /// None that this campaign allows.
+    pub(super) fn alone(&self, choice: &Choice) -> Result<Self, Error> {
+        let mut file: serde_json::Value = read_toml(&self.source.file)?;
+        file["campaign"]["runs"] = 1.into();
+        for (varied, value) in self.varied.iter().zip(&choice.values) {
+            file["vary"][&varied.name] = serde_json::json!({ "distribution": "choice", "values": [value] });
+        }
+        let source = Source { file: write_toml(&file)?, ..self.source.clone() };
+        Self::of(source, Path::new("the worst run"), Path::new("the worst run"))
     }
 
     /// Draws the numbers of run `number`: a function of the campaign's texts and the number alone.

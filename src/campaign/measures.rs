@@ -99,15 +99,25 @@ impl Measures {
 
     /// Makes run `number` and measures it. `simulation` records [`Measures::signals`] at every step.
     pub fn run(&self, campaign: &Campaign, simulation: &mut Simulation<InProcess>, number: u64) -> Row {
-        let choice = campaign.choice(number);
-        campaign.start(simulation, &choice);
+        self.run_from(campaign, simulation, number, &campaign.choice(number))
+    }
+
+    /// As [`Measures::run`], from what else than its number draws.
+    pub(super) fn run_from(
+        &self,
+        campaign: &Campaign,
+        simulation: &mut Simulation<InProcess>,
+        number: u64,
+        choice: &Choice,
+    ) -> Row {
+        campaign.start(simulation, choice);
         let mut seen = self.nothing();
         let outcome = simulation.run_unrecorded(|_, values| self.see(&mut seen, values));
         let (failure, promises) = match outcome {
             Ok(outcome) => (outcome.failure, outcome.promises),
             Err(error) => (Some(error), Vec::new()),
         };
-        self.row(number, &choice, &seen, &promises, failure.as_ref())
+        self.row(number, choice, &seen, &promises, failure.as_ref())
     }
 
     fn nothing(&self) -> Seen {

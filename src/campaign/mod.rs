@@ -7,17 +7,22 @@
 mod arrow;
 mod distribution;
 mod file;
+mod join;
 mod measures;
+mod rare;
 mod runner;
 mod sampling;
 mod sobol;
+mod splitting;
 mod summary;
 mod table;
 
 pub use distribution::{Distribution, VarySection};
 pub use file::{Campaign, Choice, Source, Success, Varied};
+pub use join::join;
 pub use measures::Measures;
-pub use runner::{Options, Progress, kept, recorded, run, version};
+pub use rare::{Failing, Rare, Value, rare};
+pub use runner::{Options, Progress, kept, recorded, run, runs, version};
 pub use sampling::{Sampler, Sampling};
 pub use summary::{Case, Lack, Rate, Spread, Summary, summary};
 pub use table::{Cell, Column, GROUP, Kind, Reader, Row};

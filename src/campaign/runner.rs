@@ -3,12 +3,14 @@
 //!
 //! Rows go to segments beside the output, in the folder `<output>.parts`. A segment holds the next runs in order.
 //! It is written under another name, synchronised and renamed, so that it is there as a whole or not at all. When
-//! all runs are there, the segments are joined. Their cuts do not show in the result.
+//! all runs are there, the segments are joined. Their cuts do not show in the result. A part of the runs is made in
+//! the same way, and its file tells which they are.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::Write;
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -18,9 +20,9 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::arrow;
-use super::file::{Campaign, Source};
+use super::file::{Campaign, Choice, Source};
 use super::measures::Measures;
-use super::table::{GROUP, Reader, Row, Writer};
+use super::table::{Cell, GROUP, Reader, Row, Writer};
 use crate::coupling::{InProcess, Simulation};
 use crate::error::Error;
 
@@ -43,13 +45,17 @@ pub(super) mod key {
     pub(crate) const CONFIGURATION: &str = "punctual.configuration.";
     /// Units and meanings of the columns, as JSON.
     pub(crate) const COLUMNS: &str = "punctual.columns";
+    /// Of a part: the first of its runs and the next one after it, `FIRST..NEXT`.
+    pub(crate) const RUNS: &str = "punctual.runs";
 }
 
-/// Output and threads of a campaign.
+/// Output, runs and threads of a campaign.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The Parquet file.
     pub output: PathBuf,
+    /// The runs to make, a part of the campaign; `None` for all.
+    pub runs: Option<Range<u64>>,
     /// Number of runs made at once; default one for each core.
     pub threads: Option<NonZeroUsize>,
 }
@@ -65,8 +71,12 @@ pub struct Progress {
     pub wall_time: Duration,
 }
 
-/// The metadata of a campaign's files.
-fn metadata(source: &Source, measures: &Measures) -> Vec<(String, String)> {
+/// The metadata of a campaign's files; `runs` of a part.
+pub(super) fn metadata(
+    source: &Source,
+    measures: &Measures,
+    runs: Option<&Range<u64>>,
+) -> Vec<(String, String)> {
     let columns = serde_json::to_string(measures.columns()).unwrap_or_default();
     let mut texts = vec![
         (key::FINGERPRINT.to_owned(), source.fingerprint()),
@@ -77,6 +87,7 @@ fn metadata(source: &Source, measures: &Measures) -> Vec<(String, String)> {
     texts.extend(source.system.iter().map(|text| (key::SYSTEM.to_owned(), text.clone())));
     let configurations = source.configurations.iter().enumerate();
     texts.extend(configurations.map(|(i, text)| (format!("{}{i}", key::CONFIGURATION), text.clone())));
+    texts.extend(runs.map(|runs| (key::RUNS.to_owned(), format!("{}..{}", runs.start, runs.end))));
     let schema = arrow::schema(measures.columns(), &texts);
     texts.push((arrow::KEY.to_owned(), schema));
     texts
@@ -108,10 +119,20 @@ pub fn version(reader: &Reader) -> &str {
     reader.text(key::VERSION).unwrap_or("unknown")
 }
 
+/// The numbers of the runs in a file: those of its part, or all from 0 on.
+pub fn runs(reader: &Reader) -> Range<u64> {
+    let part = reader.text(key::RUNS).and_then(|text| text.split_once(".."));
+    let first = part.and_then(|(first, _)| first.parse().ok()).unwrap_or(0);
+    first..first.saturating_add(reader.rows())
+}
+
 /// The folder of segments, which no other process uses.
-struct Parts {
+pub(super) struct Parts {
     folder: PathBuf,
-    fingerprint: String,
+    /// The fingerprint of the campaign, for a part with its runs.
+    identity: String,
+    /// The first run that belongs here.
+    first: u64,
     /// Held as long as this lives.
     _lock: File,
 }
@@ -121,10 +142,12 @@ type Segments = BTreeMap<u64, (u64, PathBuf)>;
 
 impl Parts {
     /// Opens the folder for `output`, which may exist from an earlier call.
-    fn open(output: &Path, fingerprint: String) -> Result<Self, Error> {
-        let mut name = output.as_os_str().to_owned();
-        name.push(".parts");
-        let folder = PathBuf::from(name);
+    pub(super) fn open(output: &Path, campaign: &Campaign, runs: Option<&Range<u64>>) -> Result<Self, Error> {
+        let mut identity = campaign.source().fingerprint();
+        if let Some(runs) = runs {
+            identity += &format!(", runs {}..{}", runs.start, runs.end);
+        }
+        let folder = parts_folder(output);
         fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
         let lock_path = folder.join("lock");
         let lock = File::create(&lock_path).map_err(|e| Error::io("write", &lock_path, e))?;
@@ -136,15 +159,16 @@ impl Parts {
             }
             Err(TryLockError::Error(e)) => return Err(Error::io("lock", &lock_path, e)),
         }
-        let parts = Self { folder, fingerprint, _lock: lock };
+        let first = runs.map_or(0, |runs| runs.start);
+        let parts = Self { folder, identity, first, _lock: lock };
         let identity = parts.folder.join("fingerprint");
         match fs::read_to_string(&identity) {
-            Ok(found) if found == parts.fingerprint => {}
-            Ok(found) => return Err(other_campaign(&parts.folder, &found, &parts.fingerprint)),
+            Ok(found) if found == parts.identity => {}
+            Ok(found) => return Err(other_campaign(&parts.folder, &found, &parts.identity)),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
                 let new = parts.unfinished();
                 let written = File::create(&new).and_then(|mut file| {
-                    file.write_all(parts.fingerprint.as_bytes())?;
+                    file.write_all(parts.identity.as_bytes())?;
                     file.sync_all()
                 });
                 written.map_err(|e| Error::io("write", &new, e))?;
@@ -156,12 +180,12 @@ impl Parts {
     }
 
     /// Path of a file that is not complete yet.
-    fn unfinished(&self) -> PathBuf {
+    pub(super) fn unfinished(&self) -> PathBuf {
         self.folder.join("unfinished")
     }
 
     /// Renames a file that is complete on the disk.
-    fn settle(&self, from: &Path, to: &Path) -> Result<(), Error> {
+    pub(super) fn settle(&self, from: &Path, to: &Path) -> Result<(), Error> {
         fs::rename(from, to).map_err(|e| Error::io("write", to, e))?;
         let folder = to.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         // Not every system can synchronise a folder; a segment that is lost is made again.
@@ -169,7 +193,7 @@ impl Parts {
         Ok(())
     }
 
-    /// The segments that are there, without a gap from run 0 on.
+    /// The segments that are there, without a gap from the first run on.
     fn segments(&self) -> Result<Segments, Error> {
         let problem = |e| Error::io("read", &self.folder, e);
         let mut found = Segments::new();
@@ -182,7 +206,7 @@ impl Parts {
                 found.insert(first, (next.saturating_sub(first), path));
             }
         }
-        let mut done = 0;
+        let mut done = self.first;
         for (first, (count, path)) in &found {
             if *first != done {
                 let message = format!("the runs {done} to {} are missing before it; remove it", first - 1);
@@ -194,7 +218,7 @@ impl Parts {
     }
 
     /// Removes the folder with all its files.
-    fn remove(self) -> Result<(), Error> {
+    pub(super) fn remove(self) -> Result<(), Error> {
         // The last goes first, so that the rest of an interrupted removal has no gap.
         for (_, path) in self.segments()?.values().rev() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
@@ -212,6 +236,13 @@ impl Parts {
     }
 }
 
+/// The folder of segments beside `output`.
+pub(super) fn parts_folder(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".parts");
+    PathBuf::from(name)
+}
+
 fn other_campaign(path: &Path, found: &str, wanted: &str) -> Error {
     let message = format!(
         "{} is of another campaign (fingerprint {found}, must be {wanted}): its file, its components or the version \
@@ -221,18 +252,38 @@ fn other_campaign(path: &Path, found: &str, wanted: &str) -> Error {
     Error::configuration("--output", message)
 }
 
-/// Whether `output` is the complete result of `campaign`.
+/// Whether `output` is the complete result of `campaign`, or of these runs of it.
 ///
 /// # Errors
 ///
-/// It is of another campaign, or cannot be read.
-fn complete(campaign: &Campaign, output: &Path) -> Result<bool, Error> {
+/// It is of another campaign, has other runs of it, or cannot be read.
+pub(super) fn complete(campaign: &Campaign, output: &Path, wanted_runs: &Range<u64>) -> Result<bool, Error> {
     if !output.exists() {
         return Ok(false);
     }
     let (reader, _) = recorded(output)?;
-    let (found, wanted) = (reader.text(key::FINGERPRINT).unwrap_or("none"), campaign.source().fingerprint());
-    if found == wanted { Ok(true) } else { Err(other_campaign(output, found, &wanted)) }
+    let (found, wanted) = (fingerprint(&reader), campaign.source().fingerprint());
+    if found != wanted {
+        return Err(other_campaign(output, found, &wanted));
+    }
+    let found = runs(&reader);
+    if found != *wanted_runs {
+        let message = format!(
+            "{} has the runs {}..{} of this campaign, must have {}..{}; remove it, or give another output",
+            output.display(),
+            found.start,
+            found.end,
+            wanted_runs.start,
+            wanted_runs.end
+        );
+        return Err(Error::configuration("--output", message));
+    }
+    Ok(true)
+}
+
+/// The fingerprint in a file.
+pub(super) fn fingerprint(reader: &Reader) -> &str {
+    reader.text(key::FINGERPRINT).unwrap_or("none")
 }
 
 /// Makes the runs that are not there yet. Ends early once `stop` is set; then it keeps all complete runs with no
@@ -247,25 +298,23 @@ pub fn run(
     stop: &AtomicBool,
     tell: &(dyn Fn(u64) + Sync),
 ) -> Result<Progress, Error> {
-    let runs = campaign.runs();
-    let fingerprint = campaign.source().fingerprint();
-    if complete(campaign, &options.output)? {
-        let mut folder = options.output.as_os_str().to_owned();
-        folder.push(".parts");
-        if Path::new(&folder).exists() {
+    let runs = options.runs.clone().unwrap_or(0..campaign.runs());
+    let all = runs.end - runs.start;
+    if complete(campaign, &options.output, &runs)? {
+        if parts_folder(&options.output).exists() {
             // The last process was killed between its last two steps.
-            Parts::open(&options.output, fingerprint)?.remove()?;
+            Parts::open(&options.output, campaign, options.runs.as_ref())?.remove()?;
         }
-        return Ok(Progress { done: runs, before: runs, wall_time: Duration::ZERO });
+        return Ok(Progress { done: all, before: all, wall_time: Duration::ZERO });
     }
     let measures = Measures::new(campaign);
-    let parts = Parts::open(&options.output, fingerprint)?;
+    let parts = Parts::open(&options.output, campaign, options.runs.as_ref())?;
     let mut segments = parts.segments()?;
     let before: u64 = segments.values().map(|(count, _)| count).sum();
     let begin = Instant::now();
-    if before < runs {
+    if before < all {
         let crew = Crew::new(campaign, &measures, options.threads)?;
-        crew.work(before, stop, tell, |first, rows| {
+        crew.work(runs.start + before..runs.end, stop, &|next| tell(next - runs.start), |first, rows| {
             let next = first + rows.len() as u64;
             let path = parts.folder.join(format!("runs-{first:016}-{next:016}.parquet"));
             let count = next - first;
@@ -279,8 +328,8 @@ pub fn run(
     }
     let wall_time = begin.elapsed();
     let done: u64 = segments.values().map(|(count, _)| count).sum();
-    if done == runs {
-        join(campaign, &measures, &parts, &segments)?;
+    if done == all {
+        gather(campaign, options.runs.as_ref(), &measures, &parts, &segments)?;
         parts.settle(&parts.unfinished(), &options.output)?;
         parts.remove()?;
     }
@@ -293,43 +342,69 @@ pub fn run(
 ///
 /// Another process has gone on with it; a file that cannot be read or written.
 pub fn kept(campaign: &Campaign, output: &Path) -> Result<Option<Reader>, Error> {
-    let parts = Parts::open(output, campaign.source().fingerprint())?;
+    let parts = Parts::open(output, campaign, None)?;
     let segments = parts.segments()?;
     if segments.is_empty() {
         return Ok(None);
     }
-    join(campaign, &Measures::new(campaign), &parts, &segments)?;
+    gather(campaign, None, &Measures::new(campaign), &parts, &segments)?;
     Reader::open(&parts.unfinished()).map(Some)
 }
 
-/// Writes all rows into one file, a group at a time.
-fn join(campaign: &Campaign, measures: &Measures, parts: &Parts, segments: &Segments) -> Result<(), Error> {
-    let metadata = metadata(campaign.source(), measures);
+/// Writes the rows of all `segments` of the campaign, or of its `runs`, into one file.
+fn gather(
+    campaign: &Campaign,
+    runs: Option<&Range<u64>>,
+    measures: &Measures,
+    parts: &Parts,
+    segments: &Segments,
+) -> Result<(), Error> {
+    let metadata = metadata(campaign.source(), measures, runs);
     let mut writer = Writer::create(&parts.unfinished(), measures.columns(), &metadata)?;
-    for (count, path) in segments.values() {
-        let reader = Reader::open(path)?;
-        if reader.rows() != *count {
-            let message = format!("it has {} rows, must have {count}; remove it", reader.rows());
-            return Err(Error::io("use", path, std::io::Error::other(message)));
-        }
-        for group in 0..reader.groups() {
-            reader.group(group, measures.columns())?.into_iter().try_for_each(|row| writer.push(row))?;
-        }
+    for (first, (count, path)) in segments {
+        copy(&Reader::open(path)?, path, &(*first..first + count), measures, &mut writer)?;
     }
     writer.finish()
 }
 
+/// Copies the rows of the file at `path` to `writer`, a group at a time, if they are those of `runs`.
+pub(super) fn copy(
+    reader: &Reader,
+    path: &Path,
+    runs: &Range<u64>,
+    measures: &Measures,
+    writer: &mut Writer,
+) -> Result<(), Error> {
+    let wrong = |message: String| Error::io("use", path, std::io::Error::other(message));
+    if reader.rows() != runs.end - runs.start {
+        let message =
+            format!("it has {} rows, must have {}; remove it", reader.rows(), runs.end - runs.start);
+        return Err(wrong(message));
+    }
+    let mut due = runs.start;
+    for group in 0..reader.groups() {
+        for row in reader.group(group, measures.columns())? {
+            match row.first() {
+                Some(Cell::Count(run)) if *run == due => due += 1,
+                _ => return Err(wrong(format!("run {due} is not in its place; remove it"))),
+            }
+            writer.push(row)?;
+        }
+    }
+    Ok(())
+}
+
 /// The threads and their simulations.
-struct Crew<'a> {
+pub(super) struct Crew<'a> {
     campaign: &'a Campaign,
     measures: &'a Measures,
-    pool: ThreadPool,
+    pub(super) pool: ThreadPool,
     /// Simulations by thread; each is only ever used by its own.
     simulations: Vec<Mutex<Simulation<InProcess>>>,
 }
 
 impl<'a> Crew<'a> {
-    fn new(
+    pub(super) fn new(
         campaign: &'a Campaign,
         measures: &'a Measures,
         threads: Option<NonZeroUsize>,
@@ -345,25 +420,26 @@ impl<'a> Crew<'a> {
         Ok(Self { campaign, measures, pool, simulations })
     }
 
-    /// Makes the runs from `first` on, and gives their rows to `keep` in order, some at a time.
+    /// Makes `runs`, and gives their rows to `keep` in order, some at a time. `tell` gets the number after the last
+    /// one made.
     fn work(
         &self,
-        first: u64,
+        runs: Range<u64>,
         stop: &AtomicBool,
         tell: &(dyn Fn(u64) + Sync),
         mut keep: impl FnMut(u64, Vec<Row>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let done = AtomicU64::new(first);
-        let mut next = first;
+        let done = AtomicU64::new(runs.start);
+        let mut next = runs.start;
         let mut size = self.simulations.len();
-        while next < self.campaign.runs() && !stop.load(Ordering::Relaxed) {
-            let end = self.campaign.runs().min(next + size as u64);
+        while next < runs.end && !stop.load(Ordering::Relaxed) {
+            let end = runs.end.min(next + size as u64);
             let begin = Instant::now();
             let make = |number: u64| {
                 if stop.load(Ordering::Relaxed) {
                     return None;
                 }
-                let row = self.make(number);
+                let row = self.make(number, &self.campaign.choice(number));
                 tell(done.fetch_add(1, Ordering::Relaxed) + 1);
                 Some(row)
             };
@@ -381,11 +457,12 @@ impl<'a> Crew<'a> {
         Ok(())
     }
 
-    fn make(&self, number: u64) -> Row {
+    /// Makes run `number` from `choice`, on a thread of the pool.
+    pub(super) fn make(&self, number: u64, choice: &Choice) -> Row {
         let thread = rayon::current_thread_index().unwrap_or(0) % self.simulations.len();
         // A run that panicked leaves nothing behind, since the next one begins with a reset.
         let mut simulation =
             self.simulations[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        self.measures.run(self.campaign, &mut simulation, number)
+        self.measures.run_from(self.campaign, &mut simulation, number, choice)
     }
 }

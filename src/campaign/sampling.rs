@@ -25,7 +25,9 @@ pub enum Sampling {
     Sobol,
 }
 
-/// The first stream that belongs to no run; so there are fewer runs than this.
+/// The first stream of [`Sequence`]; those of the runs are below.
+const SEQUENCES: u64 = 1 << 62;
+/// The first stream that belongs to all runs.
 const SHARED: u64 = 1 << 63;
 /// Streams that one dimension may use.
 const PER_DIMENSION: u64 = 16;
@@ -134,6 +136,23 @@ impl Sampler {
                 return place;
             }
         }
+    }
+}
+
+/// Random numbers that belong to no run.
+pub(super) struct Sequence(ChaCha8Rng);
+
+impl Sequence {
+    /// The sequence `number` < 2⁶² under `seed`.
+    pub(super) fn new(seed: u64, number: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(SEQUENCES + number);
+        Self(rng)
+    }
+
+    /// The next number in (0, 1).
+    pub(super) fn unit(&mut self) -> f64 {
+        unit(self.0.next_u64())
     }
 }
 

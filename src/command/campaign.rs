@@ -3,10 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::campaign::{self, Campaign, Measures, Options, Rate, Reader, Summary};
+use super::run::stem;
+use crate::campaign::{self, Campaign, Measures, Options, Progress, Rare, Rate, Reader, Summary};
 use crate::error::{Error, INTERRUPTED};
 use crate::output::{self, Counter, number};
 use crate::report::campaign::{Pages, pages as campaign_pages};
@@ -18,10 +20,10 @@ const AT_ONCE: usize = 1000;
 /// Arguments of `punctual campaign`.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The campaign file (TOML): a system, how many runs, what varies and how
+    /// The campaign file (TOML): a system, how many runs, what varies and how; or what --pack wrote
     campaign: PathBuf,
     /// The Parquet file to write; a campaign that was interrupted goes on from FILE.parts [default: the
-    /// campaign file with the ending .parquet]
+    /// campaign file with the ending .parquet; of a shard .K-of-N.parquet or .FIRST-LAST.parquet, of the worst run of --rare -worst.parquet]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// The number of runs made at once [default: one for each core]
@@ -43,6 +45,22 @@ pub struct Arguments {
     /// Run nothing: list what is drawn for the runs FIRST to LAST - 1, as CSV or JSON
     #[arg(long, value_name = "FIRST..LAST", value_parser = range)]
     list: Option<Range>,
+    /// Run a part alone: the K-th of N equal parts (K from 1), or the runs FIRST to LAST - 1
+    #[arg(long, value_name = "K/N|FIRST..LAST", value_parser = shard, conflicts_with_all = ["list", "report", "require", "worst"])]
+    shard: Option<Shard>,
+    /// Run nothing: join the files of all shards, or those in a folder, to the one Parquet file
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["list", "shard", "threads"])]
+    join: Vec<PathBuf>,
+    /// Estimate the probability of failure, however rare, by subset simulation in independent repeats; write the worst run
+    /// found, which `punctual replay` makes again
+    #[arg(long, value_name = "REPEATS", num_args = 0..=1, require_equals = true, default_missing_value = "20",
+        value_parser = clap::value_parser!(u32).range(5..=10_000),
+        conflicts_with_all = ["list", "shard", "join", "pack", "worst", "report", "require"])]
+    rare: Option<u32>,
+    /// Run nothing: write the campaign with the texts of its system and components into one file, which other
+    /// machines run in its place
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "shard", "join", "output", "threads", "worst", "json", "report", "require"])]
+    pack: Option<PathBuf>,
 }
 
 /// Requirements on a campaign.
@@ -66,6 +84,54 @@ fn range(text: &str) -> Result<Range, String> {
     if range.first < range.last { Ok(range) } else { Err(format!("{text:?} has no run, must rise")) }
 }
 
+/// A part of a campaign, as `--shard` names it.
+#[derive(Clone, Copy, Debug)]
+enum Shard {
+    /// The K-th of N, K from 1.
+    Part(u64, u64),
+    Runs(Range),
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let Some((part, of)) = text.split_once('/') else {
+        return range(text).map(Shard::Runs).map_err(|e| format!("{e}; or K/N, such as 1/8"));
+    };
+    match (part.parse(), of.parse()) {
+        (Ok(part), Ok(of)) if 0 < part && part <= of => Ok(Shard::Part(part, of)),
+        (Ok(_), Ok(_)) => Err(format!("{text:?} is no part, K must be from 1 to N")),
+        _ => Err(format!("{text:?} is not of the form K/N, such as 1/8")),
+    }
+}
+
+impl Shard {
+    /// Its runs, of so many.
+    fn runs(self, all: u64) -> Result<std::ops::Range<u64>, Error> {
+        let wrong = |message: String| Error::configuration("--shard", message);
+        match self {
+            Self::Part(_, of) if of > all => {
+                Err(wrong(format!("is one of {of} parts, must be of at most {all}, the number of runs")))
+            }
+            Self::Part(part, of) => {
+                // At most 2^53 of each.
+                let end = |part: u64| (u128::from(all) * u128::from(part) / u128::from(of)) as u64;
+                Ok(end(part - 1)..end(part))
+            }
+            Self::Runs(range) if range.last > all => {
+                Err(wrong(format!("ends at {}, must be at most {all}, the number of runs", range.last)))
+            }
+            Self::Runs(range) => Ok(range.first..range.last),
+        }
+    }
+
+    /// What its file's name ends in.
+    fn ending(self) -> String {
+        match self {
+            Self::Part(part, of) => format!("{part}-of-{of}.parquet"),
+            Self::Runs(Range { first, last }) => format!("{first}-{last}.parquet"),
+        }
+    }
+}
+
 /// A run as `--list` shows it.
 #[derive(Serialize)]
 struct Drawn<'a> {
@@ -82,6 +148,9 @@ struct Report {
     complete: bool,
     done: u64,
     runs: u64,
+    /// Of a shard: its first run and the next one after it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shard: Option<[u64; 2]>,
     wall_time: f64,
     runs_per_second: f64,
     /// The page and the picture, where they are asked for.
@@ -89,6 +158,16 @@ struct Report {
     report: Vec<String>,
     #[serde(flatten)]
     summary: Option<Summary>,
+}
+
+/// The report on a rare failure, as JSON.
+#[derive(Serialize)]
+struct RareReport {
+    campaign: String,
+    /// The file of the worst run.
+    file: String,
+    #[serde(flatten)]
+    found: Rare,
 }
 
 /// Makes the missing runs, and sums up.
@@ -101,8 +180,17 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if let Some(range) = arguments.list {
         return list(arguments, &campaign, range);
     }
-    let output = arguments.output.clone();
-    let output = output.unwrap_or_else(|| arguments.campaign.with_extension("parquet"));
+    if let Some(path) = &arguments.pack {
+        whole::write(path, campaign.packed())?;
+        output::result(&format!("written: {}", path.display()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(repeats) = arguments.rare {
+        return rare(arguments, &campaign, repeats as usize);
+    }
+    let runs = arguments.shard.map(|shard| shard.runs(campaign.runs())).transpose()?;
+    let ending = arguments.shard.map_or_else(|| "parquet".to_owned(), Shard::ending);
+    let output = arguments.output.clone().unwrap_or_else(|| arguments.campaign.with_extension(ending));
     if let Some(ending) = output.extension().filter(|e| arguments.report && (*e == "html" || *e == "svg")) {
         let message = format!(
             "ends in .{}, the ending of what --report writes beside it; give another ending, such as .parquet",
@@ -113,19 +201,24 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     // A second Ctrl-C ends the program at once, since the kept rows are safe.
     let stop = super::interruption()?;
     // Run.
-    let options = Options { output: output.clone(), threads: arguments.threads };
-    let counter = Counter::new("runs", 0, campaign.runs());
-    let progress = campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?;
-    drop(counter);
+    let all = runs.as_ref().map_or(campaign.runs(), |runs| runs.end - runs.start);
+    let progress = if arguments.join.is_empty() {
+        let options = Options { output: output.clone(), runs: runs.clone(), threads: arguments.threads };
+        let counter = Counter::new("runs", 0, all);
+        campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?
+    } else {
+        campaign::join(&campaign, &arguments.join, &output)?;
+        Progress { done: all, before: 0, wall_time: Duration::ZERO }
+    };
 
     // Sum up.
-    let complete = progress.done == campaign.runs();
+    let complete = progress.done == all;
     let (mut summary, mut pages) = (None, Vec::new());
     let reader = match complete {
-        true => Some(campaign::recorded(&output)?.0),
+        true if runs.is_none() => Some(campaign::recorded(&output)?.0),
         // The page of what there is.
         false if arguments.report => campaign::kept(&campaign, &output)?,
-        false => None,
+        _ => None,
     };
     if let Some(reader) = reader {
         let measures = Measures::new(&campaign);
@@ -141,7 +234,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         file: output.display().to_string(),
         complete,
         done: progress.done,
-        runs: campaign.runs(),
+        runs: all,
+        shard: runs.map(|runs| [runs.start, runs.end]),
         wall_time: seconds,
         runs_per_second: (progress.done - progress.before) as f64 / seconds.max(1e-9),
         report: pages,
@@ -149,12 +243,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     // Tell.
     if progress.before > 0 {
-        output::note(&format!("note: {} of {} runs were there already", progress.before, campaign.runs()));
+        output::note(&format!("note: {} of {all} runs were there already", progress.before));
     }
     if arguments.json {
         output::json(&report);
     } else if let Some(summary) = &report.summary {
         output::result(&text(&report, summary));
+    } else if let Some([first, last]) = report.shard.filter(|_| complete) {
+        let (made, of) = (made(&report), campaign.runs());
+        output::result(&format!(
+            "{all} runs{made}: {first}..{last} of {of}\n\nwritten: {}\n\nonce all are there: punctual campaign {} --join FILE...",
+            report.file, report.campaign
+        ));
     }
     if !complete {
         let page = match &report.report[..] {
@@ -162,9 +262,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             files => format!("; of these there is {}", files.join(", ")),
         };
         output::note(&format!(
-            "interrupted with {} of {} runs kept; the same command goes on from there{page}",
-            progress.done,
-            campaign.runs()
+            "interrupted with {} of {all} runs kept; the same command goes on from there{page}",
+            progress.done
         ));
         return Ok(ExitCode::from(INTERRUPTED));
     }
@@ -229,6 +328,55 @@ fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
+/// Estimates the probability of failure.
+fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<ExitCode, Error> {
+    let worst = || arguments.campaign.with_file_name(format!("{}-worst.parquet", stem(&arguments.campaign)));
+    let output = arguments.output.clone().unwrap_or_else(worst);
+    let stop = super::interruption()?;
+    let counter = Counter::new("repeats", 0, repeats as u64);
+    let found = campaign::rare(campaign, &output, arguments.threads, repeats, &stop, &|done| {
+        counter.update(done as u64);
+    })?;
+    drop(counter);
+    let Some(found) = found else {
+        output::note("interrupted; of an estimate nothing is kept");
+        return Ok(ExitCode::from(INTERRUPTED));
+    };
+    let report = RareReport {
+        campaign: arguments.campaign.display().to_string(),
+        file: output.display().to_string(),
+        found,
+    };
+    if arguments.json {
+        output::json(&report);
+    } else {
+        output::result(&rare_text(&report));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {
+    let Rare { probability, interval: [low, high], repeats, levels, runs, plain_runs, worst } = found;
+    let mut rows = vec![["the worst", "value", "unit"].map(str::to_owned).to_vec()];
+    rows.extend(worst.values.iter().map(|v| vec![v.name.clone(), format!("{:?}", v.value), v.unit.clone()]));
+    rows.push(vec!["least h".into(), worst.least_h.map_or("-".into(), number), String::new()]);
+    format!(
+        "probability of failure {probability:.3e}, 95 % interval {low:.2e} to {high:.2e}\n\n\
+         {repeats} repeats over {} levels of h, {runs} runs; plain sampling takes {plain_runs:.1e} for the same\n\n{}\n\n\
+         written: {file}\n\nagain, with pictures: punctual replay {file} --run 0 --out out",
+        levels.len(),
+        output::table(&rows, &[false, true, false])
+    )
+}
+
+/// What the runs took, if any were made.
+fn made(report: &Report) -> String {
+    match report.wall_time {
+        0.0 => String::new(),
+        time => format!(" in {time:.3} s ({} runs/s)", number(report.runs_per_second)),
+    }
+}
+
 fn text(report: &Report, summary: &Summary) -> String {
     let part = |rate: &Rate| {
         let [low, high] = rate.interval.map(|end| format!("{:.4}", 100.0 * end));
@@ -255,10 +403,7 @@ fn text(report: &Report, summary: &Summary) -> String {
         vec![case.run.to_string(), case.least_h.map_or("-".to_owned(), number), verdict]
     }));
     let worst = output::table(&rows, &[true, true, false]);
-    let made = match report.wall_time {
-        0.0 => String::new(),
-        time => format!(" in {time:.3} s ({} runs/s)", number(report.runs_per_second)),
-    };
+    let made = made(report);
     let again = summary.worst.first().map_or_else(String::new, |case| {
         format!("\n\nagain, with pictures: punctual replay {} --run {} --out out", report.file, case.run)
     });

@@ -69,14 +69,16 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     // Read the recorded row.
     let (reader, source) = campaign::recorded(path)?;
     let campaign = Campaign::of(source, path, path)?;
-    if run >= reader.rows() {
-        let message = format!("is {run}, must be from 0 to {}", reader.rows().saturating_sub(1));
+    let runs = campaign::runs(&reader);
+    if !runs.contains(&run) {
+        let message = format!("is {run}, must be from {} to {}", runs.start, runs.end.saturating_sub(1));
         return Err(Error::configuration("--run", message));
     }
     let measures = Measures::new(&campaign);
     // Rows are in order, in groups of equal size.
-    let group = usize::try_from(run / GROUP as u64).unwrap_or(usize::MAX);
-    let recorded = reader.group(group, measures.columns())?.into_iter().nth((run % GROUP as u64) as usize);
+    let place = run - runs.start;
+    let group = usize::try_from(place / GROUP as u64).unwrap_or(usize::MAX);
+    let recorded = reader.group(group, measures.columns())?.into_iter().nth((place % GROUP as u64) as usize);
     let recorded = recorded.ok_or_else(|| Error::configuration("--run", "is not in the file"))?;
 
     // Measure the run again, and compare.

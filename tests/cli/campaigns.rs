@@ -598,3 +598,232 @@ fn the_example_runs() {
         assert!(workshop.text(&format!("out/unicycle-1-{picture}.svg")).trim_end().ends_with("</svg>"));
     }
 }
+
+/// Parts made apart, one of them killed on the way, are the campaign of one machine; whatever is no part of it is named.
+#[test]
+fn shards_join_to_the_campaign_of_one_machine() {
+    let workshop = workshop(20, "latin_hypercube");
+    workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet"]).success();
+    let shard = |part: &str| workshop.punctual(["campaign", "c.toml", "--shard", part]);
+    for part in ["1/3", "3/3"] {
+        shard(part).success();
+    }
+    let join = |files: &[&str]| {
+        let fixed = ["campaign", "c.toml", "-o", "joined.parquet", "--join"];
+        workshop.punctual([fixed.as_slice(), files].concat())
+    };
+    let (first, second, third) = ("c.1-of-3.parquet", "c.2-of-3.parquet", "c.3-of-3.parquet");
+    join(&[third, first])
+        .fails(2, "--join: the runs 6..13 are in none of the 2 files; `--shard 6..13` makes them");
+    join(&[first]).fails(2, "--join: the runs 6..20 are in none of the 1 files; `--shard 6..20` makes them");
+    assert!(shard("2/3").success().starts_with("7 runs in "));
+    join(&[first, second, third, second]).fails(
+        2,
+        "--join: the runs 6..13 are both in c.2-of-3.parquet and in c.2-of-3.parquet; leave one out",
+    );
+    // Half of a file, and none at all, though it was begun.
+    let bytes = workshop.bytes(second);
+    workshop.write("half.parquet", &bytes[..bytes.len() / 2]);
+    join(&[first, "half.parquet", third]).fails_like(
+        2,
+        "--join: half.parquet is no part of a campaign, or only half of one: ",
+        &["make it again with --shard"],
+    );
+    fs::create_dir(workshop.path("begun.parquet.parts")).expect("a folder");
+    join(&[first, "begun.parquet", third]).fails(
+        2,
+        "--join: begun.parquet is not complete: what is there is in begun.parquet.parts, and the same --shard goes on",
+    );
+    // Another version, where the text stands in the file.
+    let mut other = bytes.clone();
+    let key = other.windows(16).position(|w| w == b"punctual.version").expect("the key");
+    let ours = env!("CARGO_PKG_VERSION").as_bytes();
+    let at = key + other[key..].windows(ours.len()).position(|w| w == ours).expect("the version");
+    other[at] = b'9';
+    workshop.write("older.parquet", other);
+    join(&[first, "older.parquet", third]).fails_like(
+        2,
+        "--join: older.parquet was made by version 9",
+        &["of this program, this is version"],
+    );
+    // Other campaigns.
+    let other = |name: &str| {
+        workshop.punctual(["campaign", "other.toml", "--shard", "6..13", "-o", name]).success();
+    };
+    let refused = |name: &str, message: &str| {
+        let expected = format!("--join: {name} is a part of another campaign: {message}");
+        join(&[first, name, third]).fails(2, &expected);
+    };
+    let of_file = |name: &str, text: String, message: &str| {
+        workshop.write("other.toml", text);
+        other(name);
+        refused(name, message);
+    };
+    let text = file(20, "latin_hypercube");
+    of_file("seed.parquet", text.replace("seed = 7", "seed = 8"), "its seed is 8, must be 7");
+    of_file("runs.parquet", file(21, "latin_hypercube"), "it is one of 21 runs, must be of 20");
+    let wider = text.replace("deviation = 2", "deviation = 3");
+    of_file("file.parquet", wider, "its campaign file has another text");
+    let of_part = |name: &str, part: &str, more: &str, message: &str| {
+        let before = workshop.text(part);
+        workshop.write(part, format!("{before}{more}"));
+        other(name);
+        workshop.write(part, before);
+        refused(name, message);
+    };
+    workshop.write("other.toml", text);
+    of_part("system.parquet", "system.toml", "# another\n", "its system file has another text");
+    let message = "its component \"plant\" has another configuration";
+    of_part("plant.parquet", "plant.toml", "[disturbance]\nperiod = 0.1\ninputs = { a = 0.1 }\n", message);
+    assert!(!workshop.path("joined.parquet").exists() && !workshop.path("joined.parquet.parts").exists());
+
+    // A folder stands for its files. The rows are those of one machine, and what is told of them too.
+    fs::create_dir(workshop.path("all")).expect("a folder");
+    for name in [first, second, third] {
+        workshop.write(&format!("all/{name}"), workshop.bytes(name));
+    }
+    let report: Value = serde_json::from_str(&join(&["all", "--json", "--report"]).success()).expect("JSON");
+    assert!(workshop.bytes("joined.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+    assert_eq!((&report["runs"], &report["report"][0]), (&20.into(), &"joined.html".into()));
+    // A part tells its own runs, and no others.
+    workshop.punctual(["replay", second, "--run", "6"]).success();
+    workshop.punctual(["replay", second, "--run", "12"]).success();
+    workshop.punctual(["replay", second, "--run", "13"]).fails(2, "--run: is 13, must be from 6 to 12");
+    workshop.punctual(["campaign", "c.toml", "--shard", "2/4", "-o", second]).fails(
+        2,
+        "--output: c.2-of-3.parquet has the runs 6..13 of this campaign, must have 5..10; remove it, or give another \
+         output",
+    );
+    shard("0/3").fails_like(2, "invalid value '0/3'", &["K must be from 1 to N"]);
+    shard("3").fails_like(2, "invalid value '3'", &["such as 0..100; or K/N, such as 1/8"]);
+    shard("1/21").fails(2, "--shard: is one of 21 parts, must be of at most 20, the number of runs");
+    shard("6..21").fails(2, "--shard: ends at 21, must be at most 20, the number of runs");
+}
+
+/// A shard that was killed goes on, and only as that shard.
+#[test]
+fn a_shard_can_be_ended_at_any_point() {
+    let workshop = workshop(MANY, "random");
+    workshop.write("system.toml", workshop.text("system.toml").replace(STEP, "step = 0.25"));
+    let mut child = begin(&workshop, &["--threads", "1", "--shard", "2/2"]);
+    wait(&workshop, &mut child, 0, Duration::from_millis(5));
+    let sent = Command::new("kill").args(["-KILL", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    child.wait().expect("a child");
+    let before = kept(&workshop) - MANY / 2;
+    assert!(before > 0 && before < MANY / 2, "{before}");
+    let shard =
+        |part: &str, output: &str| workshop.punctual(["campaign", "c.toml", "--shard", part, "-o", output]);
+    shard("1/2", "cut.parquet").fails_like(2, "--output: cut.parquet.parts is of another campaign", &[]);
+    let resumed = shard("2/2", "cut.parquet");
+    assert_eq!(resumed.stderr, format!("note: {before} of {} runs were there already\n", MANY / 2));
+    resumed.success();
+    shard("2/2", "whole.parquet").success();
+    assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+}
+
+/// One file is enough on another machine; one that was changed or is of another version is none.
+#[test]
+fn a_packed_campaign_needs_no_other_file() {
+    let workshop = with_fmus(6, "random");
+    workshop.punctual(["campaign", "c.toml"]).success();
+    workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
+    let packed = workshop.text("c.json");
+    let elsewhere = Workshop::new();
+    elsewhere.write("c.json", &packed);
+    elsewhere.punctual(["campaign", "c.json"]).success();
+    assert!(elsewhere.bytes("c.parquet") == workshop.bytes("c.parquet"), "the bytes differ");
+    let refused = |text: String, message: &str| {
+        elsewhere.write("other.json", text);
+        elsewhere.punctual(["campaign", "other.json"]).fails_like(2, "other.json: ", &[message]);
+    };
+    refused(packed.replace("seed = 7", "seed = 8"), "was changed after `--pack` wrote it");
+    refused(
+        packed.replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1),
+        "was packed by version 0.0.0 of this program",
+    );
+    refused(packed[..packed.len() / 2].to_owned(), "is no whole campaign that `--pack` wrote");
+}
+
+/// A plant whose way is the sum of four normal numbers times 1 - exp(-2), and a wall at `d` (m) that nothing keeps it
+/// from: the filter acts on nothing.
+fn drifting(workshop: &Workshop, d: f64) -> String {
+    let model = "[plant]\nstates = [{ name = \"x\", unit = \"m\" }, { name = \"a\" }, { name = \"b\" }, { name = \"c\" }, \
+                 { name = \"d\" }]\ninputs = [{ name = \"u\" }]\n[plant.derivatives]\n\
+                 x = \"a + b + c + d + u\"\na = \"-a\"\nb = \"-b\"\nc = \"-c\"\nd = \"-d\"\n";
+    workshop.write("plant.toml", format!("kind = \"plant\"\n{model}"));
+    let barrier = format!("[[barrier]]\nname = \"wall\"\nexpression = \"{d:?} - x\"\n");
+    workshop.write("filter.toml", format!("kind = \"filter\"\nassurance = \"off\"\n{model}{barrier}"));
+    let states = ["x", "a", "b", "c", "d"];
+    let connected = states.map(|state| {
+        format!("[[system.connection]]\nfrom = \"plant.x.{state}\"\nto = \"filter.x.{state}\"\n")
+    });
+    let varied = states[1..].iter().map(|state| {
+        format!("[vary.\"plant.x0.{state}\"]\ndistribution = \"normal\"\nmean = 0\ndeviation = 1\n")
+    });
+    let system = "[system.experiment]\nstop_time = 2.0\nstep = 1.0\n\
+                  [[system.component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
+                  [[system.component]]\nname = \"plant\"\nfmu = \"plant.toml\"\n\
+                  start = { \"u.u\" = 0.0, inner_step = 0.1 }\n";
+    let campaign = "[campaign]\nruns = 1\nsuccess = \"on_time_and_inside\"\n";
+    [system, &connected.concat(), campaign, &varied.collect::<String>()].concat()
+}
+
+/// A probability that is known, and the worst run again.
+#[test]
+fn a_rare_failure_is_estimated_and_shown() {
+    let workshop = Workshop::new();
+    // 2.17009 deviations, 2 (1 - exp(-2)) m each: fifteen in a thousand, by tables of the normal distribution.
+    let text = drifting(&workshop, 2.170_090 * 2.0 * (1.0 - (-2.0_f64).exp()));
+    workshop.write("c.toml", &text);
+    let rare = |more: &[&str]| workshop.punctual([&["campaign", "c.toml"], more].concat());
+    let report: Value = serde_json::from_str(&rare(&["--rare=5", "--json"]).success()).expect("JSON");
+    let interval = numbers(&report["interval"]);
+    assert!(interval[0] < 0.015 && 0.015 < interval[1], "{report}");
+    assert!(interval[0] > 0.0075 && interval[1] < 0.03, "{report}");
+    let levels = numbers(&report["levels"]);
+    assert!(levels.len() == 2 && levels.is_sorted_by(|a, b| a > b) && levels[1] >= 0.0, "{levels:?}");
+    // Where it says, and as bad as it says.
+    let values = report["worst"]["values"].as_array().expect("a list");
+    let sum: f64 = values.iter().filter_map(|value| value["value"].as_f64()).sum();
+    let least = report["worst"]["least_h"].as_f64().expect("a number");
+    assert!(least < 0.0 && values.len() == 4);
+    let expected = (2.170_090 * 2.0 - sum) * (1.0 - (-2.0_f64).exp());
+    assert!((least - expected).abs() < 1e-3, "{least}, not {expected}");
+    let again = workshop.punctual(["replay", "c-worst.parquet", "--run", "0"]).success();
+    assert!(again.contains("the row is as recorded, bit for bit") && again.contains("not kept"), "{again}");
+    let (names, rows) = rows(&workshop.path("c-worst.parquet"));
+    let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
+    assert_eq!(number(&rows[0][place]).map(f64::to_bits), Some(least.to_bits()));
+    // The number of threads does not show.
+    let one = rare(&["--rare=5", "--json", "--threads", "1", "-o", "again.parquet"]).success();
+    let one: Value = serde_json::from_str(&one).expect("JSON");
+    assert_eq!((&one["probability"], &one["interval"]), (&report["probability"], &report["interval"]));
+    assert!(workshop.bytes("again.parquet") == workshop.bytes("c-worst.parquet"), "the bytes differ");
+
+    rare(&["--rare"])
+        .fails(2, "--output: c-worst.parquet is there already; remove it, or give another output");
+    rare(&["--rare=4"]).fails_like(2, "invalid value '4' for '--rare", &[]);
+    let refused = |text: String, message: &str| {
+        workshop.write("c.toml", text);
+        rare(&["--rare=5", "-o", "none.parquet"]).fails_like(2, message, &[]);
+        assert!(!workshop.path("none.parquet").exists());
+    };
+    let success = "success = \"on_time_and_inside\"\n";
+    refused(text.replace(success, ""), "campaign.success: is \"kept\"; --rare goes by h, so it must be");
+    let (system, _) = text.split_once("[vary.").expect("the first table");
+    refused(system.to_owned(), "vary: is empty, so that all runs are alike");
+    let plant = workshop.text("plant.toml");
+    workshop.write("plant.toml", plant + "[disturbance]\nperiod = 0.1\ninputs = { u = 0.1 }\n");
+    let seed = "[vary.\"plant.disturbance.seed\"]\ndistribution = \"seed\"\n";
+    refused(
+        text.clone() + seed,
+        "vary.\"plant.disturbance.seed\".distribution: is \"seed\"; --rare comes to failures by small steps",
+    );
+    // A start that nothing makes fail: there is no way on, which is no probability.
+    let narrow = text.replace(
+        "distribution = \"normal\"\nmean = 0\ndeviation = 1",
+        "distribution = \"choice\"\nvalues = [0.0, 0.1]",
+    );
+    refused(narrow, "--rare: found no way to a failure: the least h that ");
+}

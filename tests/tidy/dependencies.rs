@@ -303,6 +303,7 @@ fn each_dependency_is_named_in_one_place() {
             &["rayon", ":", ":"],
             &[
                 "src/campaign/runner.rs",
+                "src/campaign/splitting.rs",
                 "src/command/map.rs",
                 "src/reproduce/",
                 "python/src/pool.rs",

@@ -39,7 +39,7 @@ pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, OutputSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use punctual_models::{Functions, mentions};
-pub use read::{ConfigurationError, read_toml};
+pub use read::{ConfigurationError, read_toml, write_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};
 
@@ -115,9 +115,9 @@ impl Configuration {
     /// None in practice: the types always have a TOML form.
     pub fn canonical(&self) -> Result<String, ConfigurationError> {
         match self {
-            Self::Filter(c) => read::write_toml(c),
-            Self::Plant(c) => read::write_toml(c),
-            Self::Controller(c) => read::write_toml(c),
+            Self::Filter(c) => write_toml(c),
+            Self::Plant(c) => write_toml(c),
+            Self::Controller(c) => write_toml(c),
         }
     }
 

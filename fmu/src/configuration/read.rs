@@ -92,6 +92,10 @@ fn hint(text: &str, at: usize) -> &'static str {
 }
 
 /// A value as TOML text.
-pub(super) fn write_toml<T: Serialize>(value: &T) -> Result<String, ConfigurationError> {
+///
+/// # Errors
+///
+/// A value that TOML has no form for, such as one that is missing in a list.
+pub fn write_toml<T: Serialize>(value: &T) -> Result<String, ConfigurationError> {
     toml::to_string(value).map_err(|e| ConfigurationError::new("", e.to_string()))
 }
