@@ -79,7 +79,7 @@ fn bicycle() -> Bicycle {
 
 fn held<P: ControlAffine<4, 2> + Copy + Send + 'static>(plant: P, obstacles: usize, period: f64, times: u32) {
     let builder = obstructed(plant, obstacles).sampling(Sampling::default()).expect("valid settings");
-    let mut drive = Drive::recorded(builder, plant, period);
+    let mut drive = Drive::recorded(builder, &plant, period);
     for _ in 0..times {
         black_box(drive.step());
     }

@@ -74,7 +74,7 @@ impl Outline {
     }
 
     /// The outline of barrier `index` of `filter`, an expression of the place alone, in the square around `ranges` and beyond,
-    /// until all of it is seen, within [`REACHES`]. The place is the states `plane`; the others have the values of `x`, which
+    /// until all of it is seen, up to four times as large. The place is the states `plane`; the others have the values of `x`, which
     /// do not matter. `None` where h = 0 is nowhere there.
     ///
     /// # Errors

@@ -76,7 +76,7 @@ pub(crate) struct Drive {
 
 impl Drive {
     /// The loop of a filter and `plant` at the `period` (s), without the first samples, in which the period is measured.
-    pub(crate) fn recorded<P: ControlAffine<4, 2>>(builder: FilterBuilder, plant: P, period: f64) -> Self {
+    pub(crate) fn recorded<P: ControlAffine<4, 2>>(builder: FilterBuilder, plant: &P, period: f64) -> Self {
         const FIRST: usize = 5;
         const SAMPLES: usize = 55;
         let mut filter = builder.build().expect("valid filter");
@@ -91,7 +91,7 @@ impl Drive {
                 samples.push((t, x));
             }
             filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
-            x = rk4_step(&plant, &x.into(), &u.into(), period).into();
+            x = rk4_step(plant, &x.into(), &u.into(), period).into();
         }
         filter.restore(&begin).expect("its own state");
         Self { filter, begin, samples, next: 0 }
