@@ -19,6 +19,10 @@ pub(super) struct WitnessReport {
     /// What no plan accounts for yet, or what the nearest one fails at.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
+    /// Where none ends at rest, a `plan_horizon` in s with which there is one, and the time in s until which that keeps every
+    /// promise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    in_motion: Option<[f64; 2]>,
     /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
     left_out: Vec<String>,
     /// The least factor of all deadlines with which a plan was found.
@@ -60,6 +64,7 @@ pub(super) fn find(
     let refused = |reason: String| WitnessReport {
         found: false,
         reason: Some(reason),
+        in_motion: in_motion(c, x0),
         left_out: Vec::new(),
         soonest_factor: None,
         soonest: Vec::new(),
@@ -110,12 +115,27 @@ pub(super) fn find(
     Ok(Some(WitnessReport {
         found: configured.is_ok(),
         reason,
+        in_motion: if configured.is_err() { in_motion(c, x0) } else { None },
         left_out,
         soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
         soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: shown.map(plan),
         files,
     }))
+}
+
+/// A `plan_horizon` for a file that has none, as long as its latest deadline, and until when there is a plan with it.
+fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
+    if c.plan_horizon.is_some() {
+        return None;
+    }
+    let latest = c.barrier.iter().filter_map(|barrier| barrier.deadline).fold(0.0, f64::max);
+    let horizon = if latest > 0.0 { latest } else { c.experiment.stop_time - c.experiment.start_time };
+    let mut c = c.clone();
+    c.plan_horizon = Some(horizon);
+    let filter = c.assured(c.build().ok()?).ok()?;
+    let until = filter.foresee(c.experiment.start_time, x0, 1.0).ok()?.until;
+    until.is_finite().then_some([horizon, until])
 }
 
 impl WitnessReport {
@@ -146,6 +166,13 @@ impl WitnessReport {
             (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
             (false, None) => "\nwitness: NONE was found".to_owned(),
         }];
+        if let Some([horizon, until]) = self.in_motion {
+            lines.push(format!(
+                "none ends at rest; with plan_horizon = {} there is one until {} s, to be prolonged on the way",
+                number(horizon),
+                number(until)
+            ));
+        }
         if !self.left_out.is_empty() {
             lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
         }

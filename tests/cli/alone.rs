@@ -396,6 +396,47 @@ fn two_vehicles_in_one_model_avoid_each_other() {
     assert!(nearest >= 3.0, "{nearest} m");
 }
 
+/// What is promised of it has an end, which `check` and the run tell, and which is put off.
+#[test]
+fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
+    let workshop = Workshop::new();
+    let file = String::from_utf8(fs::read(examples().join("../models/aeroplane.toml")).expect("the example"));
+    let file = file.expect("a text").replace("stop_time = 120.0", "stop_time = 45.0");
+    workshop.write("plane.toml", &file);
+    let checked = workshop.punctual(["check", "plane.toml"]).success();
+    assert!(
+        checked.contains("outside, h = -215.41 m; guaranteed until 60.8 s, whatever u_ref is"),
+        "{checked}"
+    );
+    assert!(
+        checked.contains("whatever u_ref is, until 60.8 s; it is prolonged where one is found"),
+        "{checked}"
+    );
+    workshop.punctual(["run", "plane.toml", "--require", "on_time_and_inside"]).success();
+    let table = Table::parse(&workshop.text("plane/plane.csv"));
+    let until = table.column("filter.assured_until");
+    assert!(until.is_sorted() && until[0] > 50.0 && until[until.len() - 1] > 65.0, "{until:?}");
+    // Without a horizon it says what to do; where no plans are followed, that there is none to prolong.
+    workshop.write("plane.toml", file.replace("plan_horizon = 20.0", ""));
+    let refused = workshop.punctual(["check", "plane.toml"]);
+    assert!(refused.code == 1 && refused.stdout.contains("witness: NONE was found"), "{refused:#?}");
+    assert!(
+        refused.stdout.contains("none ends at rest; with plan_horizon = 30 there is one until "),
+        "{refused:#?}"
+    );
+    for (value, message) in [
+        ("0.01", "plan_horizon: is 0.01 s, must be finite, and at least a step (0.05 s)"),
+        (
+            "20.0\nassurance = \"off\"",
+            "plan_horizon: is for plans, of which there are none: assurance is \"off\"",
+        ),
+    ] {
+        workshop.write("plane.toml", file.replace("= 20.0 # s", &format!("= {value}")));
+        let done = workshop.punctual(["check", "plane.toml"]);
+        assert!(done.code != 0 && done.stderr.contains(message), "{done:#?}");
+    }
+}
+
 #[test]
 fn a_campaign_takes_a_file_alone() {
     let workshop = Workshop::new();
