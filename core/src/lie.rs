@@ -22,7 +22,7 @@ mod embedded;
 mod external;
 mod source;
 
-pub use ahead::{Ahead, SUBSTEPS, flow};
+pub use ahead::{Ahead, SUBSTEPS, flow, is_even};
 
 use alloc::boxed::Box;
 use core::array::from_fn;
