@@ -20,7 +20,7 @@ from ._command import run
 from ._error import Error
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client as _Client, Future as _Future
 
 _SECONDS = 5.0  # that the runs of a batch take together: the most that a lost worker loses
 _GROWTH = 4  # largest growth of a batch from one to the next, as a factor
@@ -31,7 +31,7 @@ def campaign(
     file: str | os.PathLike[str],
     output: str | os.PathLike[str] | None = None,
     *,
-    client: Client | str | None = None,
+    client: _Client | str | None = None,
     batch: int | None = None,
 ) -> dict[str, Any]:
     """Makes the runs of a campaign file; returns the report of `punctual campaign --json`.
@@ -157,9 +157,9 @@ def _segment(text: str, first: int, end: int) -> tuple[bytes, float]:
 
 
 @contextmanager
-def _batches(client: Client) -> Iterator[dict[Future, tuple[int, int]]]:
+def _batches(client: _Client) -> Iterator[dict[_Future, tuple[int, int]]]:
     """Batches on their way; what is left of them at the end is given up."""
-    flying: dict[Future, tuple[int, int]] = {}
+    flying: dict[_Future, tuple[int, int]] = {}
     try:
         yield flying
     finally:
@@ -167,7 +167,7 @@ def _batches(client: Client) -> Iterator[dict[Future, tuple[int, int]]]:
             client.cancel(list(flying))
 
 
-def _spread(client: Client, kept: _Kept, batch: int | None) -> None:
+def _spread(client: _Client, kept: _Kept, batch: int | None) -> None:
     """Has the workers make the runs that are missing."""
     from distributed import wait
 
