@@ -556,6 +556,50 @@ fn what_was_missed_is_not_taken_up_again() {
     assert_eq!(step(&mut filter, 7.9 + PERIOD, inside), Standing::Assured);
 }
 
+/// A promise that is lost, since the plant is not the model, is given again where a plan keeps it; what was broken is not.
+#[test]
+fn a_lost_promise_is_taken_up_again() {
+    let mut random = Random(5);
+    for (run, hits) in [false, true, false, true, false].into_iter().enumerate() {
+        let vehicle = [Vehicle::PointMass, Vehicle::Unicycle][run % 2];
+        let bounds = [8.0, if run % 2 == 0 { 8.0 } else { 2.0 }];
+        let (mut filter, mut u) = (vehicle.assured(8.0, bounds), [0.0; 2]);
+        let mut x = [0.0, 0.0, random.between(-0.4, 0.4), random.between(-0.5, 0.5)];
+        let gone = [vec![-300.0, 40.0, 0.0, 0.0], vec![OBSTACLE.0[0], OBSTACLE.0[1], 0.0, 0.0]];
+        let (mut lost, mut again) = (0, 0);
+        for k in 0..600_u32 {
+            let t = f64::from(k) * PERIOD;
+            // Somebody carries it away, and back.
+            let is_away = (60..66).contains(&k);
+            let seen: &[f64] = if is_away { &gone[usize::from(hits)] } else { &x };
+            let wish = wanted(vehicle, u64::from(k) / 40 % 5, x, bounds, &mut random);
+            let assurance = *filter.step(t, seen, &wish, &mut u).expect("right dimensions");
+            let [flag, backed] =
+                [filter.report().barriers[0].guaranteed, filter.report().status == Status::Backup];
+            assert_eq!(flag, assurance.is_assured(), "{run} {t}");
+            match assurance.standing {
+                Standing::Assured => assert!(k < 60 || !is_away && !hits, "{run} {t}"),
+                Standing::Withdrawn => {
+                    assert!(k >= 60 && assurance.failure.is_some() && !backed, "{run} {t}");
+                    lost += 1;
+                }
+                other => panic!("{run} {t}: {other:?}"),
+            }
+            again += u32::from(k > 66 && assurance.is_assured());
+            if !is_away {
+                x = vehicle.move_by(x, u, PERIOD);
+            }
+            if assurance.is_assured() {
+                let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+                assert!(distance(OBSTACLE.0) >= OBSTACLE.1, "{run} {t}: {x:?}");
+                assert!(t + PERIOD < 8.0 || distance(GOAL.0) <= GOAL.1, "{run} {t}: {x:?}");
+            }
+        }
+        // At the first sample back.
+        assert_eq!((lost, again), if hits { (540, 0) } else { (6, 533) }, "{run}");
+    }
+}
+
 /// The derivative of each piece, beside central differences of it.
 #[test]
 fn derivatives_are_those_of_the_piece_in_force() {

@@ -24,7 +24,7 @@ use crate::configuration::{
 pub const LOG_CATEGORIES: [(&str, &str); 3] = [
     ("logStatusError", "calls that failed, with the reason"),
     ("logEvents", "what happened: instantiation, initialization, reset"),
-    ("logStatusWarning", "promises that were refused or withdrawn, with the reason"),
+    ("logStatusWarning", "promises that were refused or withdrawn, with the reason, or given again"),
 ];
 
 /// Everything derived from one configuration.

@@ -219,21 +219,29 @@ fn what_is_not_promised_is_said_in_words() {
     slave.step(3.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), Standing::Withdrawn as i32);
     assert!(slave.log.messages()[0].starts_with("the promise is withdrawn ("), "{:?}", slave.log.messages());
+    // Back again, it is given again, which is said once too.
+    for k in 4..6 {
+        sample(&slave, [0.0, 0.0, 1.0, 0.0]);
+        slave.step(f64::from(k) * STEP, STEP);
+        assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+    }
+    let said = slave.log.messages();
+    assert!(said.len() == 2 && said[1].starts_with("the promise is assured again"), "{said:?}");
     // What is read ahead of the step that decides anew is what the step says.
     slave.set_flag("rearm", true);
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
     let read = (slave.integer("assurance"), slave.flag("goal.guaranteed"));
     assert_eq!(read, (Standing::Assured as i32, true));
-    slave.step(4.0 * STEP, STEP);
+    slave.step(6.0 * STEP, STEP);
     // A refused step has no plan behind its input.
-    slave.refused(slave.try_step(5.0 * STEP, -1.0));
+    slave.refused(slave.try_step(7.0 * STEP, -1.0));
     assert!(slave.integer("assurance") == Standing::Undecided as i32 && !slave.flag("goal.guaranteed"));
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
-    slave.step(5.0 * STEP, STEP);
+    slave.step(7.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
     // Late.
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
-    slave.step(10.0 * STEP, STEP);
+    slave.step(12.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), Standing::Irregular as i32);
 }
 

@@ -71,10 +71,11 @@ pub enum Standing {
     Assured = 1,
     /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
     Refused = 2,
-    /// Was assured, and is no more: the plant is not where the model led.
+    /// Was assured, and is not now: the plant is not where the model led. Until something promised is missed the promise is
+    /// taken up again at the first sample from which a plan keeps it.
     Withdrawn = 3,
     /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
-    /// from there. After a late one the promise is taken up again at the next sample in time, if a plan keeps it from there.
+    /// from there. It is taken up again as one that is withdrawn, after a late sample at the next one in time.
     Irregular = 4,
     /// Was assured until a time, which has come: no plan was found beyond it.
     Expired = 5,
@@ -140,9 +141,12 @@ pub struct Commitment {
     pub standing: Standing,
     /// Why there is no plan, where the promise was refused or withdrawn.
     failure: Option<Failure>,
-    /// One of each barrier; `None` where nothing is promised.
+    /// One of each barrier; `None` where nothing is promised, or no more.
     promises: Vec<Option<Promise>>,
     plan: Plan,
+    /// Where the plan was lost: when, in s, and when another one is next searched for.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    lost: Option<[f64; 2]>,
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     share: f64,
@@ -152,6 +156,19 @@ pub struct Commitment {
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     sample: Option<[f64; 2]>,
+}
+
+impl Commitment {
+    /// Whether the promise stands, or may be taken up again.
+    fn is_followed(&self) -> bool {
+        match self.standing {
+            Standing::Assured => true,
+            Standing::Undecided | Standing::Refused => false,
+            Standing::Withdrawn | Standing::Irregular | Standing::Expired => {
+                self.promises.iter().any(Option::is_some)
+            }
+        }
+    }
 }
 
 /// h ≥ 0 from one time in s until another, and the margin that plans keep.
@@ -546,7 +563,7 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, share, prolong_at, sample, .. } = commitment;
+        let Commitment { standing, promises, plan, lost, share, prolong_at, sample, .. } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -554,7 +571,7 @@ impl AssuredFilter {
         if *standing == Standing::Undecided && state.time.is_some() {
             return refuse("standing", "is undecided, beside samples that were decided on");
         }
-        if matches!(standing, Standing::Assured | Standing::Irregular) {
+        if commitment.is_followed() {
             if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
                 return refuse("plan", flaw);
             }
@@ -570,6 +587,9 @@ impl AssuredFilter {
             }
             if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
                 return refuse("sample", "has no time, must have one beside a plan");
+            }
+            if lost.iter().flatten().any(|t| !t.is_finite()) {
+                return refuse("lost", "is at a time that is not finite");
             }
         }
         self.rows.filter_mut().restore(state)?;
@@ -635,7 +655,8 @@ impl AssuredFilter {
             return Ok(&self.assurance);
         }
         self.looked = None;
-        self.rows.filter_mut().is_backed = self.is_followed() && self.in_time(t, hold);
+        self.rows.filter_mut().is_backed =
+            self.commitment.is_followed() && self.commitment.lost.is_none() && self.in_time(t, hold);
         self.rows.peek(t, hold, x, u_ref, u)?;
         self.sample(t, hold, x, u_ref, u);
         let mut inside = [0.0; MAX_INPUTS];
@@ -703,12 +724,16 @@ impl AssuredFilter {
         }
         if self.next.standing == Standing::Undecided && is_valid {
             self.decide(t, hold, x, u);
-        } else if self.is_followed() {
+        } else if self.commitment.is_followed() {
             match (self.in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
                 (true, None) if is_valid => self.end(Standing::Assured, None),
                 (true, None) => {}
                 (false, None) => self.end(Standing::Irregular, None),
-                (_, failure) => self.end(Standing::Withdrawn, failure),
+                // For good.
+                (_, failure) => {
+                    self.end(Standing::Withdrawn, failure);
+                    self.next.promises.fill(None);
+                }
             }
         }
         (self.assurance.driver, self.piece) = (Driver::Rows, Piece::ROWS);
@@ -731,15 +756,9 @@ impl AssuredFilter {
         let is_assured = *standing == Standing::Assured;
         (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
         self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { plan.witness.until });
-        if is_assured {
+        if is_assured || u != &rows[..u.len()] {
             self.report_on(&rows[..u.len()], u);
         }
-    }
-
-    /// Whether the promise stands, or came late at the last sample only and may be taken up again.
-    fn is_followed(&self) -> bool {
-        let Commitment { standing, failure, .. } = &self.commitment;
-        *standing == Standing::Assured || *standing == Standing::Irregular && failure.is_none()
     }
 
     /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
@@ -757,10 +776,12 @@ impl AssuredFilter {
         self.next.promises.iter().zip(self.models()).enumerate().find_map(|(barrier, (promise, model))| {
             let Promise { from, until, .. } = (*promise)?;
             let h = model.value(t, x);
+            // One that begins with this sample is seen at it.
+            let begins = t - 2.0 * ON_TIME * self.period;
             match from <= t && t < until {
                 // Not-a-number is outside too.
                 true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),
-                true if from > seen => Some(Failure::Missed { barrier }),
+                true if seen < from && from < begins => Some(Failure::Missed { barrier }),
                 _ => None,
             }
         })
@@ -792,13 +813,21 @@ impl AssuredFilter {
             })
     }
 
-    /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it.
+    /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it
+    /// where the promise stands.
     fn report_on(&mut self, rows: &[f64], u: &[f64]) {
-        let driver = self.assurance.driver;
+        let (driver, is_assured) = (self.assurance.driver, self.assurance.is_assured());
         let Workspace { next, report, .. } = &mut self.rows.filter_mut().workspace;
         next.input[..u.len()].copy_from_slice(u);
         report.status = match (report.status, driver) {
             (Status::InvalidInput, _) => Status::InvalidInput,
+            (status, _) if !is_assured => {
+                if status.is_satisfied() {
+                    Status::Infeasible
+                } else {
+                    status
+                }
+            }
             (_, Driver::Reference) => Status::Unchanged,
             (_, Driver::Eased) => Status::Filtered,
             (status, Driver::Rows) if status.is_satisfied() => status,
@@ -811,7 +840,7 @@ impl AssuredFilter {
                 (b.on_course, state.on_course) = (false, false);
                 b.slack = b.row.slack(u);
             }
-            if promise.is_some() && b.phase != Phase::Released {
+            if is_assured && promise.is_some() && b.phase != Phase::Released {
                 b.guaranteed = true;
                 (b.unmet_steps, state.unmet) = (0, None);
                 (b.blocked_by, b.deadlocked) = (None, false);
@@ -1107,33 +1136,59 @@ impl AssuredFilter {
         let failure = match found {
             Ok((driver, (piece, share), witness)) => {
                 self.piece = piece;
-                self.next.share = share;
+                (self.next.share, self.next.lost) = (share, None);
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
                 self.next.plan.witness = witness;
                 return driver;
             }
             Err(failure) => failure,
         };
-        let again = |planner: &Planner<'_>| planner.beyond(&self.next.plan.witness).search(t, x);
-        match self.planned(&self.next.promises, (t, hold), u, again) {
+        let found = match self.commitment.lost {
+            Some([_, next]) if t < next => Err(failure),
+            _ => self.planned(&self.next.promises, (t, hold), u, |planner| {
+                planner.beyond(&self.next.plan.witness).search(t, x)
+            }),
+        };
+        match found {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.prolong_at = self.next_prolonging(t, plan.witness.until);
-                (self.next.plan, self.next.share) = (plan, 1.0);
+                (self.next.plan, self.next.share, self.next.lost) = (plan, 1.0, None);
                 self.piece = Piece::Searched;
                 Driver::Plan
             }
             Err(longer) => {
                 // A plan that has come to its end was kept.
                 let is_at_its_end = self.next.plan.witness.until <= t + 0.5 * hold;
+                let Commitment { standing, lost, .. } = self.commitment;
                 let (standing, failure) = match self.is_regular(t, hold) {
+                    _ if lost.is_some() => (standing, failure),
                     _ if is_at_its_end => (Standing::Expired, longer),
                     true => (Standing::Withdrawn, failure),
                     false => (Standing::Irregular, failure),
                 };
                 self.end(standing, Some(failure));
-                Driver::Rows
+                // Ever more seldom, since a search is long.
+                if lost.is_none_or(|[_, next]| t >= next) {
+                    let since = lost.map_or(t, |[since, _]| since);
+                    self.next.lost = Some([since, t + (t - since).max(hold)]);
+                }
+                self.come_near(t, hold, x, u)
             }
+        }
+    }
+
+    /// Where the promise is lost: the input of the plan's law, where that nearly keeps it from here; else the answer of the
+    /// rows.
+    fn come_near(&mut self, t: f64, hold: f64, x: &[f64], u: &mut [f64]) -> Driver {
+        let nearly = |planner: &Planner<'_>| planner.nearly(&self.next.plan, t, x);
+        match self.planned(&self.next.promises, (t, hold), u, nearly) {
+            Ok(input) => {
+                u.copy_from_slice(&input[..u.len()]);
+                self.piece = Piece::Searched;
+                Driver::Plan
+            }
+            Err(_) => Driver::Rows,
         }
     }
 }

@@ -27,6 +27,8 @@ const SEARCHED: f64 = 3.0;
 const KEPT: f64 = 0.5;
 /// Margins for another input where the next sample may come at any time: what is left is for the plan to move by.
 const WARY: f64 = 4.0;
+/// Margins for a plan that is followed though it is lost: a hundredth of |h| at the first sample is missing at most.
+const NEARLY: f64 = -100.0;
 /// Margin of a limit of an integral in the search, as a part of the way to it at the start.
 const ROOM: f64 = 1e-3;
 /// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
@@ -435,6 +437,18 @@ impl<'a> Planner<'a> {
                 Ok((followed, false))
             })
         })
+    }
+
+    /// The input of the law of `plan` at `t` and `x`, if from there it nearly keeps every requirement.
+    ///
+    /// # Errors
+    ///
+    /// What it fails at.
+    pub fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
+        let grid = Grid { period: self.period, even: true };
+        let follow = |follows| self.walk(plan, NEARLY, grid, (t, x), None, follows);
+        let near = follow(true).or_else(|failure| follow(false).map_err(|_| failure))?;
+        Ok(near.inputs[0].1)
     }
 
     /// What `find` finds for samples in the present period; else, where the plan was made for another, for those that it

@@ -220,11 +220,15 @@ impl Block for FilterBlock {
 
     fn notice(&mut self) -> Option<String> {
         let (standing, failure) = self.standing()?;
-        if self.noticed.replace(standing) == Some(standing) {
+        let stands = |standing| matches!(standing, Standing::Undecided | Standing::Assured);
+        let before = self.noticed.replace(standing);
+        if before == Some(standing) {
             return None;
         }
-        let stands = matches!(standing, Standing::Undecided | Standing::Assured);
-        (!stands).then(|| {
+        if standing == Standing::Assured && before.is_some_and(|before| !stands(before)) {
+            return Some("the promise is assured again: a plan keeps it from here".to_owned());
+        }
+        (!stands(standing)).then(|| {
             let why = match failure {
                 Some(failure) => Some(self.configuration.failure(failure)),
                 None => self.configuration.unaccounted(),
