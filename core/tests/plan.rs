@@ -600,6 +600,68 @@ fn a_lost_promise_is_taken_up_again() {
     }
 }
 
+/// Gusts that no model knows of: a promise is lost with one at most, and what is said to be assured between two is kept,
+/// at ten instants of each step. What is given again is as good as what was given first.
+#[test]
+fn gusts_lose_promises_but_do_not_make_them_lie() {
+    const LAST: u32 = 250;
+    const INSTANTS: u32 = 10;
+    let seeds = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 1500 } else { 12 };
+    // Runs that were accepted, losses, promises given again, and runs that are assured at the end.
+    let mut told = [0_u32; 4];
+    for seed in 1..=seeds {
+        let random = &mut Random(0xd1b5_4a32_d192_ed03_u64.wrapping_mul(seed));
+        let vehicle = if seed % 2 == 0 { Vehicle::PointMass } else { Vehicle::Unicycle };
+        let (deadline, size) = (random.between(4.0, 9.0), 10.0_f64.powf(random.between(-3.5, 0.3)));
+        let often = random.between(0.01, 0.3);
+        let bounds = match vehicle {
+            Vehicle::PointMass => [random.between(3.0, 12.0); 2],
+            Vehicle::Unicycle => [random.between(3.0, 12.0), random.between(1.0, 3.0)],
+        };
+        let mut filter = vehicle.assured(deadline, bounds);
+        let (mut x, mut u) = ([random.between(-4.0, 4.0), random.between(-4.0, 4.0), 0.3, 0.0], [0.0; 2]);
+        let mut before = Standing::Undecided;
+        for k in 0..600_u32 {
+            let t = f64::from(k) * PERIOD;
+            let blows = k > 0 && k < LAST && random.between(0.0, 1.0) < often;
+            if blows {
+                x[2] += size * random.between(-1.0, 1.0);
+                x[3] += size * random.between(-1.0, 1.0);
+            }
+            let wish = wanted(vehicle, u64::from(k) / 35 % 5, x, bounds, random);
+            let now = filter.step(t, &x, &wish, &mut u).expect("right dimensions").standing;
+            assert_eq!(filter.report().barriers[0].guaranteed, now == Standing::Assured, "{seed} {t}");
+            match (before, now) {
+                (Standing::Undecided, Standing::Assured) => told[0] += 1,
+                (Standing::Undecided, Standing::Refused) => break,
+                (Standing::Assured, Standing::Withdrawn) => {
+                    assert!(blows, "{seed} {t}: lost without a gust");
+                    told[1] += 1;
+                }
+                (Standing::Withdrawn, Standing::Assured) => told[2] += 1,
+                (a, b) => assert_eq!(a, b, "{seed} {t}"),
+            }
+            before = now;
+            for part in 1..=INSTANTS {
+                x = vehicle.move_by(x, u, PERIOD / f64::from(INSTANTS));
+                let after = t + PERIOD * f64::from(part) / f64::from(INSTANTS);
+                let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+                // The rows know nothing of a promise that is not there.
+                if now == Standing::Assured {
+                    assert!(distance(OBSTACLE.0) >= OBSTACLE.1, "{seed} {after}: {x:?}");
+                    assert!(after < deadline || distance(GOAL.0) <= GOAL.1, "{seed} {after}: {x:?}");
+                }
+            }
+        }
+        told[3] += u32::from(before == Standing::Assured);
+    }
+    println!(
+        "accepted {}, lost {}, given again {}, assured at the end {}",
+        told[0], told[1], told[2], told[3]
+    );
+    assert!(told.iter().all(|n| *n > 0) && told[2] <= told[1], "{told:?}");
+}
+
 /// The derivative of each piece, beside central differences of it.
 #[test]
 fn derivatives_are_those_of_the_piece_in_force() {
