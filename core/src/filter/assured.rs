@@ -181,6 +181,9 @@ struct Promise {
     until: f64,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     margin: f64,
+    /// What new plans keep, ≥ 0: a reserve where it is more than the margin.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    reserve: f64,
 }
 
 /// A sample that was looked at, its input, and that of the filter inside.
@@ -581,7 +584,8 @@ impl AssuredFilter {
             if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
                 return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
             }
-            let is_promise = |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0;
+            let is_promise =
+                |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0 && p.reserve >= 0.0;
             if !promises.iter().flatten().all(is_promise) {
                 return refuse("promises", "have a time or a margin that is no number");
             }
@@ -892,7 +896,12 @@ impl AssuredFilter {
                 End::OnArrival => from + self.period,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
-            (!soft && until > from).then_some(Promise { from, until, margin: margin(model, t, x, h) })
+            let margin = margin(model, t, x, h);
+            // Half of the user's, so that a plan stands behind the rows, which aim at all of it.
+            let reserve = slot.promise.settings().margin / AMPLE;
+            // What is kept from now on may be nearer to its edge.
+            let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
+            (!soft && until > from).then_some(Promise { from, until, margin, reserve })
         };
         self.filter().slots.iter().zip(self.models()).map(promise).collect()
     }
@@ -911,8 +920,7 @@ impl AssuredFilter {
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
         let x = &self.rows.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
-        self.planned(&promises, (t, self.period), &[], |planner| planner.search(t, x))
-            .map(|plan| plan.witness)
+        self.first(promises, (t, self.period), x, &[]).map(|(_, plan)| plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
@@ -924,17 +932,13 @@ impl AssuredFilter {
     /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
     /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one.
     fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
-        let search = |promises: &[Option<Promise>]| {
-            self.planned(promises, (t, hold), u, |planner| planner.search(t, x))
-        };
+        let search = |promises| self.first(promises, (t, hold), x, u);
         let promises = self.promises(t, x, |_| 1.0);
-        let mut found = search(&promises).map(|plan| (1.0, (promises.clone(), plan)));
+        let mut found = search(promises.clone()).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter().slots.iter().any(yields) {
             let later = least_factor(Self::LONGEST, None, |factor| {
-                let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
-                let plan = search(&promises).ok()?;
-                Some((promises, plan))
+                search(self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 })).ok()
             });
             found = later.map_or(found, Ok);
         }
@@ -950,6 +954,24 @@ impl AssuredFilter {
                 self.end(Standing::Refused, Some(failure));
             }
         }
+    }
+
+    /// The first plan for `promises`, with their reserve, else without; and what it keeps.
+    fn first(
+        &self,
+        mut promises: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+    ) -> Result<(Vec<Option<Promise>>, Plan), Failure> {
+        let search =
+            |promises: &[Option<Promise>]| self.planned(promises, at, u, |planner| planner.search(at.0, x));
+        let mut found = search(&promises);
+        if found.is_err() && promises.iter().flatten().any(|promise| promise.reserve > promise.margin) {
+            promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+            found = search(&promises);
+        }
+        found.map(|plan| (promises, plan))
     }
 
     /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
@@ -993,8 +1015,8 @@ impl AssuredFilter {
             .zip(promises)
             .enumerate()
             .filter_map(|(barrier, (model, promise))| {
-                let Promise { from, until, margin } = (*promise)?;
-                Some(Requirement { barrier, is_limit: false, model, from, until, margin })
+                let Promise { from, until, margin, reserve } = (*promise)?;
+                Some(Requirement { barrier, is_limit: false, model, from, until, margin, reserve })
             })
             .collect();
         if requirements.is_empty() {
@@ -1005,7 +1027,7 @@ impl AssuredFilter {
         let limits = self.limits(plant);
         requirements.extend(limits.iter().zip(promises.len()..).map(|(limit, barrier)| {
             let (from, until) = (t, f64::INFINITY);
-            Requirement { barrier, is_limit: true, model: limit, from, until, margin: 0.0 }
+            Requirement { barrier, is_limit: true, model: limit, from, until, margin: 0.0, reserve: 0.0 }
         }));
         let mut planner = Planner::new(plant, dims, &self.bounds, &requirements, period, size);
         if let Rows::Integrated(own) = &self.rows {
@@ -1145,9 +1167,14 @@ impl AssuredFilter {
         };
         let found = match self.commitment.lost {
             Some([_, next]) if t < next => Err(failure),
-            _ => self.planned(&self.next.promises, (t, hold), u, |planner| {
-                planner.beyond(&self.next.plan.witness).search(t, x)
-            }),
+            _ => {
+                // One that is lost is found again without its reserve.
+                let mut promises = self.next.promises.clone();
+                promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+                self.planned(&promises, (t, hold), u, |planner| {
+                    planner.beyond(&self.next.plan.witness).search(t, x)
+                })
+            }
         };
         match found {
             Ok(plan) => {

@@ -109,7 +109,7 @@ pub enum Failure {
         /// Time in s.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         time: f64,
-        /// h − margin there, < 0.
+        /// h there, less what has to be kept of it, < 0.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
@@ -202,17 +202,24 @@ impl<'a> Walk<'a> {
         self
     }
 
+    /// The least value of requirement `i`. With less strictness the reserve may be used up.
+    fn least_of(&self, i: usize) -> f64 {
+        let reserve = if self.strictness >= 1.0 { self.requirements[i].reserve } else { f64::NEG_INFINITY };
+        self.margin(i).max(reserve)
+    }
+
     fn margin(&self, i: usize) -> f64 {
         self.strictness * self.requirements[i].margin
     }
 
     /// Notes that h of requirement `i` is at least `h` around `t`.
     fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
-        let (barrier, slack) = (self.requirements[i].barrier, h - self.margin(i));
+        let (barrier, missing) = (self.requirements[i].barrier, h - self.least_of(i));
         // Not-a-number is broken too.
-        if slack.is_nan() || slack < 0.0 {
-            return Err(Failure::Broken { barrier, time: t, slack });
+        if missing.is_nan() || missing < 0.0 {
+            return Err(Failure::Broken { barrier, time: t, slack: missing });
         }
+        let slack = h - self.margin(i);
         let counts = !self.requirements[i].is_limit;
         if counts && self.witness.tightest.is_none_or(|least| slack < least.slack) {
             self.witness.tightest = Some(Tightest { barrier, time: t, slack });
@@ -349,7 +356,7 @@ impl<'a> Walk<'a> {
 
     /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from`.
     fn least(&mut self, i: usize, path: &[Course], (from, dt): (f64, f64), halvings: u32) -> f64 {
-        let (model, margin) = (self.requirements[i].model, self.margin(i));
+        let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
         let mut h = [0.0; COURSE];
         model.value_along(from, path, &mut h);
         let (mut least, mut missed) = (h[0], 0.0_f64);
@@ -367,14 +374,14 @@ impl<'a> Walk<'a> {
         let bound = course::least(&h, dt) - course::last_terms(&h, dt) - MISSED * missed;
         let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
         let slack = bound - margin;
-        let decides = slack >= 0.0
+        let decides = bound >= needed
             && (slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS);
-        if decides || least < margin || halvings == 0 {
+        if decides || least < needed || halvings == 0 {
             return bound.min(least);
         }
         let half = 0.5 * dt;
         let left = self.least(i, path, (from, half), halvings - 1);
-        if left < margin {
+        if left < needed {
             return left;
         }
         let path: Vec<Course> = path.iter().map(|c| shifted(c, half)).collect();

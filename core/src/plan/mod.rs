@@ -54,6 +54,9 @@ pub struct Requirement<'a> {
     pub until: f64,
     /// Least value in the unit of h, ≥ 0.
     pub margin: f64,
+    /// Least value that a new plan keeps, in the unit of h, ≥ 0: what is more than the margin is a reserve for a plant that is
+    /// not quite the model. The rest of a plan may use it up.
+    pub reserve: f64,
 }
 
 /// A law that may keep what is asked for, such as a controller of one's own: it writes the input at a time in s and a state.

@@ -183,7 +183,10 @@ impl<'a> Planner<'a> {
         let mut failure = Failure::NoRest;
         for (part, holds) in GRIDS {
             let sooner = |r: &Requirement<'a>| {
-                let margin = if r.is_limit { ROOM * r.model.value(t, x).abs() } else { r.margin };
+                let margin = match r.is_limit {
+                    true => ROOM * r.model.value(t, x).abs(),
+                    false => r.margin.max((r.margin + r.reserve) / SEARCHED),
+                };
                 Requirement { from: t + part * (r.from - t), margin, ..*r }
             };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
