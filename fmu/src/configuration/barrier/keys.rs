@@ -124,7 +124,7 @@ static KEYS: [Row; 33] = [
             name: "margin",
             value: Number(OfH, Range::NON_NEGATIVE),
             default: Some("a hundredth of the radius, half axis or half side; else 0"),
-            meaning: "less than h ever is: h ≥ margin is what is aimed at; what held inputs are expected to cost is added",
+            meaning: "less than h ever is: h ≥ margin is what is aimed at, and plans keep half of it for a plant that is not quite the model; what held inputs are expected to cost is added",
         },
         parameters: &[whole("h to arrive and stay above", |b| Some(&mut b.margin))],
     },
