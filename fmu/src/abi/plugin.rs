@@ -103,10 +103,14 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     Ok(library.into())
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 fn open_at(path: &Path) -> Result<Library, libloading::Error> {
+    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    // Libraries that it needs lie beside it, where the system looks for those of an absolute path, with backslashes.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
-    unsafe { Library::new(path) }
+    let library = unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }?;
+    Ok(library.into())
 }
 
 fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, String> {
