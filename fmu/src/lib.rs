@@ -30,5 +30,7 @@ pub mod instance;
 pub mod product;
 pub mod state;
 
+#[cfg(windows)]
+pub use abi::loadable;
 pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2};
 pub use filter_loop::{FilterLoop, LoopState};

@@ -103,9 +103,10 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
 #[cfg(windows)]
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    use punctual_fmu::loadable;
     // Libraries that it needs lie beside it (section 2.3), where the system would not look otherwise.
     // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
-    let library = unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }?;
+    let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())
 }
 
