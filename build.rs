@@ -5,7 +5,10 @@ fn main() {
     println!("cargo::rerun-if-changed=src/host/logger.c");
     cc::Build::new().file("src/host/logger.c").warnings(true).compile("punctual_host_logger");
     // The stack that other systems give: Windows has 1 MiB, and descriptions may be nested 256 deep.
-    if std::env::var("CARGO_CFG_TARGET_ENV").is_ok_and(|environment| environment == "msvc") {
-        println!("cargo::rustc-link-arg-bins=/STACK:8388608");
+    let target = |key: &str| std::env::var(format!("CARGO_CFG_TARGET_{key}")).unwrap_or_default();
+    match (target("OS").as_str(), target("ENV").as_str()) {
+        ("windows", "msvc") => println!("cargo::rustc-link-arg-bins=/STACK:8388608"),
+        ("windows", _) => println!("cargo::rustc-link-arg-bins=-Wl,--stack,8388608"),
+        _ => {}
     }
 }

@@ -1,5 +1,5 @@
-//! Links the shared library against the oldest glibc that Rust's standard library supports, whichever the machine
-//! has. Calls of functions of newer versions go to those that `src/abi/glibc.rs` defines.
+//! Gives the shared library its name on macOS, and elsewhere links it against the oldest glibc that Rust's standard library
+//! supports, whichever the machine has. Calls of functions of newer versions go to those that `src/abi/glibc.rs` defines.
 
 use std::env;
 
@@ -28,6 +28,10 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(old_glibc)");
     let target = |key: &str| env::var(format!("CARGO_CFG_TARGET_{key}")).unwrap_or_default();
+    if target("OS") == "macos" {
+        // Not the place where it was made.
+        println!("cargo::rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libpunctual_fmu.dylib");
+    }
     if (target("OS").as_str(), target("ENV").as_str(), target("ARCH").as_str()) != ("linux", "gnu", "x86_64")
     {
         return;

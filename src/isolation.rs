@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 use crate::error::Error;
+use crate::host::crash_at_once;
 use crate::host::journal::{self, LastCall};
 
 /// The name of the journal in the child's folder.
@@ -30,6 +31,7 @@ fn journal_file(folder: &Path) -> PathBuf {
 ///
 /// The folder cannot be written to.
 pub fn settle(folder: &Path) -> Result<(), Error> {
+    crash_at_once();
     let file = journal_file(folder);
     journal::begin(&file).map_err(|e| Error::io("write", &file, e))?;
     // A refusal means that it is set already: then files go there.
@@ -65,6 +67,8 @@ pub enum End {
 pub enum Break {
     /// Ended by this signal.
     Signal(i32),
+    /// Ended by this exception, on Windows.
+    Exception(u32),
     /// Ended with this exit code, which the FMU chose by ending the process.
     Exit(i32),
     /// Stopped because it took longer than this.
@@ -75,6 +79,7 @@ impl fmt::Display for Break {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Signal(number) => write!(f, "crashed with signal {number}{}", meaning(*number)),
+            Self::Exception(number) => write!(f, "crashed with exception {number:#X}{}", cause(*number)),
             Self::Exit(code) => write!(f, "ended the whole process with exit code {code}"),
             Self::Late(limit) => write!(f, "did not come back within {} s", limit.as_secs_f64()),
         }
@@ -92,6 +97,28 @@ fn meaning(signal: i32) -> &'static str {
         15 => " (terminated)",
         _ => "",
     }
+}
+
+/// The meaning of an exception of Windows that is not handled.
+fn cause(exception: u32) -> &'static str {
+    match exception {
+        0xC000_0005 => " (invalid memory access)",
+        0xC000_001D => " (illegal instruction)",
+        0xC000_0094 => " (division by zero)",
+        0xC000_00FD => " (stack overflow)",
+        0xC000_0374 => " (corrupted heap)",
+        0xC000_0409 => " (aborted)",
+        0xC000_0135 => " (a library is missing)",
+        _ => "",
+    }
+}
+
+/// The way in which a process with the exit code `code` broke off on Windows, which has no signals: an exception that is not
+/// handled becomes the exit code; those of the system begin with 0xC.
+#[cfg(any(not(unix), test))]
+fn coded(code: i32) -> Break {
+    let number = code.cast_unsigned();
+    if number >> 28 == 0xC { Break::Exception(number) } else { Break::Exit(code) }
 }
 
 /// A folder for a child and its arguments.
@@ -172,5 +199,18 @@ fn broken(status: ExitStatus) -> Break {
 
 #[cfg(not(unix))]
 fn broken(status: ExitStatus) -> Break {
-    Break::Exit(status.code().unwrap_or(-1))
+    coded(status.code().unwrap_or(-1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exit_code_of_windows_names_the_exception() {
+        let crash = coded(-1_073_741_819);
+        assert_eq!(crash.to_string(), "crashed with exception 0xC0000005 (invalid memory access)");
+        assert_eq!(coded(3), Break::Exit(3));
+        assert_eq!(coded(-1), Break::Exit(-1));
+    }
 }

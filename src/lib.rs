@@ -24,6 +24,8 @@
 //! command              one thin function per subcommand
 //! ```
 #![deny(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod campaign;
 pub mod command;

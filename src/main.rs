@@ -1,6 +1,8 @@
 //! The `punctual` command line: arguments in, exit code out. The commands stand in [`punctual::command`]; nothing
 //! is printed but through [`punctual::output`].
 #![deny(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use std::process::ExitCode;
 

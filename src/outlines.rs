@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use punctual_core::elementary;
 use punctual_core::filter::SafetyFilter;
 use punctual_fmu::configuration::{BarrierSection, FilterConfiguration, Shape, mentions};
 
@@ -47,7 +48,7 @@ impl Outline {
             // (x/A)⁴ + (y/B)⁴ = 1, within the rectangle; the obstacle is enlarged until it contains it.
             Shape::Rectangle { .. } => (round(pair("half_sides")?, 0.5), false),
             Shape::RectangularObstacle { .. } => {
-                (round(pair("half_sides")?.map(|side| side * 2.0_f64.powf(0.25)), 0.5), true)
+                (round(pair("half_sides")?.map(|side| side * elementary::powf(2.0, 0.25)), 0.5), true)
             }
             Shape::HalfPlane { .. } => (beside(pair("normal")?, FAR * size), false),
             Shape::AtMost { .. }
@@ -57,7 +58,7 @@ impl Outline {
             | Shape::Plugin { .. }
             | Shape::External { .. } => return None,
         };
-        let (sin, cos) = number("angle").unwrap_or(0.0).sin_cos();
+        let (sin, cos) = elementary::sin_cos(number("angle").unwrap_or(0.0));
         let corners = corners.into_iter().map(|[x, y]| [cos * x - sin * y, sin * x + cos * y]);
         Some(Self {
             label: section.name.clone(),
@@ -170,14 +171,14 @@ pub fn reads(filter: &FilterConfiguration, section: &BarrierSection, plane: [usi
 
 /// (x/a)^(2/p) + (y/b)^(2/p) = 1: an ellipse for p = 1, a rounded rectangle for p = 1/2.
 fn round([a, b]: [f64; 2], power: f64) -> Vec<[f64; 2]> {
-    let bent = |part: f64| part.signum() * part.abs().powf(power);
-    let corner = |k: usize| (TAU * k as f64 / CORNERS as f64).sin_cos();
+    let bent = |part: f64| part.signum() * elementary::powf(part.abs(), power);
+    let corner = |k: usize| elementary::sin_cos(TAU * k as f64 / CORNERS as f64);
     (0..CORNERS).map(corner).map(|(sin, cos)| [a * bent(cos), b * bent(sin)]).collect()
 }
 
 /// The side of a line through 0 to which `normal` shows, `far` long.
 fn beside(normal: [f64; 2], far: f64) -> Vec<[f64; 2]> {
-    let length = normal[0].hypot(normal[1]);
+    let length = elementary::hypot(normal[0], normal[1]);
     let [x, y] = normal.map(|part| part / length * far);
     vec![[-y, x], [y, -x], [y + x, -x + y], [-y + x, x + y]]
 }

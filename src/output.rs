@@ -5,6 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use punctual_core::elementary;
 
 /// Prints a result: `text` and a line break, on stdout.
 pub fn result(text: &str) {
@@ -173,7 +174,7 @@ pub fn number(value: f64) -> String {
     }
     let size = value.abs();
     let text = if (1e-4..1e7).contains(&size) {
-        let digits = (5 - size.log10().floor() as i32).clamp(0, 9) as usize;
+        let digits = (5 - elementary::log10(size).floor() as i32).clamp(0, 9) as usize;
         format!("{value:.digits$}")
     } else {
         let text = format!("{value:.5e}");

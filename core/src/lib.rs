@@ -61,13 +61,13 @@
 //!
 //! | feature | gives |
 //! |---|---|
-//! | `std` (default) | elementary functions (sin, exp, …) of the platform. Without it the crate needs `alloc` only. |
-//! | `libm` | elementary functions of the crate [`libm`](https://docs.rs/libm), with or without `std`. A filter then gives the same bits on every operating system; those of the platform differ in the last digit. It is slower where a model has many of them. |
+//! | `std` (default) | Rust's standard library in the dependencies. Without it the crate needs `alloc` only. |
 //! | `serde` | `Serialize` and `Deserialize` for states, reports, settings and derivatives. |
 //! | `interior-point` | a second solver of the quadratic program, to compare with. Needs `std`. |
 //! | `plan` | plans: `filter::AssuredFilter` promises only what a verified plan keeps. Needs `std`. |
 //!
-//! One of `std` and `libm` is needed.
+//! A filter gives the same bits on every operating system and processor: [`elementary`] functions (sin, exp, …) are those
+//! of the crate [`libm`](https://docs.rs/libm), not the platform's, and nothing fuses a multiplication with an addition.
 //!
 //! # References
 //!
@@ -81,11 +81,6 @@
 // Elementary functions come from one module: core/clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-#[cfg(not(any(feature = "std", feature = "libm")))]
-compile_error!(
-    "punctual-core needs sin, exp and the like from somewhere: switch on its feature `std` (the default), or `libm`"
-);
-
 #[macro_use]
 extern crate alloc;
 #[cfg(any(feature = "std", test))]
@@ -95,7 +90,7 @@ pub mod barrier;
 pub mod barriers;
 pub mod convergence;
 pub mod dynamics;
-mod elementary;
+pub mod elementary;
 pub mod error;
 pub mod filter;
 pub mod jet;

@@ -15,6 +15,8 @@
 //!
 //! [`fmi2`] has the C types of `abi` and the table of its functions, for whoever calls such a library.
 #![deny(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 #[cfg(not(panic = "unwind"))]
 compile_error!("the FMU guards every exported function against panics, which needs panic = \"unwind\"");
@@ -28,5 +30,7 @@ pub mod instance;
 pub mod product;
 pub mod state;
 
+#[cfg(windows)]
+pub use abi::loadable;
 pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2};
 pub use filter_loop::{FilterLoop, LoopState};

@@ -51,6 +51,8 @@
 //! | `functions` | values of expressions of state and time |
 //! | `model` | plants and barriers of expressions |
 #![forbid(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod affine;
 mod error;

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use punctual_core::elementary;
 use punctual_core::scalar::Scalar;
 
 use crate::MAX_OPERATIONS;
@@ -271,7 +272,7 @@ pub(crate) trait Record {
         /// Largest whole exponent that is multiplied out.
         const WHOLE: f64 = 64.0;
         if let Value::Number(a) = a {
-            return Value::Number(a.powf(exponent));
+            return Value::Number(elementary::powf(a, exponent));
         }
         if exponent == 0.5 {
             return self.call(Function::Sqrt, a, a);
@@ -332,15 +333,15 @@ pub(crate) trait Record {
 fn number(function: Function, a: f64, b: f64) -> f64 {
     match function {
         Function::Sqrt => a.sqrt(),
-        Function::Exp => a.exp(),
-        Function::Ln => a.ln(),
-        Function::Sin => a.sin(),
-        Function::Cos => a.cos(),
-        Function::Tan => a.tan(),
-        Function::Atan => a.atan(),
-        Function::Atan2 => a.atan2(b),
+        Function::Exp => elementary::exp(a),
+        Function::Ln => elementary::ln(a),
+        Function::Sin => elementary::sin(a),
+        Function::Cos => elementary::cos(a),
+        Function::Tan => elementary::tan(a),
+        Function::Atan => elementary::atan(a),
+        Function::Atan2 => elementary::atan2(a, b),
         Function::Abs => a.abs(),
-        Function::Tanh => a.tanh(),
+        Function::Tanh => elementary::tanh(a),
         // The scalar's own minimum: that of plain numbers passes over a value that is not a number.
         Function::Min => Scalar::min(a, b),
         Function::Max => Scalar::max(a, b),

@@ -7,6 +7,8 @@
 
 use std::fmt;
 
+use punctual_core::elementary;
+
 use crate::syntax::{self, FUNCTIONS, Function, Node, Operator, PI, TIME, Tree};
 
 /// The base units in the order of a [`Unit`]'s exponents; angles have none.
@@ -49,7 +51,7 @@ impl Unit {
     }
 
     fn power(&self, exponent: f64) -> Self {
-        let factor = self.factor.powf(exponent);
+        let factor = elementary::powf(self.factor, exponent);
         Self { exponents: self.exponents.map(|e| e * exponent), factor, name: None }
     }
 
@@ -218,7 +220,7 @@ fn number(tree: &Tree) -> Option<f64> {
                 Operator::Subtract => a - b,
                 Operator::Multiply => a * b,
                 Operator::Divide => a / b,
-                Operator::Power => a.powf(b),
+                Operator::Power => elementary::powf(a, b),
             })
         }
         Node::Name(_) | Node::Call(..) => None,

@@ -10,6 +10,8 @@
 //!
 //! Nothing of a filter depends on this crate.
 #![forbid(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod baselines;
 pub mod effort;

@@ -4,6 +4,7 @@
 //! With u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs
 //! into every loop; [`Heading`] drives to a goal.
 
+use punctual_core::elementary;
 use punctual_core::error::{Error, finite, positive};
 use punctual_core::scalar::Scalar;
 
@@ -168,7 +169,7 @@ fn first_in_the_way(
     clearance: f64,
 ) -> Option<([f64; 2], f64)> {
     let way = [goal[0] - position[0], goal[1] - position[1]];
-    let length = way[0].hypot(way[1]);
+    let length = elementary::hypot(way[0], way[1]);
     let (mut first, mut found) = (f64::INFINITY, None);
     for &(centre, radius) in discs {
         let to = [centre[0] - position[0], centre[1] - position[1]];
@@ -194,10 +195,10 @@ fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2]
     let way = [goal[0] - position[0], goal[1] - position[1]];
     // A disc on the left is passed on its right side.
     let side = if way[0] * to[1] - way[1] * to[0] > 0.0 { -1.0 } else { 1.0 };
-    let (distance, out) = (to[0].hypot(to[1]), ENLARGED * wide);
+    let (distance, out) = (elementary::hypot(to[0], to[1]), ENLARGED * wide);
     // The point, along the line to the centre and to the left of it.
     let [along, across] = if distance > out {
-        let [sin, cos] = [out / distance, (1.0 - (out / distance).powi(2)).sqrt()];
+        let [sin, cos] = [out / distance, (1.0 - elementary::powi(out / distance, 2)).sqrt()];
         [distance * cos * cos, distance * cos * sin * side]
     } else {
         [-out * OUTWARDS, out * side]

@@ -1,6 +1,7 @@
 //! Reference plants, with the state and input order of the paper, section IV.
 
 use nalgebra::{SMatrix, SVector};
+use punctual_core::elementary;
 
 use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
 use punctual_core::error::{Error, positive};
@@ -234,7 +235,7 @@ impl ControlAffine<4, 2> for SmallSlipBicycle {
 
     fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         let slip = bounds[0][1].abs().max(bounds[1][1].abs());
-        driven([x[0], x[1]], x[3], bounds, time[1], slip.hypot(1.0))
+        driven([x[0], x[1]], x[3], bounds, time[1], elementary::hypot(slip, 1.0))
     }
 }
 
@@ -298,7 +299,7 @@ impl KinematicBicycle {
 
     /// Steering angle δ in rad that belongs to the slip angle `beta` in rad, |β| < π/2.
     pub fn steering_angle(&self, beta: f64) -> f64 {
-        (beta.tan() * ((self.l_f + self.l_r) / self.l_r)).atan()
+        elementary::atan(elementary::tan(beta) * ((self.l_f + self.l_r) / self.l_r))
     }
 
     /// The same vehicle with an angle for its input. It is not affine in that, so it is a plant and no filter's

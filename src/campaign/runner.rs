@@ -134,7 +134,7 @@ pub(super) struct Parts {
     /// The first run that belongs here.
     first: u64,
     /// Held as long as this lives.
-    _lock: File,
+    lock: File,
 }
 
 /// Segments by their first run, each with its number of runs and its path.
@@ -160,7 +160,7 @@ impl Parts {
             Err(TryLockError::Error(e)) => return Err(Error::io("lock", &lock_path, e)),
         }
         let first = runs.map_or(0, |runs| runs.start);
-        let parts = Self { folder, identity, first, _lock: lock };
+        let parts = Self { folder, identity, first, lock };
         let identity = parts.folder.join("fingerprint");
         match fs::read_to_string(&identity) {
             Ok(found) if found == parts.identity => {}
@@ -223,6 +223,8 @@ impl Parts {
         for (_, path) in self.segments()?.values().rev() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
         }
+        // On Windows an open file keeps its folder.
+        drop(self.lock);
         for name in ["unfinished", "fingerprint", "lock"] {
             let path = self.folder.join(name);
             match fs::remove_file(&path) {

@@ -16,6 +16,7 @@
 
 use std::f64::consts::TAU;
 
+use punctual_core::elementary;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
@@ -43,10 +44,11 @@ fn generator(seed: u64, repeat: usize, level: usize, point: usize) -> Sequence {
 /// Fills `z` with standard normal numbers: G. E. P. Box and M. E. Muller (1958).
 fn normal(rng: &mut Sequence, z: &mut [f64]) {
     for pair in z.chunks_mut(2) {
-        let (radius, angle) = ((-2.0 * rng.unit().ln()).sqrt(), TAU * rng.unit());
-        pair[0] = radius * angle.cos();
+        let (radius, angle) = ((-2.0 * elementary::ln(rng.unit())).sqrt(), TAU * rng.unit());
+        let (sin, cos) = elementary::sin_cos(angle);
+        pair[0] = radius * cos;
         if let Some(second) = pair.get_mut(1) {
-            *second = radius * angle.sin();
+            *second = radius * sin;
         }
     }
 }
@@ -159,7 +161,7 @@ impl Problem<'_> {
                     .sum();
                 plan.made += POINTS as u64;
                 let accepted = moved as f64 / POINTS as f64;
-                width = (width * (STEERING * (accepted - WANTED)).exp()).clamp(1e-3, 1.0);
+                width = (width * elementary::exp(STEERING * (accepted - WANTED))).clamp(1e-3, 1.0);
             }
             plan.widths.push(width);
         }
@@ -196,11 +198,11 @@ impl Problem<'_> {
         }
         let n = repeats as f64;
         let probability = found.iter().sum::<f64>() / n;
-        let variance = found.iter().map(|p| (p - probability).powi(2)).sum::<f64>() / (n - 1.0);
+        let variance = found.iter().map(|p| elementary::powi(p - probability, 2)).sum::<f64>() / (n - 1.0);
         // Where none arrives, nothing is known of it.
         let deviation = if probability > 0.0 { (variance / n).sqrt() / probability } else { f64::INFINITY };
         // Of the logarithm, since estimates of rare events are skewed to the right.
-        let factor = (student(n - 1.0) * deviation).exp();
+        let factor = elementary::exp(student(n - 1.0) * deviation);
         let made = (repeats * POINTS * (1 + MOVES * plan.levels.len())) as u64;
         let high = if probability > 0.0 { (probability * factor).min(1.0) } else { 1.0 };
         let interval = [probability / factor, high];
@@ -244,7 +246,7 @@ mod tests {
     }
 
     fn density(x: f64) -> f64 {
-        (-0.5 * x * x).exp() / TAU.sqrt()
+        elementary::exp(-0.5 * x * x) / TAU.sqrt()
     }
 
     /// The probability that the plant passes `limit`, without a drawn number: the density of x below it, carried on step

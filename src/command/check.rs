@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_core::elementary;
 use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal};
 use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::{
@@ -431,7 +432,7 @@ fn filter(
         if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
             warn(format!(
                 "the repeated root is negative: errors grow by a factor of {} until the deadline",
-                number((-rate * deadline).exp())
+                number(elementary::exp(-rate * deadline))
             ));
         }
         // Findings from the start.

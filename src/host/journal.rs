@@ -108,9 +108,8 @@ fn write_at_start(file: &File, record: &[u8]) -> io::Result<()> {
     std::os::unix::fs::FileExt::write_all_at(file, record, 0)
 }
 
-#[cfg(not(unix))]
-fn write_at_start(mut file: &File, record: &[u8]) -> io::Result<()> {
-    use std::io::{Seek, Write};
-    file.rewind()?;
-    file.write_all(record)
+#[cfg(windows)]
+fn write_at_start(file: &File, record: &[u8]) -> io::Result<()> {
+    // One call, as there may be several threads. A disk that is full makes the record shorter.
+    std::os::windows::fs::FileExt::seek_write(file, record, 0).map(|_| ())
 }

@@ -103,8 +103,24 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
 #[cfg(windows)]
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    use punctual_fmu::loadable;
     // Libraries that it needs lie beside it (section 2.3), where the system would not look otherwise.
     // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
-    let library = unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }?;
+    let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())
+}
+
+/// Has a crash end this process at once. Windows would ask somebody first.
+pub(crate) fn crash_at_once() {
+    #[cfg(windows)]
+    {
+        #[link(name = "kernel32")]
+        unsafe extern "system" {
+            fn SetErrorMode(mode: u32) -> u32;
+        }
+        /// SEM_FAILCRITICALERRORS and SEM_NOGPFAULTERRORBOX.
+        const NO_DIALOG: u32 = 1 | 2;
+        // SAFETY: the function takes any number and may be called at any time.
+        unsafe { SetErrorMode(NO_DIALOG) };
+    }
 }

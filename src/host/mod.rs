@@ -26,6 +26,7 @@ pub use punctual_modeldescription::{
 pub use slave::Slave;
 
 use library::Library;
+pub(crate) use library::crash_at_once;
 
 use crate::error::{Error, FmuProblem};
 

@@ -1,5 +1,7 @@
 //! From values to pixels along one axis: the range shown, its ticks and their labels.
 
+use punctual_core::elementary;
+
 /// An axis in numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {
@@ -37,15 +39,17 @@ impl Axis {
 
     /// A logarithmic axis over at least `low` to `high` (0 < low ≤ high), ends at powers of ten.
     pub(super) fn logarithmic(low: f64, high: f64) -> Self {
-        let mut from = (low.log10() + 1e-9).floor() as i32;
-        let mut to = (high.log10() - 1e-9).ceil() as i32;
+        let mut from = (elementary::log10(low) + 1e-9).floor() as i32;
+        let mut to = (elementary::log10(high) - 1e-9).ceil() as i32;
         if from >= to {
             (from, to) = (from - 1, from + 1);
         }
         let every = ((to - from) as usize).div_ceil(8);
-        let ticks =
-            (from..=to).step_by(every).map(|e| (10_f64.powi(e), format!("10{}", superscript(e)))).collect();
-        Self { low: 10_f64.powi(from), high: 10_f64.powi(to), logarithmic: true, ticks }
+        let ticks = (from..=to)
+            .step_by(every)
+            .map(|e| (elementary::powi(10.0, e), format!("10{}", superscript(e))))
+            .collect();
+        Self { low: elementary::powi(10.0, from), high: elementary::powi(10.0, to), logarithmic: true, ticks }
     }
 
     /// The position of `value`: 0 at the low end, 1 at the high end; NaN where it has no place.
@@ -54,8 +58,8 @@ impl Axis {
             if value == 0.0 {
                 return f64::NAN;
             }
-            let (low, high) = (self.low.log10(), self.high.log10());
-            (value.abs().log10() - low) / (high - low)
+            let (low, high) = (elementary::log10(self.low), elementary::log10(self.high));
+            (elementary::log10(value.abs()) - low) / (high - low)
         } else {
             (value - self.low) / (self.high - self.low)
         }
@@ -64,7 +68,7 @@ impl Axis {
 
 /// The number of the form 1, 2 or 5 times a power of ten that is nearest to `rough` (> 0).
 fn nice_step(rough: f64) -> f64 {
-    let power = 10_f64.powf(rough.log10().floor());
+    let power = elementary::powf(10.0, elementary::log10(rough).floor());
     let factor = match rough / power {
         f if f < 1.5 => 1.0,
         f if f < 3.5 => 2.0,
@@ -85,7 +89,7 @@ fn label(value: f64, step: f64) -> String {
         if value == 0.0 { "0".to_owned() } else { format!("{mantissa}·10{}", superscript(exponent)) }
     } else {
         // Steps are 1, 2 or 5 times a power of ten.
-        let digits = (-(step.log10() + 1e-9).floor()).max(0.0);
+        let digits = (-(elementary::log10(step) + 1e-9).floor()).max(0.0);
         format!("{value:.*}", digits as usize)
     };
     let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');

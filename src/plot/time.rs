@@ -1,5 +1,7 @@
 //! Signals over time, in one panel or several over one time axis.
 
+use punctual_core::elementary;
+
 use super::axes::Axes;
 use super::canvas::{Anchor, Canvas, INK, MARK, Pen, SAFE};
 use super::decimate::decimate;
@@ -147,7 +149,7 @@ fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String
             let high = extent(sizes().chain(bounds().map(f64::abs))).map_or(1.0, |range| range.1);
             // A signal that passes through zero must not stretch the axis without end.
             let low = percentiles(sizes(), 1.0, 100.0).map_or(0.1, |range| range.0);
-            (Axis::logarithmic(low.max(high * 10_f64.powf(-DECADES)), high), None)
+            (Axis::logarithmic(low.max(high * elementary::powf(10.0, -DECADES)), high), None)
         }
     })
 }

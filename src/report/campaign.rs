@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use punctual_core::elementary;
 use serde::Serialize;
 
 use super::table;
@@ -225,7 +226,7 @@ fn dependence(values: &[f64], good: &[bool]) -> f64 {
     let rate = |runs: &[usize]| runs.iter().filter(|&&run| good[run]).count() as f64 / runs.len() as f64;
     let all = rate(&order);
     let parts = order.chunks(values.len().div_ceil(PARTS).max(1));
-    parts.map(|part| part.len() as f64 * (rate(part) - all).powi(2)).sum()
+    parts.map(|part| part.len() as f64 * elementary::powi(rate(part) - all, 2)).sum()
 }
 
 /// Success over two axes.
@@ -376,7 +377,7 @@ fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
 
 /// The next of 1, 2, 5, 10 and so on.
 fn round(width: f64) -> f64 {
-    let power = 10_f64.powf(width.log10().floor());
+    let power = elementary::powf(10.0, elementary::log10(width).floor());
     [1.0, 2.0, 5.0].map(|factor| factor * power).into_iter().find(|w| *w >= width).unwrap_or(10.0 * power)
 }
 

@@ -1,6 +1,7 @@
 //! What bounds and u_ref leave of a promise: rows alone, plans, and the filters of the literature that fall back on a
 //! backup.
 
+use punctual_core::elementary;
 use rayon::prelude::*;
 
 use punctual_core::barrier::Barrier;
@@ -272,7 +273,7 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
     if method == Method::Tube {
         let h0 = disc().map_err(Error::from)?.value(0.0, &x0);
         // The gradient is shortest at the edge, and the box of inputs holds the disc of its bound.
-        let authority = bounds[0] * RADIUS / RADIUS.hypot(SMOOTHING);
+        let authority = bounds[0] * RADIUS / elementary::hypot(RADIUS, SMOOTHING);
         let least = tube(1.0).map_err(Error::from)?.least_deadline(h0, authority);
         let accepted = least.is_some_and(|least| least <= DEADLINE);
         let mut inner = filter;
@@ -305,7 +306,8 @@ fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
         let position = [p, q].map(|c| RADIUS * (2.0 * c - 1.0));
         let (angle, speed) = (std::f64::consts::TAU * angle, 4.0 * speed);
         let at = [CENTRE[0] + position[0], CENTRE[1] + position[1]];
-        let velocity = [speed * angle.cos(), speed * angle.sin()];
+        let (sin, cos) = elementary::sin_cos(angle);
+        let velocity = [speed * cos, speed * sin];
         let as_point = SVector::from([at[0], at[1], velocity[0], velocity[1]]);
         if terminal.value(0.0, &as_point) < 0.0 {
             continue;

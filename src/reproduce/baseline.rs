@@ -1,6 +1,7 @@
 //! Baselines with their parameters, and our own methods, in the settings they are run in.
 
 use punctual_core::convergence::first_order::Exponent;
+use punctual_core::elementary;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
 use punctual_core::lie::DerivativeSource;
 use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
@@ -82,7 +83,7 @@ impl Baseline {
 
     /// The candidates of [`super::search`] for the same method; none where there is nothing to choose.
     pub fn candidates(self) -> Vec<Self> {
-        let powers = |from: i32, to: i32| (from..=to).map(|e| 2_f64.powi(e));
+        let powers = |from: i32, to: i32| (from..=to).map(|e| elementary::powi(2.0, e));
         match self {
             Self::Exponential(_) => {
                 let rates = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];

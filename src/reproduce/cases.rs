@@ -3,6 +3,7 @@
 
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
+use punctual_core::elementary;
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::plants::{Bicycle, PointMass, Signal, Signals, Unicycle};
@@ -83,11 +84,12 @@ impl Vehicle {
             (Nominal::Coast, _) => SVector::zeros(),
             (Nominal::Damping, _) => self.damped().map(|speed| speed.map_or(0.0, |k| -x[k])).into(),
             (Nominal::Away(size), Self::PointMass) => {
-                let distance = to[0].hypot(to[1]).max(f64::MIN_POSITIVE);
+                let distance = elementary::hypot(to[0], to[1]).max(f64::MIN_POSITIVE);
                 to.map(|d| -size * d / distance).into()
             }
             (Nominal::Away(size), _) => {
-                let ahead = to[0] * x[2].cos() + to[1] * x[2].sin();
+                let (sin, cos) = elementary::sin_cos(x[2]);
+                let ahead = to[0] * cos + to[1] * sin;
                 [if ahead < 0.0 { size } else { -size }, 0.0].into()
             }
         }

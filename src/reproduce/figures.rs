@@ -1,5 +1,6 @@
 //! The pictures: the paper's two figures beside ours, and the effects of step and deadline.
 
+use punctual_core::elementary;
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
@@ -64,7 +65,7 @@ impl Trace {
     }
 
     fn depth(&self) -> Vec<f64> {
-        self.x.iter().map(|x| RADIUS - (x[0] - CENTRE[0]).hypot(x[1] - CENTRE[1])).collect()
+        self.x.iter().map(|x| RADIUS - elementary::hypot(x[0] - CENTRE[0], x[1] - CENTRE[1])).collect()
     }
 
     fn path(&self, label: &str, colour: usize, style: Style) -> Curve {
@@ -322,15 +323,19 @@ fn phase_portrait() -> Result<Figure, Error> {
 
 /// The order p of y ≈ c xᵖ by least squares in logarithms, over the positive values; none below two.
 fn order(x: &[f64], y: &[f64]) -> Option<f64> {
-    let points: Vec<(f64, f64)> =
-        x.iter().zip(y).filter(|(_, y)| **y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
+    let points: Vec<(f64, f64)> = x
+        .iter()
+        .zip(y)
+        .filter(|(_, y)| **y > 0.0)
+        .map(|(x, y)| (elementary::ln(*x), elementary::ln(*y)))
+        .collect();
     if points.len() < 2 {
         return None;
     }
     let n = points.len() as f64;
     let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
     let above: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
-    Some(above / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>())
+    Some(above / points.iter().map(|p| elementary::powi(p.0 - mx, 2)).sum::<f64>())
 }
 
 /// The time at which h passes 0, between samples, less the deadline; none without an arrival.
@@ -511,7 +516,7 @@ fn deadlines() -> Result<Figure, Error> {
         })
     };
     // Either component of d, reached at any speed under a constant acceleration: d/√2 = a T²/2.
-    let distance = CENTRE[0].hypot(CENTRE[1]) - RADIUS;
+    let distance = elementary::hypot(CENTRE[0], CENTRE[1]) - RADIUS;
     let least = times.iter().map(|t| f64::sqrt(2.0) * distance / (t * t)).collect();
     Ok(Figure {
         key: "deadlines".into(),

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use punctual_core::elementary;
 use punctual_core::filter::{Report, SafetyFilter};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::simulation::{Schedule, closed_loop_by};
@@ -99,7 +100,7 @@ impl Outcome {
         for i in 0..2 {
             self.whole_peak[i] = self.whole_peak[i].max(u[i].abs());
         }
-        self.whole_longest = self.whole_longest.max(u[0].hypot(u[1]));
+        self.whole_longest = self.whole_longest.max(elementary::hypot(u[0], u[1]));
         self.whole_effort += (u[0] * u[0] + u[1] * u[1]) * setup.step;
         // The arrival's own sample already belongs to the time inside.
         if before && self.arrival.is_none() {
@@ -109,7 +110,7 @@ impl Outcome {
         // Compares half a step early, so that round-off in t cannot skip the sample at the deadline.
         if t > setup.deadline - setup.step / 2.0 {
             // Not `f64::min`, which drops a value that is not a number.
-            let depth = RADIUS - (position[0] - CENTRE[0]).hypot(position[1] - CENTRE[1]);
+            let depth = RADIUS - elementary::hypot(position[0] - CENTRE[0], position[1] - CENTRE[1]);
             self.least_h = if h < self.least_h || h.is_nan() { h } else { self.least_h };
             self.least_depth =
                 if depth < self.least_depth || depth.is_nan() { depth } else { self.least_depth };

@@ -176,7 +176,7 @@ fn resource_locations_of_every_spelling() {
             format!("file://{}", encoded.replace("%C3%BC", "%c3%bc")),
             format!("file:{encoded}"),
             format!("file:///{encoded}"),
-            format!("file://localhost{encoded}"),
+            format!("file://localhost/{}", encoded.trim_start_matches('/')),
             format!("file://{path}"),
             format!("file://{path}/"),
             format!("file:///{path}"),

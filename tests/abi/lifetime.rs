@@ -1,6 +1,7 @@
 //! Reset, several instances, threads, unloading.
 
 use std::path::Path;
+#[cfg(target_os = "linux")]
 use std::process::Command;
 
 use crate::api::{API, Api, library_path};

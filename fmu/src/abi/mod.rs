@@ -26,6 +26,8 @@ mod unsupported;
 use std::ffi::{CString, c_int};
 use std::ptr;
 
+#[cfg(windows)]
+pub use plugin::loadable;
 pub use plugin::{PluginFolder, file_name};
 
 use fmi2::{

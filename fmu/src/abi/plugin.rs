@@ -77,6 +77,16 @@ pub fn file_name(name: &str) -> String {
     format!("{DLL_PREFIX}{name}{DLL_SUFFIX}")
 }
 
+/// The path of a library as Windows loads it, together with libraries beside it: absolute, with backslashes, and where it is
+/// long in the form that may be.
+#[cfg(windows)]
+pub fn loadable(path: &Path) -> PathBuf {
+    /// The length from which on other forms are refused (MAX_PATH).
+    const LONG: usize = 260;
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    if path.as_os_str().len() < LONG { path } else { path.canonicalize().unwrap_or(path) }
+}
+
 impl PluginLoader for PluginFolder {
     fn load(&self, name: &str) -> Result<Plugin, String> {
         let (path, file) = (self.file(name), file_name(name));
@@ -103,10 +113,13 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     Ok(library.into())
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 fn open_at(path: &Path) -> Result<Library, libloading::Error> {
+    use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
+    // Libraries that it needs lie beside it.
     // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
-    unsafe { Library::new(path) }
+    let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
+    Ok(library.into())
 }
 
 fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, String> {

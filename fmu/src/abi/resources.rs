@@ -32,20 +32,21 @@ fn folder(location: &str) -> Result<PathBuf, String> {
         }
         return Ok(PathBuf::from(location));
     };
+    // A raw path may contain blanks or a percent sign. So it is taken as it stands where the decoded one does not
+    // exist.
+    let (raw, decoded) = (path(rest, cfg!(windows)), path(&decode(rest)?, cfg!(windows)));
+    Ok(if !decoded.exists() && raw.exists() { raw } else { decoded })
+}
+
+/// The path after `file:`. On Windows `shares` stand behind two slashes, or four.
+fn path(rest: &str, shares: bool) -> PathBuf {
     // file:/p, file:///p and file:////p mean the same, and so does file://localhost/p.
-    let rest = rest.strip_prefix("//localhost/").map_or(rest, |path| path);
+    let rest = rest.strip_prefix("//localhost/").unwrap_or(rest);
     let path = rest.trim_start_matches('/');
     // A drive letter needs no leading slash.
     let drive = path.as_bytes().get(1) == Some(&b':');
-    let path = if drive { path.to_owned() } else { format!("/{path}") };
-    // A raw path may contain blanks or a percent sign. So it is taken as it stands where the decoded one does not
-    // exist.
-    let decoded = PathBuf::from(decode(&path)?);
-    if !decoded.exists() && std::path::Path::new(&path).exists() {
-        Ok(PathBuf::from(path))
-    } else {
-        Ok(decoded)
-    }
+    let share = shares && matches!(rest.len() - path.len(), 2 | 4);
+    PathBuf::from(if drive { path.to_owned() } else { format!("{}{path}", if share { "//" } else { "/" }) })
 }
 
 #[cfg(test)]
@@ -57,15 +58,22 @@ mod tests {
         for (location, wanted) in [
             ("file:///tmp/a/resources", "/tmp/a/resources"),
             ("file:///tmp/a/resources/", "/tmp/a/resources/"),
-            ("file:////tmp/a", "/tmp/a"),
             ("file:/tmp/a", "/tmp/a"),
             ("file://localhost/tmp/a", "/tmp/a"),
             ("file:///tmp/a%20b/%C3%BC", "/tmp/a b/\u{fc}"),
             ("file:///tmp/a b/\u{fc}", "/tmp/a b/\u{fc}"),
             ("file:///C:/a/resources", "C:/a/resources"),
+            ("file:///C%3A/a/resources", "C:/a/resources"),
+            ("file://localhost/C:/a", "C:/a"),
             ("/tmp/plain", "/tmp/plain"),
         ] {
             assert_eq!(folder(location), Ok(PathBuf::from(wanted)), "{location}");
+        }
+        for (rest, wanted) in [("////tmp/a", "/tmp/a"), ("//host/share", "/host/share")] {
+            assert_eq!(path(rest, false), PathBuf::from(wanted), "{rest}");
+        }
+        for rest in ["//host/share/a", "////host/share/a"] {
+            assert_eq!(path(rest, true), PathBuf::from("//host/share/a"), "{rest}");
         }
     }
 

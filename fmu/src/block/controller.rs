@@ -1,5 +1,6 @@
 //! A nominal controller: from the state to the wanted input. Only waypoints remember anything: the present one.
 
+use punctual_core::elementary;
 use punctual_core::jet::Tangent;
 use punctual_core::scalar::Scalar;
 use punctual_models::Functions;
@@ -52,7 +53,8 @@ impl ControllerBlock {
         let mut present = self.waypoint;
         if let Controller::Waypoints { points, acceptance_radius, .. } = &self.configuration.controller {
             while present + 1 < points.len()
-                && (points[present][0] - x[0]).hypot(points[present][1] - x[1]) <= *acceptance_radius
+                && elementary::hypot(points[present][0] - x[0], points[present][1] - x[1])
+                    <= *acceptance_radius
             {
                 present += 1;
             }

@@ -1,5 +1,6 @@
 //! Units by name: products of powers of base units, as `m/s2` or `kg.m2/s`.
 
+use punctual_core::elementary;
 use punctual_modeldescription::BaseUnit;
 use punctual_models::Unit;
 
@@ -21,7 +22,7 @@ pub fn base_unit(name: &str) -> Option<BaseUnit> {
                 digits => digits.parse().ok().filter(|n| (1..=LARGEST).contains(n))?,
             };
             let mut times = |(_, exponents, factor): &(&str, [i32; 8], f64)| {
-                base.factor *= factor.powi(sign * exponent);
+                base.factor *= elementary::powi(*factor, sign * exponent);
                 let own = [
                     &mut base.kg,
                     &mut base.m,

@@ -2,6 +2,7 @@
 
 use super::{Bound, Condition, Sample, checked_order};
 use punctual_core::MAX_RELATIVE_DEGREE;
+use punctual_core::elementary;
 use punctual_core::error::{Error, ErrorKind, length, positive};
 use punctual_core::jet::Taylor;
 use punctual_core::scalar::Scalar;
@@ -125,7 +126,9 @@ impl Chain {
         let psi = self.psi(h);
         let outside = self.functions[..self.n].iter().zip(psi).filter(|(_, psi)| *psi < 0.0);
         let times = outside.map(|(function, psi)| match *function {
-            ClassK::Power { gain, exponent: q } if q < 1.0 => psi.abs().powf(1.0 - q) / (gain * (1.0 - q)),
+            ClassK::Power { gain, exponent: q } if q < 1.0 => {
+                elementary::powf(psi.abs(), 1.0 - q) / (gain * (1.0 - q))
+            }
             _ => f64::INFINITY,
         });
         times.sum()

@@ -4,6 +4,7 @@ use super::chain::{Chain, ClassK};
 use super::{Bound, Condition, Sample, checked_order};
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::convergence::first_order::Exponent;
+use punctual_core::elementary;
 use punctual_core::error::{Error, positive};
 
 /// ψ_1 = ḣ + α |h|^p sign h with α = |h₀|^{1−p}/((1 − p) T), such that h = 0 at T where ψ_1 = 0 throughout.
@@ -42,7 +43,11 @@ impl Condition for FirstOrderFixedTime {
         let (p, anchor) = (self.exponent.get(), at.anchor[0]);
         // On the boundary at the anchor nothing has to be reached, and any gain keeps it.
         let size = anchor.abs();
-        let gain = if size > 0.0 { size.powf(1.0 - p) * self.exponent.rate(at.deadline) } else { self.rate };
+        let gain = if size > 0.0 {
+            elementary::powf(size, 1.0 - p) * self.exponent.rate(at.deadline)
+        } else {
+            self.rate
+        };
         let mut functions = [ClassK::Linear(self.rate); MAX_RELATIVE_DEGREE];
         functions[0] = ClassK::Power { gain, exponent: p };
         let bound = Chain::of(self.n, functions).bound(at);

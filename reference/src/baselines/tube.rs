@@ -3,6 +3,7 @@
 use super::{Bound, Condition, Sample, checked_order};
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::convergence::comparison::{binomial, lower_terms};
+use punctual_core::elementary;
 use punctual_core::error::{Error, ErrorKind, positive};
 
 /// h + s(t) ≥ 0 is kept, with s(τ) = s₀ (1 − τ/T)ᵏ until T and 0 from then on: (D + a)ⁿ (h + s) ≥ 0.
@@ -50,7 +51,7 @@ impl Tube {
             let left = 1.0 - elapsed / deadline;
             let mut factor = 1.0;
             for j in 0..=self.n {
-                derivatives[j] = factor * left.powi((self.power - j) as i32);
+                derivatives[j] = factor * elementary::powi(left, (self.power - j) as i32);
                 factor *= -((self.power - j) as f64) / deadline;
             }
         }
@@ -61,7 +62,7 @@ impl Tube {
     pub fn width(&self, anchor: &[f64], deadline: f64) -> f64 {
         let shape = self.shape(deadline, 0.0);
         let link = |e: &[f64], i: usize| -> f64 {
-            (0..=i).map(|j| binomial(i, j) * self.rate.powi((i - j) as i32) * e[j]).sum()
+            (0..=i).map(|j| binomial(i, j) * elementary::powi(self.rate, (i - j) as i32) * e[j]).sum()
         };
         let needed = (0..self.n).filter_map(|i| {
             let per_width = link(&shape, i);

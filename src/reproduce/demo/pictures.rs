@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use punctual_core::elementary;
+
 use super::Run;
 use crate::error::Error;
 use crate::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
@@ -73,7 +75,8 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
     let mut lines = Vec::new();
     for (run, colour) in [(ours, 0), (paper, 1)] {
         let (x, y) = (series(&run.recording, "plant.x.x_p")?, series(&run.recording, "plant.x.y_p")?);
-        let values = x.iter().zip(&y).map(|(x, y)| RADIUS - (x - CENTRE[0]).hypot(y - CENTRE[1])).collect();
+        let values =
+            x.iter().zip(&y).map(|(x, y)| RADIUS - elementary::hypot(x - CENTRE[0], y - CENTRE[1])).collect();
         let time = run.recording.times().to_vec();
         lines.push(Series {
             label: run.case.title.into(),
