@@ -97,7 +97,7 @@ impl Standing {
 
     fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Undecided => ("undecided", "no step with a valid state yet"),
+            Self::Undecided => ("undecided", "no step with a valid state yet, or not armed"),
             Self::Assured => ("assured", "a plan keeps every promise, whatever u_ref is"),
             Self::Refused => ("refused", "no plan was found at the start: nothing is promised"),
             Self::Withdrawn => ("withdrawn", "was assured: the plant is not where the model led"),
@@ -694,6 +694,12 @@ impl AssuredFilter {
     /// whole filter.
     fn sample(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
         self.next.clone_from(&self.commitment);
+        if self.report().status == Status::NotArmed {
+            self.piece = Piece::ROWS;
+            let Commitment { standing, failure, .. } = self.next;
+            self.assurance = Assurance { standing, failure, ..Assurance::default() };
+            return;
+        }
         let mut rows = [0.0; MAX_INPUTS];
         rows[..u.len()].copy_from_slice(u);
         let x = &self.rows.state(x)[..];
