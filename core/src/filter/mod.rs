@@ -58,7 +58,7 @@ pub struct FilterState {
     /// The measured sampling period in s, under [`Sampling::Measured`] from the second sample on.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: Option<f64>,
-    /// The input handed out at [`Self::time`]; zeros above the number of inputs.
+    /// The input handed out at [`Self::time`], or last while not armed; zeros above the number of inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub input: [f64; MAX_INPUTS],
     /// Time of the first sample in s, valid or not, where the filter is [armed later](FilterBuilder::arm_after) than that.

@@ -599,6 +599,13 @@ impl FilterConfiguration {
         self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
     }
 
+    /// The same filter, armed at its first step.
+    #[must_use]
+    pub fn armed_at_once(mut self) -> Self {
+        self.arm_after = 0.0;
+        self
+    }
+
     /// Whether the filter follows plans.
     pub fn is_assured(&self) -> bool {
         self.unassured.is_empty()
