@@ -146,7 +146,7 @@ fn rearming_does_not_make_it_wait_again() {
 #[test]
 fn invalid_samples_begin_the_wait_and_do_not_end_it() {
     let mut filter = filter(AFTER, Sampling::Period(0.1), 0.0);
-    let mut invalid = |filter: &mut SafetyFilter, t: f64| {
+    let invalid = |filter: &mut SafetyFilter, t: f64| {
         let mut u = [f64::NAN; 2];
         filter.step(t, &[f64::NAN; 4], &[0.0; 2], &mut u).expect("right lengths").status
     };

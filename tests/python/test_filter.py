@@ -74,6 +74,25 @@ def test_deadlines_start_anew():
     assert own.step(0.0, x).u.tolist() == first.u.tolist()
 
 
+def test_a_filter_that_is_armed_later(fmus, tmp_path):
+    late = FILTER | {"arm_after": 0.5}
+    fmu = punctual.build(late, tmp_path / "late.fmu")
+    result = punctual.simulate(fmu, fmus[1], stop_time=6.0, step_size=STEP, nominal={"a": ("v", -1.0)})
+    assert not any(name.endswith("_code") for name in result.dtype.names)
+    own = punctual.Filter(late)
+    for t, row in sampled(result):
+        # Pickled on either side of the arming, it goes on as it would have.
+        own = pickle.loads(pickle.dumps(own))
+        step = own.step(t, [row[f"x.{name}"] for name in STATES], [row["u_ref.a"], row["u_ref.omega"]])
+        assert step.u.tolist() == [row["u.a"], row["u.omega"]] and step.status == row["status"], t
+        assert step.satisfied or step.status is Status.NOT_ARMED
+        assert (step.barriers["goal"].phase is Phase.WAITING) == (step.status is Status.NOT_ARMED)
+    waiting = result["status"] == Status.NOT_ARMED
+    assert waiting[0] and abs(waiting.sum() - 0.5 / STEP) <= 1 and not waiting[-1]
+    judged = punctual.promise(result, "goal")
+    assert judged.deadline == pytest.approx(0.5 + 5.0, abs=1.5 * STEP) and judged.constraint_met
+
+
 def test_real_numbers_of_any_type_and_layout_are_taken():
     states, inputs = exactly([1.0, 2.0, 0.0, 3.0], 4), exactly([2.0, 1.0], 2)
     answers = [punctual.Filter(FILTER).step(0.0, *given).u.tobytes() for given in zip(states, inputs)]
