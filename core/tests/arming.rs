@@ -242,6 +242,12 @@ fn plans_are_decided_on_when_it_is_armed() {
             assert_eq!((assurance.standing, assurance.until), (Standing::Undecided, None), "at {t}");
             assert_eq!((late.report().status, u), (Status::NotArmed, [-8.0, 6.0]));
             assert!(late.plan().is_none() && late.report().barriers.iter().all(|b| !b.guaranteed));
+            // Nor is it decided on where u_ref is no number.
+            let unwanted = *late.peek(t, &moved, &[f64::NAN, 0.0], &mut [0.0; 2]).expect("right lengths");
+            assert_eq!(
+                (unwanted.standing, late.report().status),
+                (Standing::Undecided, Status::InvalidInput)
+            );
             // Taken back and made again, in an instance of its own too.
             let (state, commitment) = (late.filter().state().clone(), late.commitment().clone());
             late.restore(&state, &commitment).expect("its own");

@@ -285,7 +285,8 @@ impl Table {
         }
     }
 
-    /// Adds the parameters of `configuration`, which come after the outputs, and the codes, which come last; completes `layout` with their position.
+    /// Adds the parameters of `configuration`, which come after the outputs, then the codes, and completes `layout` with
+    /// their position.
     fn finish<C: Clone>(
         mut self,
         configuration: &C,

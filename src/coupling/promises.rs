@@ -165,7 +165,7 @@ struct Zeros {
     last: Option<f64>,
     /// Whether deadlines count from one of them.
     counted: bool,
-    /// The first point with another state, the size of that, and how far it moved until the next point.
+    /// The first point with another state, and that; how far it moved until the next point.
     after: Option<(f64, Vec<f64>)>,
     moved: Option<f64>,
 }

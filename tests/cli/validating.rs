@@ -210,6 +210,8 @@ fn rules_on_the_interface_and_the_experiment() {
         "startTime=\"0.95\" stopTime=\"1\"",
         "warning experiment.step D:14: stepSize is 0.1; should be at most stopTime - startTime = 0.05",
     );
+    let exact = [("startTime=\"0\" stopTime=\"1\"", "startTime=\"0.2\" stopTime=\"0.3\"")];
+    assert_eq!(findings(description("none", &exact)), [""; 0], "0.3 - 0.2 is a little less than 0.1");
     one(
         "<Category name=\"logAll\"/>",
         "<Category name=\"logAll\"/><Category name=\"logAll\" description=\"again\"/>",

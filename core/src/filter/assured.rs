@@ -694,10 +694,11 @@ impl AssuredFilter {
     /// whole filter.
     fn sample(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
         self.next.clone_from(&self.commitment);
-        if self.report().status == Status::NotArmed {
-            self.piece = Piece::ROWS;
-            let Commitment { standing, failure, .. } = self.next;
-            self.assurance = Assurance { standing, failure, ..Assurance::default() };
+        let filter = self.rows.filter();
+        // Not by the status: u_ref may be no number.
+        let is_armed = filter.workspace.next.is_armed(t, filter.arm_after);
+        if self.next.standing == Standing::Undecided && !is_armed {
+            (self.assurance, self.piece) = (Assurance::default(), Piece::ROWS);
             return;
         }
         let mut rows = [0.0; MAX_INPUTS];

@@ -200,7 +200,7 @@ impl Check<'_> {
             }
         }
         if let (Some(stop), Some(step)) = (experiment.stop_time, experiment.step_size)
-            && step > stop - start
+            && step > (stop - start) * (1.0 + ROUND_OFF)
             && stop > start
         {
             let message = format!(
@@ -296,6 +296,9 @@ impl Check<'_> {
         self.description.variable_naming_convention == NamingConvention::Structured
     }
 }
+
+/// Round-off of a time that is the difference of two, as a part of it.
+const ROUND_OFF: f64 = 1e-9;
 
 /// The beginning of a long text, for messages.
 pub fn brief(text: &str) -> String {
