@@ -78,11 +78,7 @@ const BEFORE: &[Rule] = &[
     ("archive.platform", Warning, "there is a library for this platform"),
     ("archive.top-folder", Warning, "everything lies where the standard has a place for it"),
     ("xml.readable", Error, "modelDescription.xml is there, UTF-8, well-formed, and needs no document type"),
-    (
-        "xml.encoding",
-        Warning,
-        "modelDescription.xml is in UTF-8 where it is in ISO-8859-1, and has no byte order mark",
-    ),
+    ("xml.encoding", Warning, "modelDescription.xml is in UTF-8, not ISO-8859-1, without a byte order mark"),
     ("schema.element", Error, "elements are those of the schema, in its order and number"),
     ("schema.attribute", Error, "attributes are those of the schema; the required ones are there"),
     ("schema.value", Error, "values have the type that the schema gives them"),

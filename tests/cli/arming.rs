@@ -52,7 +52,7 @@ fn notes(report: &Value) -> Vec<String> {
 
 #[test]
 fn zeros_that_a_deadline_counts_from_are_noted() {
-    for order in ["gauss_seidel", "jacobi"] {
+    for order in ["gauss-seidel", "jacobi"] {
         let report = run(&workshop("zeros-until-step", order, ""));
         let note = "filter: the state was all zero until t = 0 s, and jumped then, as where a plant gives zeros before its first step; \
                     the deadlines count from t = 0 s: with `arm_after = 0.1` in the filter, from the jump";
@@ -63,7 +63,7 @@ fn zeros_that_a_deadline_counts_from_are_noted() {
 /// A state that begins at zero and moves on is none of it, nor are zeros at which the filter was not armed.
 #[test]
 fn other_zeros_are_not() {
-    for order in ["gauss_seidel", "jacobi"] {
+    for order in ["gauss-seidel", "jacobi"] {
         assert_eq!(notes(&run(&workshop("none", order, ""))), [""; 0], "0, 1, 2, ... in {order}");
         let report = run(&workshop("zeros-until-step", order, "arm_after = 0.1\n"));
         assert_eq!(notes(&report), [""; 0], "{order}: {report:#}");
@@ -73,7 +73,7 @@ fn other_zeros_are_not() {
 /// The deadline counts from the armed step, and the steps before are none that failed.
 #[test]
 fn a_run_is_judged_from_the_armed_step_on() {
-    let workshop = workshop("zeros-until-step", "gauss_seidel", "arm_after = 0.1\n");
+    let workshop = workshop("zeros-until-step", "gauss-seidel", "arm_after = 0.1\n");
     let report = run(&workshop);
     let promise = &report["promises"][0];
     assert_eq!((&promise["promise"], &promise["began_inside"]), (&"kept".into(), &true.into()), "{promise}");
@@ -82,14 +82,14 @@ fn a_run_is_judged_from_the_armed_step_on() {
     assert_eq!(table.column("filter.status")[..2], [9.0, 0.0], "not_armed, then unchanged or filtered");
     assert_eq!(table.column("filter.u.v")[0], 2.0, "u_ref within its bounds");
     // Without it, the promise begins outside, and is about a state that never was.
-    let report = run(&self::workshop("zeros-until-step", "gauss_seidel", ""));
+    let report = run(&self::workshop("zeros-until-step", "gauss-seidel", ""));
     assert_eq!(report["promises"][0]["began_inside"], false, "{report:#}");
 }
 
 /// One that outlasts the run leaves the promise open.
 #[test]
 fn one_that_is_never_armed_promises_nothing() {
-    let workshop = workshop("zeros-until-step", "gauss_seidel", "arm_after = 5.0\n");
+    let workshop = workshop("zeros-until-step", "gauss-seidel", "arm_after = 5.0\n");
     let report = run(&workshop);
     assert_eq!(report["promises"][0]["promise"], "open", "{report:#}");
     let table = Table::parse(&workshop.text("out/system.csv"));
@@ -100,7 +100,7 @@ fn one_that_is_never_armed_promises_nothing() {
 /// The Integer twins of enumerations are recorded where they are named, and have the same numbers.
 #[test]
 fn twins_are_recorded_where_they_are_named() {
-    let workshop = workshop("none", "gauss_seidel", "");
+    let workshop = workshop("none", "gauss-seidel", "");
     run(&workshop);
     assert!(!workshop.text("out/system.csv").lines().next().expect("a header").contains("_code"));
     let system = workshop.text("system.toml");
@@ -116,12 +116,12 @@ fn twins_are_recorded_where_they_are_named() {
 
 #[test]
 fn check_says_what_it_leaves_open() {
-    let workshop = workshop("none", "gauss_seidel", "arm_after = 0.25\n");
+    let workshop = workshop("none", "gauss-seidel", "arm_after = 0.25\n");
     let done = workshop.punctual(["check", "filter.toml", "--x0", "p=38.5"]);
     let warning = "warning: the filter is armed 0.25 s after its first step: until then nothing is promised; what is said of a start is \
                    said of the state then";
     assert!(done.stdout.contains(warning), "{done:#?}");
-    let late = self::workshop("none", "gauss_seidel", "arm_after = 25.0\n");
+    let late = self::workshop("none", "gauss-seidel", "arm_after = 25.0\n");
     let done = late.punctual(["check", "filter.toml"]);
     assert!(done.stdout.contains("warning: the experiment stops before the filter is armed"), "{done:#?}");
 }
