@@ -53,6 +53,13 @@ pub struct Details {
 pub enum FmuProblem {
     /// Not a zip archive, or a damaged one; with the reason.
     Archive(String),
+    /// An entry is compressed in a way that importers need not know.
+    Compression {
+        /// Its name.
+        entry: String,
+        /// The method, such as `bzip2`.
+        method: String,
+    },
     /// An entry of this name would be written outside the folder it is unpacked to.
     UnsafeEntry(String),
     /// It cannot be joined with others to one; with the reason.
@@ -98,6 +105,9 @@ impl fmt::Display for FmuProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Archive(reason) => write!(f, "not a readable FMU archive: {reason}"),
+            Self::Compression { entry, method } => {
+                write!(f, "the entry {entry:?} is compressed with {method}; must be stored or deflated")
+            }
             Self::UnsafeEntry(entry) => {
                 write!(f, "refused, because the archive entry {entry:?} points out of the archive")
             }

@@ -172,9 +172,10 @@ proptest! {
     fn any_state_leaves_the_input_within_its_bounds(
         barriers in prop::collection::vec(promise(), 2),
         (time, period) in (prop::option::of(number()), prop::option::of(number())),
+        start in prop::option::of(number()),
         input in prop::array::uniform12(number()),
     ) {
-        let state = FilterState { barriers, time, period, input };
+        let state = FilterState { barriers, time, period, input, start };
         let text = json(&state);
         prop_assert_eq!(json(&back::<FilterState>(&text)), text);
         let mut filter = filter();

@@ -232,6 +232,7 @@ class Filter:
         self.statuses = items(block, "status")
         self.standings = items(block, "assurance") if "assurance" in block.outputs else {}
         self.abstentions = {self.statuses[name] for name in ABSTENTIONS}
+        self.waiting = self.statuses["not_armed"]
         self.counts = dict.fromkeys(self.statuses.values(), 0)
         self.stood = dict.fromkeys(self.standings.values(), 0)
         self.peaks = dict.fromkeys(block.efforts, 0.0)
@@ -260,7 +261,7 @@ class Filter:
                 self.peaks[name] = abs(array[i])
         for kept, slots, phases in self.barriers.values():
             h, phase, unmet, slack, late = [array[i] for array, i in slots]
-            kept["started"] |= status not in self.abstentions
+            kept["started"] |= status not in self.abstentions and status != self.waiting
             if kept["started"]:
                 standing = {phases["released"]: "released", phases["waiting"]: "waiting"}.get(phase, "in force")
                 kept["judge"].see(time, h, standing, bool(late) or phase == phases["late"])

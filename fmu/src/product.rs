@@ -53,7 +53,7 @@ pub struct Layout {
     pub outputs: usize,
     /// First parameter.
     pub parameters: usize,
-    /// One past the last parameter.
+    /// One past the last parameter: the first code, where there are [codes](Product::enumerated).
     pub end: usize,
 }
 
@@ -71,6 +71,12 @@ impl Product {
         };
         let guid = guid(&configuration.canonical()?, &variables);
         Ok(Self { configuration, variables, layout, ranges, guid })
+    }
+
+    /// The outputs that are enumerations. Each has a twin that is an Integer, from [`Layout::end`] on in the same order:
+    /// some importers drop enumerations. (They come last, so that every other variable kept its value reference.)
+    pub fn enumerated(&self) -> impl Iterator<Item = usize> + '_ {
+        enumerated(&self.variables)
     }
 
     /// The model description.
@@ -156,6 +162,16 @@ fn units(variables: &[Variable]) -> Vec<Unit> {
             Some(Unit { name: name.to_owned(), base: Some(base_unit(name)?), ..Unit::default() })
         })
         .collect()
+}
+
+/// What the name of the Integer twin of an enumeration ends in.
+pub const CODE: &str = "_code";
+
+/// The positions of the outputs that are enumerations.
+fn enumerated(variables: &[Variable]) -> impl Iterator<Item = usize> + '_ {
+    let is_enumerated =
+        |v: &Variable| v.causality == Causality::Output && matches!(v.kind, VariableKind::Enumeration(_));
+    variables.iter().enumerate().filter(move |(_, v)| is_enumerated(v)).map(|(i, _)| i)
 }
 
 /// The enumeration type of `status`.
@@ -257,7 +273,20 @@ impl Table {
         self.ranges.push(row.range);
     }
 
-    /// Adds the parameters of `configuration`, which come last, and completes `layout` with their position.
+    /// Adds an Integer twin of each output that is an enumeration.
+    fn codes(&mut self) {
+        for i in enumerated(&self.variables).collect::<Vec<_>>() {
+            let Variable { name, description, dependencies, .. } = &self.variables[i];
+            let (name, description) =
+                (format!("{name}{CODE}"), format!("{description}: the number of `{name}`"));
+            let (kind, dependencies) =
+                (VariableKind::Integer(Integer { min: Some(0), ..Integer::default() }), dependencies.clone());
+            self.add(name, &description, Causality::Output, kind).dependencies = dependencies;
+        }
+    }
+
+    /// Adds the parameters of `configuration`, which come after the outputs, then the codes, and completes `layout` with
+    /// their position.
     fn finish<C: Clone>(
         mut self,
         configuration: &C,
@@ -270,6 +299,7 @@ impl Table {
             self.parameter(row, &mut configuration);
         }
         let end = self.variables.len();
+        self.codes();
         (self, Layout { parameters, end, ..layout })
     }
 }

@@ -70,7 +70,7 @@ fn fixed_size(product: &Product) -> usize {
         Configuration::Filter(c) => {
             bool::SIZE
                 + c.barrier.len() * FixedTimeState::SIZE
-                + 2 * <Option<f64>>::SIZE
+                + 3 * <Option<f64>>::SIZE
                 + Inputs::SIZE
                 + f64::SIZE
         }
@@ -118,12 +118,13 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     match block {
         BlockState::Filter { rearm_seen, memory } => {
             let LoopState { filter, integrated, commitment: _ } = &**memory;
-            let FilterState { barriers, time, period, input } = filter;
+            let FilterState { barriers, time, period, input, start } = filter;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
             period.write(&mut out);
             input.write(&mut out);
+            start.write(&mut out);
             integrated.write(&mut out);
             if let Some(plan) = plan {
                 (plan.len() as u64).write(&mut out);
@@ -205,6 +206,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 time: input.field("filter time")?,
                 period: input.field("period")?,
                 input: input.field("input")?,
+                start: input.field("start")?,
             };
             let integrated = input.finite("integrated")?;
             let commitment = has_plan.then(|| read_commitment(&mut input)).transpose()?;

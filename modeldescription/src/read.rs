@@ -126,7 +126,9 @@ impl Located {
             .map(|(t, node)| self.simple_type(t, node))
             .collect();
         self.description.log_categories = list(root, "LogCategories", "Category")
-            .map(|node| {
+            .enumerate()
+            .map(|(c, node)| {
+                self.positions.insert(Place::Category(c), node.range().start);
                 let text = |name| node.attribute(name).unwrap_or_default().to_owned();
                 LogCategory { name: text("name"), description: text("description") }
             })

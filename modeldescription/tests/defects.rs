@@ -74,10 +74,12 @@ defects! {
 
     same_unit_twice: r#"units["m"]: the unit "m" is defined twice"#,
         |d| d.units.push(unit("m", Default::default()));
-    display_unit_without_scale: r#"units["m"].display_units.factor is 0; allowed: not 0"#,
+    display_unit_without_scale: r#"units["m"].display_units[0]: the unit "km" has the factor 0; must be finite and not 0"#,
         |d| d.units[0].display_units.push(DisplayUnit { name: "km".into(), factor: 0.0, offset: 0.0 });
-    unit_without_scale: r#"units["m"].base.factor is 0.0; allowed: finite and greater than 0"#,
+    unit_without_scale: r#"units["m"]: the unit "m" has the factor 0; must be finite and not 0"#,
         |d| d.units[0].base.as_mut().unwrap().factor = 0.0;
+    unit_turned_around: r#"units["m"].base.factor is -2.0; allowed: finite and greater than 0"#,
+        |d| d.units[0].base.as_mut().unwrap().factor = -2.0;
     unit_with_infinite_offset: r#"units["m"].base.offset is -INF; allowed: finite"#,
         |d| d.units[0].base.as_mut().unwrap().offset = f64::NEG_INFINITY;
 
@@ -97,6 +99,8 @@ defects! {
         |d| d.types[0].items.push(EnumerationItem { name: "bad".into(), value: 8, ..Default::default() });
     log_category_without_name: r#"log_categories[0].name is ""; allowed: a non-empty text"#,
         |d| d.log_categories[0].name.clear();
+    log_category_twice: r#"log_categories[1]: the log category "logAll" is defined twice"#,
+        |d| d.log_categories = vec![d.log_categories[0].clone(), d.log_categories[0].clone()];
 
     start_of_experiment: "default_experiment: startTime is NaN; must be finite",
         |d| d.default_experiment.as_mut().unwrap().start_time = Some(f64::NAN);

@@ -24,13 +24,15 @@ class Status(IntEnum):
     """The solver did not converge: u_ref within its bounds."""
     BACKUP = 8
     """The constraints are not met, or lead where no way on is left: a plan decides, and keeps every promise."""
+    NOT_ARMED = 9
+    """Not armed yet (`arm_after`): nothing is asked or promised, u_ref within its bounds."""
 
 
 class Assurance(IntEnum):
     """Where the promise of a filter that follows plans stands."""
 
     UNDECIDED = 0
-    """No step with a valid state yet."""
+    """No step with a valid state yet, or not armed."""
     ASSURED = 1
     """A plan keeps every promise, whatever u_ref is."""
     REFUSED = 2
@@ -47,7 +49,7 @@ class Phase(IntEnum):
     """Where a barrier stands with its promise."""
 
     WAITING = 0
-    """No step with valid inputs yet, or not begun."""
+    """Not begun: no step with valid inputs yet, or not armed."""
     APPROACH = 1
     """On the way, before the deadline."""
     LATE = 2

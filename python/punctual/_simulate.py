@@ -48,7 +48,7 @@ def simulate(
     - `parameters`: start values of the filter by name, such as `{"goal.deadline": 8.0}`; also of inputs that the plant
       does not give.
     - `record`: the names of what is returned. Default: all outputs of the plant, `u_ref.*` and all outputs of the
-      filter, but texts. Where both have an output of one name, the plant's is called `plant.<name>`.
+      filter, but texts and the Integer twins of enumerations (`status_code`). Where both have an output of one name, the plant's is called `plant.<name>`.
 
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
     FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` judges a barrier.
@@ -98,7 +98,8 @@ def _columns(own: Slave, plant: Slave, record: Sequence[str] | None) -> dict[str
     unknown = [name for name in record or [] if name not in columns]
     if unknown:
         raise Error(f"record: {unknown[0]!r} is none of {', '.join(columns)}")
-    return columns if record is None else {name: columns[name] for name in record}
+    twins = {f"{v.name}_code" for slave in (own, plant) for v in slave.variables.values() if v.type == "Enumeration"}
+    return {name: columns[name] for name in ([n for n in columns if n not in twins] if record is None else record)}
 
 
 class _Pair:

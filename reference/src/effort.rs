@@ -8,7 +8,7 @@ use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::error::{Error, non_negative, positive};
-use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 
 /// A filter in a closed loop: a [`SafetyFilter`], or what has one inside.
@@ -102,9 +102,12 @@ impl Running<'_> {
     /// Takes a sample.
     fn sample(&mut self, t: f64, x: &[f64], u: &[f64], report: &Report) {
         let run = &mut self.run;
-        run.unmet += usize::from(!report.status.is_satisfied());
+        let is_armed = report.status != Status::NotArmed;
+        run.unmet += usize::from(is_armed && !report.status.is_satisfied());
         for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
-            judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
+            if is_armed {
+                judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
+            }
             let enforced = standing(b.phase) == Standing::InForce;
             if b.unmet_steps > 0 || enforced && report.status.is_abstention() {
                 seen.unmet += 1;
@@ -120,10 +123,12 @@ impl Running<'_> {
 
     /// Takes an instant between two samples.
     fn instant(&mut self, filter: &SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
-        filter.barrier_values(t, x, &mut self.h)?;
-        let barriers = &filter.report().barriers;
-        for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
-            judge.see(t, *h, standing(b.phase), b.deadline_unreachable);
+        if filter.report().status != Status::NotArmed {
+            filter.barrier_values(t, x, &mut self.h)?;
+            let barriers = &filter.report().barriers;
+            for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
+                judge.see(t, *h, standing(b.phase), b.deadline_unreachable);
+            }
         }
         self.bound(x);
         Ok(())

@@ -224,7 +224,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
-            // Simulate and judge.
+            // Simulate and judge. What is said of a start is said of the state at which the filter is armed.
+            let arm_after = configuration.arm_after;
+            let configuration = configuration.armed_at_once();
             let wanted = Wanted::parse(arguments.u_ref.as_deref(), &configuration)?;
             let effort = match &start {
                 Some(x0) if arguments.effort => {
@@ -240,7 +242,8 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let out = arguments.out.as_deref();
             let zeros = || vec![0.0; measured(&configuration).len()];
             let from = start.clone().unwrap_or_else(zeros);
-            let mut report = filter(&configuration, start, &wanted, out).map_err(|e| e.in_file(file))?;
+            let mut report =
+                filter(&configuration, start, &wanted, out, arm_after).map_err(|e| e.in_file(file))?;
             report.effort = effort;
             if let (Some(plane), Some(folder)) = (plane, out) {
                 report.map =
@@ -352,6 +355,7 @@ fn filter(
     start: Option<Vec<f64>>,
     wanted: &Wanted,
     out: Option<&Path>,
+    arm_after: f64,
 ) -> Result<FilterReport, Error> {
     let mut filter = closed_loop::filter(c)?;
     // The first step from the start, then the closed loops.
@@ -367,6 +371,17 @@ fn filter(
     let witness = simulated.map(|x0| witness::find(c, x0, out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
+    let runs_for = experiment.stop_time - experiment.start_time;
+    if arm_after > 0.0 {
+        let seconds = number(arm_after);
+        warnings.push(format!(
+            "the filter is armed {seconds} s after its first step: until then nothing is promised; what is said of a start is said \
+             of the state then"
+        ));
+    }
+    if arm_after >= runs_for {
+        warnings.push("the experiment stops before the filter is armed".to_owned());
+    }
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let (uneven, inputs) = (c.uneven(), c.plant.inputs());
     let mut barriers = Vec::new();
@@ -410,7 +425,7 @@ fn filter(
         if deadline < step {
             warn(format!("the deadline is shorter than the step of {} s", number(step)));
         }
-        if deadline.is_finite() && experiment.stop_time - experiment.start_time < deadline {
+        if deadline.is_finite() && arm_after < runs_for && runs_for - arm_after < deadline {
             warn("the experiment stops before the deadline".to_owned());
         }
         let uneven = uneven.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);

@@ -163,7 +163,7 @@ impl<P: Participant> Simulation<P> {
             network::resolve(system, descriptions)?;
 
         // Give slots to all signals that are recorded, watched or connected.
-        let watched = promises::ports(system, descriptions);
+        let watched = promises::ports(system, descriptions, &links);
         let mut read = recorded.clone();
         read.extend(watched.iter().flat_map(|ports| ports.fields.iter().chain([&ports.status])));
         let mut layout = Layout::default();
@@ -294,6 +294,7 @@ impl<P: Participant> Simulation<P> {
                 self.notes.push(format!("{}: {remark}", member.participant.name()));
             }
         }
+        self.notes.extend(self.promises.iter().filter_map(Watched::note));
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
         let promises = self.promises.iter().map(Watched::promise).collect();
         Ok(Outcome { recording, statistics, promises, notes: self.notes.clone(), failure: ran.err() })

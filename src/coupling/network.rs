@@ -337,14 +337,16 @@ impl<'a> Resolver<'a> {
         Ok(ports)
     }
 
-    /// All outputs, then all connected inputs of a component.
+    /// All outputs but [twins](Description::is_twin), then all connected inputs of a component.
     fn default_columns(&self, component: usize, links: &[Link]) -> Vec<Port> {
         let ports = || {
             (0..self.descriptions[component].variables.len())
                 .map(move |variable| Port { component, variable })
         };
         let outputs = ports().filter(|&p| {
-            self.variable(p).causality == Causality::Output && self.scalar_type(p) != ScalarType::String
+            self.variable(p).causality == Causality::Output
+                && self.scalar_type(p) != ScalarType::String
+                && !self.descriptions[component].is_twin(p.variable)
         });
         let inputs = ports().filter(|p| links.iter().any(|link| link.to == *p));
         outputs.chain(inputs).collect()

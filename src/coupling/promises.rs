@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::layout::Layout;
 use super::network::{self, Link, Port};
 use super::system::{Order, System};
-use crate::error::Error;
+use crate::error::{Error, brief_time};
 use crate::host::{Causality, Description, ScalarType};
 
 /// The outputs of a barrier that are read.
@@ -120,6 +120,8 @@ pub(super) struct Ports {
     course: Course,
     /// Whether h belongs to the communication point at which it is read.
     prompt: bool,
+    /// The measured states that are connected; of the first barrier only.
+    states: Vec<Port>,
 }
 
 /// A promise that is watched.
@@ -134,6 +136,7 @@ pub(super) struct Watched {
     status: usize,
     rearm: Option<usize>,
     fields: [usize; FIELDS.len()],
+    states: Vec<usize>,
     /// The state that changes in the course of a run.
     run: Run,
 }
@@ -151,6 +154,66 @@ struct Run {
     in_a_row: u64,
     longest: u64,
     violation: f64,
+    zeros: Zeros,
+}
+
+/// The measured state of a filter while it is all zero from the start on, and the two points after it.
+#[derive(Clone, Debug, Default)]
+struct Zeros {
+    /// The first point, and the last one with zeros.
+    first: Option<f64>,
+    last: Option<f64>,
+    /// Whether deadlines count from one of them.
+    counted: bool,
+    /// The first point with another state, and that; how far it moved until the next point.
+    after: Option<(f64, Vec<f64>)>,
+    moved: Option<f64>,
+}
+
+impl Zeros {
+    /// How much farther the state goes at once, from zeros, than in the next step, where the zeros were none of the plant.
+    const JUMP: f64 = 10.0;
+
+    /// Takes the state `x` at `time` (s). `is_valid` says whether the sample there, or where outputs come late that of the
+    /// point before, is one that deadlines count from.
+    fn see(&mut self, time: f64, x: impl Iterator<Item = f64> + Clone, is_valid: bool, prompt: bool) {
+        if self.moved.is_some() {
+            return;
+        }
+        self.first.get_or_insert(time);
+        match &self.after {
+            None => {
+                let is_zero = x.clone().all(|x| x == 0.0);
+                self.counted |= is_valid && if prompt { is_zero } else { self.last.is_some() };
+                if is_zero {
+                    self.last = Some(time);
+                } else {
+                    self.after = Some((time, x.collect()));
+                }
+            }
+            Some((_, before)) => {
+                self.moved = Some(before.iter().zip(x).fold(0.0, |far, (a, b)| f64::max(far, (a - b).abs())));
+            }
+        }
+    }
+
+    /// What to say of the filter `name`, if its deadlines count from zeros that were none of its plant.
+    fn note(&self, name: &str) -> Option<String> {
+        let (first, last, moved) = (self.first?, self.last?, self.moved?);
+        let (time, x) = self.after.as_ref()?;
+        let far = x.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
+        // Not-a-number is no jump.
+        let jumps = self.counted && far > Self::JUMP * moved;
+        jumps.then(|| {
+            format!(
+                "{name}: the state was all zero until t = {} s, and jumped then, as where a plant gives zeros before its \
+                 first step; the deadlines count from t = {} s: with `arm_after = {}` in the filter, from the jump",
+                brief_time(last),
+                brief_time(first),
+                brief_time(time - first),
+            )
+        })
+    }
 }
 
 impl Run {
@@ -166,12 +229,13 @@ impl Run {
             in_a_row: 0,
             longest: 0,
             violation: 0.0,
+            zeros: Zeros::default(),
         }
     }
 }
 
 /// The promises of all filters in `system`.
-pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports> {
+pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<Ports> {
     let mut found = Vec::new();
     for (component, description) in descriptions.iter().enumerate() {
         let output = |name: &str| {
@@ -180,6 +244,9 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
             is_output.then_some(Port { component, variable })
         };
         let Some(status) = output("status") else { continue };
+        let is_state = |port: &Port| description.variables[port.variable].name.starts_with(STATE);
+        let connected = links.iter().map(|link| link.to).filter(|port| port.component == component);
+        let mut states: Vec<_> = connected.filter(is_state).collect();
         for variable in &description.variables {
             let Some(barrier) = variable.name.strip_suffix(".unmet_steps") else { continue };
             let ports = FIELDS.map(|field| output(&format!("{barrier}.{field}")));
@@ -198,6 +265,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description]) -> Vec<Ports
                 course: if straight { Course::Straight } else { Course::Smooth },
                 prompt: system.experiment().order == Order::GaussSeidel
                     && network::has_feedthrough(owner, description, h.variable),
+                states: std::mem::take(&mut states),
             });
         }
     }
@@ -209,6 +277,9 @@ fn is_filter(description: &Description) -> bool {
     let promises = description.variables.iter().any(|v| v.name.ends_with(".unmet_steps"));
     promises && description.index_of("status").is_some()
 }
+
+/// The beginning of the names of the measured states of a filter.
+const STATE: &str = "x.";
 
 /// The beginning of the names of the wanted inputs of a filter.
 const WANTED: &str = "u_ref.";
@@ -301,6 +372,7 @@ impl Watched {
             status: layout.slot(ports.status)?,
             rearm: ports.rearm.and_then(|port| layout.slot(port)),
             fields: slots,
+            states: ports.states.iter().filter_map(|port| layout.slot(*port)).collect(),
             run: Run::new(None, ports.course),
         })
     }
@@ -319,11 +391,17 @@ impl Watched {
     /// Takes the `values` of the communication point at `time` (s).
     pub(super) fn see(&mut self, time: f64, values: &[f64]) {
         let at = if self.prompt { Some(time) } else { self.run.last };
-        self.run.last = Some(time);
-        let Some(time) = at else { return };
         let [unmet, slack, h, lost, phase] = self.fields.map(|slot| values[slot]);
         let is = |number: Phase| phase == f64::from(number as i32);
-        let invalid = Status::from_number(values[self.status] as i32).is_some_and(Status::is_abstention);
+        let status = Status::from_number(values[self.status] as i32);
+        let invalid = status.is_some_and(Status::is_abstention);
+        if !self.states.is_empty() {
+            let x = self.states.iter().map(|slot| values[*slot]);
+            self.run.zeros.see(time, x, !invalid, self.prompt);
+        }
+        self.run.last = Some(time);
+        let Some(time) = at else { return };
+        let is_armed = status != Some(Status::NotArmed);
         let run = &mut self.run;
         let rearm = self.rearm.is_some_and(|slot| values[slot] != 0.0);
         if rearm && !run.rearm && run.started {
@@ -342,7 +420,7 @@ impl Watched {
             };
             run.judge.see(time, h, standing, lost != 0.0 || is(Phase::Late));
         }
-        if unmet > 0.0 || invalid {
+        if unmet > 0.0 || invalid && is_armed {
             run.unmet += 1;
             run.in_a_row += 1;
             run.longest = run.longest.max(run.in_a_row);
@@ -350,6 +428,12 @@ impl Watched {
         } else {
             run.in_a_row = 0;
         }
+    }
+
+    /// What the user should know of the state that the filter was given, if there is anything.
+    pub(super) fn note(&self) -> Option<String> {
+        let filter = self.name.rsplit_once('.').map_or(self.name.as_str(), |(filter, _)| filter);
+        self.run.zeros.note(filter)
     }
 
     /// The promise until now.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use percent_encoding::{AsciiSet, CONTROLS, utf8_percent_encode};
 use tempfile::TempDir;
-use zip::ZipArchive;
+use zip::{CompressionMethod, ZipArchive};
 
 use crate::error::{Error, FmuProblem};
 use crate::text;
@@ -65,8 +65,8 @@ impl Archive {
     /// # Errors
     ///
     /// The file cannot be read, is not a zip archive, or exceeds one of the limits above. An entry points out of
-    /// the archive (an absolute name, a drive, a backslash, a `..`), is there twice, or is neither a file nor a
-    /// folder. Nothing is written before all of this is known.
+    /// the archive (an absolute name, a drive, a backslash, a `..`), is there twice, is neither a file nor a
+    /// folder, or is neither stored nor deflated. Nothing is written before all of this is known.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let problem = |problem| Error::fmu(path, problem);
         // The file is opened here first, to tell "no such file" from "not an archive".
@@ -125,7 +125,8 @@ impl Archive {
         self.directory.path().join(entry)
     }
 
-    /// The text of `modelDescription.xml`, as far as it is safe to parse.
+    /// The text of `modelDescription.xml`, as far as it is safe to parse. A byte order mark stays; ISO-8859-1 is read where
+    /// the text says so.
     ///
     /// # Errors
     ///
@@ -137,12 +138,15 @@ impl Archive {
         let size = std::fs::metadata(&path).map_err(missing)?.len();
         limit("modelDescription.xml has", size, "bytes", MAX_DESCRIPTION_BYTES)?;
         let bytes = std::fs::read(&path).map_err(missing)?;
-        let mut text = String::from_utf8(bytes).map_err(|e| {
-            FmuProblem::Description(format!("is not UTF-8 from byte {}", e.utf8_error().valid_up_to()))
-        })?;
-        if text.starts_with('\u{feff}') {
-            text.remove(0);
-        }
+        let is_latin = declared_encoding(&bytes).is_some_and(is_latin);
+        let text = if is_latin {
+            // Its bytes are the first 256 characters.
+            bytes.into_iter().map(char::from).collect()
+        } else {
+            String::from_utf8(bytes).map_err(|e| {
+                FmuProblem::Description(format!("is not UTF-8 from byte {}", e.utf8_error().valid_up_to()))
+            })?
+        };
         super::bounds::check(&text)?;
         Ok(text)
     }
@@ -160,6 +164,19 @@ impl Archive {
         let path = std::path::absolute(&path).unwrap_or(path);
         file_uri(&path.to_string_lossy())
     }
+}
+
+/// Whether an encoding is ISO-8859-1, which the standard excludes, but tools write.
+pub fn is_latin(encoding: &str) -> bool {
+    ["iso-8859-1", "iso8859-1", "latin1"].iter().any(|name| encoding.eq_ignore_ascii_case(name))
+}
+
+/// The encoding that the XML declaration at the beginning of `bytes` names, if there is one.
+pub fn declared_encoding(bytes: &[u8]) -> Option<&str> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).strip_prefix(b"<?xml")?;
+    let end = bytes.windows(2).position(|two| two == b"?>")?;
+    let (_, rest) = std::str::from_utf8(&bytes[..end]).ok()?.split_once("encoding")?;
+    rest.split(['"', '\'']).nth(1)
 }
 
 /// An entry that may be unpacked.
@@ -231,6 +248,10 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
         if file.encrypted() {
             return Err(FmuProblem::Archive(format!("the entry {name:?} is encrypted")));
         }
+        let method = file.compression();
+        if !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
+            return Err(FmuProblem::Compression { entry: name, method: compression(method) });
+        }
         // Two names that differ in case only would overwrite each other where case does not count.
         if !names.insert(name.to_lowercase()) {
             let text = format!("the entry {name:?} is there twice (upper and lower case apart)");
@@ -250,6 +271,19 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
         return Err(FmuProblem::Archive("two of its entries share their bytes".into()));
     }
     Ok(plan)
+}
+
+/// The name of a method that is neither that of stored nor that of deflated entries.
+fn compression(method: CompressionMethod) -> String {
+    const NAMES: [(CompressionMethod, &str); 5] = [
+        (CompressionMethod::DEFLATE64, "deflate64"),
+        (CompressionMethod::BZIP2, "bzip2"),
+        (CompressionMethod::LZMA, "lzma"),
+        (CompressionMethod::ZSTD, "zstd"),
+        (CompressionMethod::XZ, "xz"),
+    ];
+    let known = NAMES.iter().find(|(known, _)| *known == method);
+    known.map_or_else(|| format!("a method of its own, {method:?}"), |(_, name)| (*name).to_owned())
 }
 
 /// Writes one entry below `folder`, and no more bytes than the archive announced for it.

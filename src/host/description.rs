@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use std::ops::Deref;
 
 use fmi_rs::model_description::fmi2 as importer;
+use punctual_fmu::product::CODE;
 use punctual_modeldescription::{
     Causality, DefaultExperiment, Located, ModelDescription, ModelStructure, SimpleType, VariableKind,
     is_c_identifier,
@@ -79,6 +80,18 @@ impl Description {
     /// The position of the variable of this name.
     pub fn index_of(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|variable| variable.name == name)
+    }
+
+    /// Whether the variable at `index` says what an enumeration of the same FMU says, for importers that drop enumerations:
+    /// the Integer `status_code` beside `status`.
+    pub fn is_twin(&self, index: usize) -> bool {
+        let variable = &self.variables[index];
+        let of =
+            variable.name.strip_suffix(CODE).filter(|_| matches!(variable.kind, VariableKind::Integer(_)));
+        let is_enumeration = |of: &str| {
+            self.variables.iter().any(|v| v.name == of && matches!(v.kind, VariableKind::Enumeration(_)))
+        };
+        of.is_some_and(is_enumeration)
     }
 
     /// The inputs an output depends on directly, as positions in the variables.

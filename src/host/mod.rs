@@ -15,7 +15,7 @@ use std::path::Path;
 
 pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
-    MAX_UNPACKED_BYTES, SMALL_BYTES,
+    MAX_UNPACKED_BYTES, SMALL_BYTES, declared_encoding, is_latin,
 };
 pub use description::{Description, Output};
 pub use logging::LogMessage;

@@ -180,6 +180,7 @@ fn gravity(status: i32) -> i32 {
         Some(Status::Unchanged) => 0,
         Some(Status::Filtered) => 1,
         Some(Status::Backup) => 2,
+        Some(Status::NotArmed) => 3,
         _ => 3 + status,
     }
 }

@@ -68,6 +68,7 @@ const BEFORE: &[Rule] = &[
         "the file is a zip archive: whole, no entry twice, no link, nothing encrypted",
     ),
     ("archive.name", Error, "no entry is absolute, leaves the archive, or holds a backslash"),
+    ("archive.compression", Error, "entries are stored or deflated: several importers read nothing else"),
     ("archive.limit", Error, "the archive is not larger than what is unpacked from a file of unknown origin"),
     (
         "archive.binary",
@@ -77,10 +78,12 @@ const BEFORE: &[Rule] = &[
     ("archive.platform", Warning, "there is a library for this platform"),
     ("archive.top-folder", Warning, "everything lies where the standard has a place for it"),
     ("xml.readable", Error, "modelDescription.xml is there, UTF-8, well-formed, and needs no document type"),
+    ("xml.encoding", Warning, "modelDescription.xml is in UTF-8, not ISO-8859-1, without a byte order mark"),
     ("schema.element", Error, "elements are those of the schema, in its order and number"),
     ("schema.attribute", Error, "attributes are those of the schema; the required ones are there"),
     ("schema.value", Error, "values have the type that the schema gives them"),
     ("schema.text", Error, "there is no text between elements"),
+    ("schema.exchange", Error, "attributes for model exchange alone are not there without it"),
 ];
 
 /// The rules on libraries and the behaviour of instances.
@@ -188,7 +191,14 @@ impl Findings {
 
     /// Whether a rule is broken whose name begins with `head`.
     pub(super) fn any(&self, head: &str) -> bool {
-        self.list.iter().any(|finding| finding.severity == Error && finding.rule.starts_with(head))
+        self.any_in(head, |_| true)
+    }
+
+    /// Whether such a rule is broken in an entry that `is_meant`; the archive as a whole has none.
+    pub(super) fn any_in(&self, head: &str, is_meant: impl Fn(&str) -> bool) -> bool {
+        let is_broken =
+            |f: &Finding| f.severity == Error && f.rule.starts_with(head) && is_meant(&f.place.file);
+        self.list.iter().any(is_broken)
     }
 
     /// All findings. Where some were left out, the last of their rule says how many.

@@ -92,6 +92,7 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
 fn rule(problem: &FmuProblem) -> &'static str {
     match problem {
         FmuProblem::UnsafeEntry(_) => "archive.name",
+        FmuProblem::Compression { .. } => "archive.compression",
         FmuProblem::Limit { .. } => "archive.limit",
         FmuProblem::Description(_) => "xml.readable",
         _ => "archive.readable",

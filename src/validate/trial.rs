@@ -35,11 +35,18 @@ pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Find
         ("schema.", "the description breaks the schema"),
         ("interface.co-simulation", "there is no co-simulation"),
         ("interface.identifier", "modelIdentifier names no library"),
-        ("archive.binary", "there is no library"),
-        ("symbols.", "a library is not complete"),
     ] {
         if findings.any(head) {
             return Some(reason.to_owned());
+        }
+    }
+    // What is wrong with the library of another platform is no obstacle.
+    let own = format!("binaries/{PLATFORM}/");
+    for (head, reason) in
+        [("archive.binary", "there is no library"), ("symbols.", "the library is not complete")]
+    {
+        if findings.any_in(head, |file| file.is_empty() || file.starts_with(&own)) {
+            return Some(format!("{reason} for {PLATFORM}"));
         }
     }
     if !archive.platforms().iter().any(|platform| platform == PLATFORM) {

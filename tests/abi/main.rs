@@ -16,12 +16,14 @@
 //! | `derivatives` | directional derivatives against differences, and refusals |
 //! | `external` | derivatives that are inputs, against the filter that computes them |
 //! | `assurance` | plans: bits, states, the log, derivatives |
+//! | `arming` | filters that are armed later than at their first step |
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
 mod arguments;
+mod arming;
 mod assurance;
 mod derivatives;
 mod exports;

@@ -243,7 +243,7 @@ impl<'a> Slave<'a> {
         let filter = before.iter().any(|line| line.starts_with("status: "));
         let shown = |line: &String| match line.split_once(": ") {
             Some((name, _)) if filter && name.starts_with("u.") => format!("{name}: 0.0 = 0"),
-            Some((name @ "status", _)) => format!("{name}: 4"),
+            Some((name @ ("status" | "status_code"), _)) => format!("{name}: 4"),
             _ => line.clone(),
         };
         before.iter().map(shown).collect()
@@ -256,7 +256,9 @@ impl<'a> Slave<'a> {
             let found = self.real(&format!("u.{}", signal.name));
             assert_eq!(found.to_bits(), wanted.to_bits(), "u.{} {when}: {found} {wanted}", signal.name);
         }
-        assert_eq!(self.integer("status"), report.status as c_int, "status {when}");
+        for name in ["status", "status_code"] {
+            assert_eq!(self.integer(name), report.status as c_int, "{name} {when}");
+        }
         for (name, b) in filter.barrier_names().zip(&report.barriers) {
             for (field, wanted) in [
                 ("h", b.h),
@@ -282,7 +284,13 @@ impl<'a> Slave<'a> {
             ] {
                 assert_eq!(self.flag(&format!("{name}.{field}")), wanted, "{name}.{field} {when}");
             }
-            assert_eq!(self.integer(&format!("{name}.phase")), b.phase as c_int, "{name}.phase {when}");
+            for field in ["phase", "phase_code"] {
+                assert_eq!(
+                    self.integer(&format!("{name}.{field}")),
+                    b.phase as c_int,
+                    "{name}.{field} {when}"
+                );
+            }
         }
     }
 }

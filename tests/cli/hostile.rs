@@ -310,11 +310,27 @@ fn variables_without_number() {
 
 #[test]
 fn another_encoding_than_is_declared() {
-    let found = findings(description("none", &[("encoding=\"UTF-8\"", "encoding=\"ISO-8859-1\"")]));
+    let declared =
+        |name: &str| description("none", &[("encoding=\"UTF-8\"", &format!("encoding=\"{name}\""))]);
     assert_eq!(
-        found,
-        ["error xml.readable modelDescription.xml:1: the declared encoding is \"ISO-8859-1\"; must be UTF-8"]
+        findings(declared("UTF-16")),
+        ["error xml.readable modelDescription.xml:1: the declared encoding is \"UTF-16\"; must be UTF-8"]
     );
+    let latin = "warning xml.encoding modelDescription.xml:1: the declared encoding is \"ISO-8859-1\", which not every importer \
+                 reads; should be UTF-8";
+    assert_eq!(findings(declared("ISO-8859-1")), [latin]);
+    // A byte that is no UTF-8: an umlaut where the declaration says so, else damage.
+    let with_byte = |text: String| {
+        let mut bytes = text.into_bytes();
+        let at = bytes.windows(6).position(|w| w == b"logAll").expect("the category");
+        bytes[at + 3] = 0xe4;
+        bytes
+    };
+    assert_eq!(findings(with_byte(declared("ISO-8859-1"))), [latin]);
+    let damaged = findings(with_byte(declared("UTF-8")));
+    assert!(damaged.len() == 1 && damaged[0].contains("is not UTF-8 from byte"), "{damaged:#?}");
     let marked = format!("\u{feff}{}", description("none", &[]));
-    assert_eq!(findings(marked), [""; 0], "a byte order mark is allowed");
+    let mark = "warning xml.encoding modelDescription.xml:1: begins with a byte order mark; should begin with `<?xml`, as some \
+                importers do not skip it";
+    assert_eq!(findings(marked), [mark]);
 }

@@ -3,6 +3,7 @@
 //! rewrite them, and read the difference before committing it.
 
 mod alone;
+mod arming;
 mod assuring;
 mod bad_configurations;
 mod bad_fmus;

@@ -200,6 +200,23 @@ fn rules_on_the_interface_and_the_experiment() {
         "stepSize=\"-0.1\"",
         "error experiment.times D:14: stepSize is -0.1; must be finite and > 0",
     );
+    one(
+        "stepSize=\"0.1\"",
+        "stepSize=\"1.5\"",
+        "warning experiment.step D:14: stepSize is 1.5; should be at most stopTime - startTime = 1, or no step fits",
+    );
+    one(
+        "startTime=\"0\" stopTime=\"1\"",
+        "startTime=\"0.95\" stopTime=\"1\"",
+        "warning experiment.step D:14: stepSize is 0.1; should be at most stopTime - startTime = 0.05",
+    );
+    let exact = [("startTime=\"0\" stopTime=\"1\"", "startTime=\"0.2\" stopTime=\"0.3\"")];
+    assert_eq!(findings(description("none", &exact)), [""; 0], "0.3 - 0.2 is a little less than 0.1");
+    one(
+        "<Category name=\"logAll\"/>",
+        "<Category name=\"logAll\"/><Category name=\"logAll\" description=\"again\"/>",
+        "error log.unique D:12: the log category \"logAll\" is defined twice",
+    );
     one("tolerance=\"1e-4\"", "tolerance=\"NaN\"", "error experiment.times D:14: tolerance is NaN;");
     one(
         "<CoSimulation modelIdentifier=\"misbehaving\" canHandleVariableCommunicationStepSize=\"true\"/>",
@@ -242,6 +259,43 @@ fn rules_on_units_and_types() {
         "value=\"1\"",
         "error type.items D:9: the items \"red\" and \"green\" of \"Light\" have the same value 1",
     );
+}
+
+#[test]
+fn units_with_factors_that_are_none() {
+    for (factor, read) in [("0", "0"), ("0.0", "0"), ("NaN", "NaN"), ("INF", "inf"), ("-INF", "-inf")] {
+        one(
+            "<BaseUnit m=\"1\"/>",
+            &format!("<BaseUnit m=\"1\" factor=\"{factor}\"/>"),
+            &format!("error unit.factor D:5: the unit \"m\" has the factor {read}; must be finite and not 0"),
+        );
+        one(
+            "factor=\"1000\"",
+            &format!("factor=\"{factor}\""),
+            &format!(
+                "error unit.factor D:5: the unit \"mm\" has the factor {read}; must be finite and not 0"
+            ),
+        );
+    }
+}
+
+/// Attributes that belong to model exchange: refused without it, of no matter with it.
+#[test]
+fn attributes_of_model_exchange() {
+    let reinit = ("<Real unit=\"m\" max=\"1000\"/>", "<Real unit=\"m\" max=\"1000\" reinit=\"true\"/>");
+    let sets = ("causality=\"input\"", "causality=\"input\" canHandleMultipleSetPerTimeInstant=\"false\"");
+    one(
+        reinit.0,
+        reinit.1,
+        "error schema.exchange D:20 y: reinit is for model exchange, which this FMU does not",
+    );
+    one(
+        sets.0,
+        sets.1,
+        "error schema.exchange D:22 u: canHandleMultipleSetPerTimeInstant is for model exchange",
+    );
+    let exchange = ("<CoSimulation", "<ModelExchange modelIdentifier=\"misbehaving\"/><CoSimulation");
+    assert_eq!(findings(description("none", &[exchange, reinit, sets])), [""; 0]);
 }
 
 #[test]
@@ -406,6 +460,72 @@ fn libraries_that_are_none_or_lack_functions() {
     let whole = misbehaving::library(&[]);
     let cut = with(&whole[..whole.len() / 3]);
     assert!(cut.starts_with("error symbols."), "{cut}");
+}
+
+/// The archive of the fixture, with the compression method of every entry told as another.
+#[test]
+fn entries_compressed_in_other_ways() {
+    for (method, name) in [
+        (12_u16, "bzip2"),
+        (14, "lzma"),
+        (9, "deflate64"),
+        (93, "zstd"),
+        (95, "xz"),
+        (1, "a method of its own, Unsupported(1)"),
+    ] {
+        let workshop = Workshop::new();
+        misbehaving::write(&workshop, "x.fmu", description("none", &[]), &misbehaving::library(&[]));
+        let mut bytes = std::fs::read(workshop.path("x.fmu")).expect("the archive");
+        // The method stands in the head of an entry, and in its line of the directory.
+        for (head, at) in [(b"PK\x03\x04", 8), (b"PK\x01\x02", 10)] {
+            let found = bytes.windows(4).position(|four| four == head).expect("an entry");
+            bytes[found + at..][..2].copy_from_slice(&method.to_le_bytes());
+        }
+        workshop.write("x.fmu", bytes);
+        let (code, found) = listed(&workshop, &[]);
+        let entry = "the entry \"modelDescription.xml\" is compressed with";
+        assert_eq!(
+            (code, found),
+            (1, vec![format!("error archive.compression : {entry} {name}; must be stored or deflated")])
+        );
+        let refused = workshop.punctual(["inspect", "x.fmu"]);
+        assert!(refused.code == 1 && refused.stderr.contains(&format!("{entry} {name}")), "{refused:#?}");
+    }
+}
+
+/// An archive with this platform's library and, for another one, something else.
+fn of_two_platforms(own: &[u8], other: &[u8], defect: &str) -> Workshop {
+    let workshop = Workshop::new();
+    let other_platform = if cfg!(windows) { "linux32/misbehaving.so" } else { "win32/misbehaving.dll" };
+    let mut archive = punctual_modeldescription::Archive::new();
+    archive.add("modelDescription.xml", description(defect, &[])).expect("an entry");
+    let suffix = std::env::consts::DLL_SUFFIX;
+    archive
+        .add(&format!("binaries/{}/misbehaving{suffix}", punctual::host::PLATFORM), own)
+        .expect("an entry");
+    archive.add(&format!("binaries/{other_platform}"), other).expect("an entry");
+    workshop.write("x.fmu", archive.to_bytes().expect("an archive"));
+    workshop
+}
+
+/// What is wrong with the library of another platform does not keep this one's from being tried.
+#[test]
+fn the_trial_runs_where_this_platforms_library_is_whole() {
+    let (whole, broken) = (misbehaving::library(&[]), b"no library".as_slice());
+    let workshop = of_two_platforms(&whole, broken, "error-in-step");
+    let (_, found) = listed(&workshop, &[]);
+    assert!(found.len() == 2 && found[0].starts_with("error symbols.readable binaries/"), "{found:#?}");
+    assert!(found[1].starts_with("error trial.call trial: "), "it ran: {found:#?}");
+    // This platform's own is not run.
+    for own in [broken.to_vec(), misbehaving::library(&["WITHOUT_STATE"])] {
+        let workshop = of_two_platforms(&own, broken, "error-in-step");
+        let done = workshop.punctual(["validate", "x.fmu"]);
+        let wanted = format!(
+            "note: not examined: the trial: the library is not complete for {}\n",
+            punctual::host::PLATFORM
+        );
+        assert_eq!((done.code, done.stderr), (1, wanted));
+    }
 }
 
 #[test]

@@ -47,6 +47,14 @@ BROKEN = {
     "an initial unknown that is not listed": ("<InitialUnknowns>\n      " + FIRST, "<InitialUnknowns>"),
     "not well-formed": ("</Outputs>", ""),
 }
+# Texts and their replacements to which we object, by this rule, and FMPy does not.
+OURS_ALONE = {
+    "unit.factor": ('<BaseUnit m="1"/>', '<BaseUnit m="1" factor="0"/>'),
+    "log.unique": ('<Category name="logAll"/>', '<Category name="logAll"/><Category name="logAll"/>'),
+    "schema.exchange": ('<Real unit="m" max="1000"/>', '<Real unit="m" max="1000" reinit="false"/>'),
+    "experiment.step": ('stepSize="0.1"', 'stepSize="2"'),
+    "xml.encoding": ('encoding="UTF-8"', 'encoding="ISO-8859-1"'),
+}
 # No defect for either.
 SOUND = {
     "nothing": ("", ""),
@@ -67,11 +75,11 @@ def library(tmp_path_factory):
     return product
 
 
-def verdicts(folder, library, old, new):
+def verdicts(folder, library, old, new, method=zipfile.ZIP_STORED):
     xml = (FIXTURES / "misbehaving.xml").read_text()
     assert old in xml
     fmu = folder / "x.fmu"
-    with zipfile.ZipFile(fmu, "w") as archive:
+    with zipfile.ZipFile(fmu, "w", method) as archive:
         archive.writestr("modelDescription.xml", xml.replace(old, new, 1))
         archive.write(library, "binaries/linux64/misbehaving.so")
     done = punctual("validate", fmu, "--json", "--no-trial", check=False)
@@ -90,6 +98,22 @@ def test_both_object(tmp_path, library, defect):
 def test_both_accept(tmp_path, library, edit):
     ours, theirs = verdicts(tmp_path, library, *SOUND[edit])
     assert ours["errors"] == 0 and theirs == [], (ours, theirs)
+
+
+@pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")
+@pytest.mark.parametrize("rule", OURS_ALONE)
+def test_ours_alone_objects(tmp_path, library, rule):
+    ours, theirs = verdicts(tmp_path, library, *OURS_ALONE[rule])
+    assert [finding["rule"] for finding in ours["findings"]] == [rule] and theirs == []
+
+
+@pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_compression(tmp_path, library, method):
+    """Python's zipfile reads more than other importers do, and FMPy says nothing to it."""
+    ours, theirs = verdicts(tmp_path, library, "", "", method)
+    expected = [] if method == zipfile.ZIP_DEFLATED else ["archive.compression"]
+    assert [finding["rule"] for finding in ours["findings"]] == expected and theirs == []
 
 
 def test_ours_have_no_errors_and_no_warnings(fmus):

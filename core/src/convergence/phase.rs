@@ -42,7 +42,7 @@ impl Phase {
 
     fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Waiting => ("waiting", "no step with valid inputs yet"),
+            Self::Waiting => ("waiting", "not begun: no step with valid inputs yet, or not armed"),
             Self::Approach => ("approach", "on the way, before the deadline"),
             Self::Late => ("late", "the deadline passed outside; the approach goes on"),
             Self::Stay => ("stay", "inside, and kept there"),

@@ -98,7 +98,7 @@ impl Standing {
 
     fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Undecided => ("undecided", "no step with a valid state yet"),
+            Self::Undecided => ("undecided", "no step with a valid state yet, or not armed"),
             Self::Assured => ("assured", "a plan keeps every promise, whatever u_ref is"),
             Self::Refused => ("refused", "no plan was found at the start: nothing is promised"),
             Self::Withdrawn => ("withdrawn", "was assured: the plant is not where the model led"),
@@ -719,6 +719,13 @@ impl AssuredFilter {
     /// whole filter.
     fn sample(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
         self.next.clone_from(&self.commitment);
+        let filter = self.rows.filter();
+        // Not by the status: u_ref may be no number.
+        let is_armed = filter.workspace.next.is_armed(t, filter.arm_after);
+        if self.next.standing == Standing::Undecided && !is_armed {
+            (self.assurance, self.piece) = (Assurance::default(), Piece::ROWS);
+            return;
+        }
         let mut rows = [0.0; MAX_INPUTS];
         rows[..u.len()].copy_from_slice(u);
         let x = &self.rows.state(x)[..];

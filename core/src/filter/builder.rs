@@ -31,6 +31,7 @@ pub struct FilterBuilder {
     correction_limit: f64,
     sampling: Sampling,
     period_max: f64,
+    arm_after: f64,
     delay: f64,
     errors: Vec<f64>,
     backend: Backend,
@@ -49,6 +50,7 @@ impl FilterBuilder {
             correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
             period_max: 0.0,
+            arm_after: 0.0,
             delay: 0.0,
             errors: Vec::new(),
             backend: Backend::default(),
@@ -336,6 +338,22 @@ impl FilterBuilder {
         Ok(self)
     }
 
+    /// Sets the time in s, finite, ≥ 0, from the filter's first sample until it is armed: every deadline counts from the first
+    /// sample with valid inputs then. Default: 0, the first sample itself. For a loop that hands out zeros, or what settles,
+    /// before it is under way.
+    ///
+    /// Before, nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
+    /// [`NotArmed`](super::Status::NotArmed). From then on every bit is that of a filter whose first sample came then.
+    /// [`SafetyFilter::rearm`] does not make it wait again.
+    ///
+    /// # Errors
+    ///
+    /// A time that is not finite or < 0.
+    pub fn arm_after(mut self, seconds: f64) -> Result<Self, Error> {
+        self.arm_after = non_negative("arm_after", seconds)?;
+        Ok(self)
+    }
+
     /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
     /// master that exchanges all values first (Jacobi). Default: 0.
     ///
@@ -389,6 +407,7 @@ impl FilterBuilder {
             correction_limit,
             sampling,
             period_max,
+            arm_after,
             delay,
             errors,
             backend,
@@ -457,6 +476,7 @@ impl FilterBuilder {
             errors,
             first_period,
             period_max,
+            arm_after,
             expected: None,
             is_backed: false,
             state,

@@ -58,9 +58,12 @@ pub struct FilterState {
     /// The measured sampling period in s, under [`Sampling::Measured`] from the second sample on.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: Option<f64>,
-    /// The input handed out at [`Self::time`]; zeros above the number of inputs.
+    /// The input handed out at [`Self::time`], or last while not armed; zeros above the number of inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub input: [f64; MAX_INPUTS],
+    /// Time of the first sample in s, valid or not, where the filter is [armed later](FilterBuilder::arm_after) than that.
+    #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
+    pub start: Option<f64>,
 }
 
 impl Clone for FilterState {
@@ -70,11 +73,23 @@ impl Clone for FilterState {
 
     /// Reuses the memory, which a derived `Clone` would not: a step must not allocate.
     fn clone_from(&mut self, source: &Self) {
-        let Self { barriers, time, period, input } = source;
+        let Self { barriers, time, period, input, start } = source;
         self.barriers.clone_from(barriers);
-        (self.time, self.period, self.input) = (*time, *period, *input);
+        (self.time, self.period, self.input, self.start) = (*time, *period, *input, *start);
     }
 }
+
+impl FilterState {
+    /// Whether a filter that is armed `after` seconds from its first sample is so at `t`: once it is, it stays so.
+    #[inline]
+    fn is_armed(&self, t: f64, after: f64) -> bool {
+        let reached = |start: f64| t - start >= after - SAME_TIME * t.abs().max(after);
+        after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
+    }
+}
+
+/// Round-off of a time that is a sum of steps, as a part of it.
+const SAME_TIME: f64 = 1e-12;
 
 /// Periods that differ by less than this part of them count as equal.
 const SAME_PERIOD: f64 = 1e-6;
@@ -121,6 +136,8 @@ pub struct SafetyFilter {
     first_period: f64,
     /// The longest time in s between two samples, 0 where it is not given.
     period_max: f64,
+    /// The time in s from the first sample until the filter is armed.
+    arm_after: f64,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
     /// Whether a plan stands behind the next step, so that rows need not be met.
@@ -177,7 +194,8 @@ impl SafetyFilter {
         Ok(&self.workspace.report)
     }
 
-    /// Forgets the anchors: the next sample with valid inputs starts every deadline anew.
+    /// Forgets the anchors: the next sample with valid inputs starts every deadline anew. The time until the filter is
+    /// [armed](FilterBuilder::arm_after) counts from its first sample all the same.
     pub fn rearm(&mut self) {
         self.state.barriers.fill(FixedTimeState::default());
         (self.state.time, self.state.period) = (None, None);

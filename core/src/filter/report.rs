@@ -42,11 +42,13 @@ pub enum Status {
     /// The constraints are not met, or lead where no way on is left, and a plan that keeps every promise decides. Only
     /// from a filter that follows plans (`AssuredFilter`).
     Backup = 8,
+    /// The filter is [not armed](super::FilterBuilder::arm_after) yet: nothing is asked or promised, u_ref within its bounds.
+    NotArmed = 9,
 }
 
 impl Status {
     /// Every status, in the order of its number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Unchanged,
         Self::Filtered,
         Self::Infeasible,
@@ -56,6 +58,7 @@ impl Status {
         Self::WrongRelativeDegree,
         Self::SolverFailed,
         Self::Backup,
+        Self::NotArmed,
     ];
 
     /// Its name, as the FMU's enumeration has it.
@@ -81,6 +84,7 @@ impl Status {
             }
             Self::SolverFailed => ("solver_failed", "no convergence: u_ref within its bounds"),
             Self::Backup => ("backup", "a plan decides, and keeps every promise"),
+            Self::NotArmed => ("not_armed", "not armed yet: nothing is promised, u_ref within its bounds"),
         }
     }
 
@@ -89,9 +93,16 @@ impl Status {
         Self::ALL.into_iter().find(|status| *status as i32 == number)
     }
 
-    /// Whether no constraint was enforced: no valid input, no finite model, no row that is one, no convergence.
+    /// Whether no constraint was enforced: no valid input, no finite model, no row that is one, no convergence, not armed.
     pub fn is_abstention(self) -> bool {
-        matches!(self, Self::InvalidInput | Self::Singular | Self::WrongRelativeDegree | Self::SolverFailed)
+        matches!(
+            self,
+            Self::InvalidInput
+                | Self::Singular
+                | Self::WrongRelativeDegree
+                | Self::SolverFailed
+                | Self::NotArmed
+        )
     }
 
     /// Whether the returned input satisfies every constraint, or a plan that keeps every promise stands behind it.

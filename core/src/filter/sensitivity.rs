@@ -167,6 +167,7 @@ impl SafetyFilter {
     ///   components at their bounds, the direction of u_ref in the others.
     /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
     ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
+    /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components that a bound holds; h as ever.
     ///
     /// Does not allocate where `out` has been used with this filter before. An answer that is not `None` says why the
     /// derivative is not known; `out` then means nothing.
@@ -219,6 +220,9 @@ impl SafetyFilter {
         if constant.contains(&self.report().status) {
             return Ok(None);
         }
+        if self.report().status == Status::NotArmed {
+            return Ok(self.directional_unarmed(t, x, u_ref, u, direction, out).err());
+        }
         if !self.errors.is_exact() {
             return Ok(Some(NoDerivative::MeasurementErrors));
         }
@@ -252,6 +256,28 @@ impl SafetyFilter {
             }
         }
         *moved = du;
+        Ok(())
+    }
+
+    /// The derivative where the filter is not armed yet: u_ref passes, and h is told.
+    fn directional_unarmed(
+        &self,
+        t: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<(), NoDerivative> {
+        for (i, b) in out.barriers.iter_mut().enumerate() {
+            let source = self.slots[i].source.directional().ok_or(NoDerivative::Source(i))?;
+            let (mut change, held) = (Ahead::ZERO, &[0.0; MAX_INPUTS][..u.len()]);
+            source.evaluate_directional(t, x, u, Direction { x: direction.x, u: held }, &mut change);
+            b.h = change.value[0];
+        }
+        for i in 0..u.len() {
+            out.u[i] = if u[i] == u_ref[i] { direction.u[i] } else { 0.0 };
+        }
         Ok(())
     }
 

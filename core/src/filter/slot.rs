@@ -9,7 +9,7 @@ use super::errors::{ErrorSlopes, MeasurementErrors};
 use super::hold::Lowest;
 use super::outlook::Outlook;
 use super::step::Moment;
-use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, Status};
+use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, SAME_TIME, Status};
 use crate::convergence::comparison::Stack;
 use crate::convergence::sampled::PeriodBound;
 use crate::convergence::stay::Means;
@@ -121,9 +121,6 @@ impl SlotSample {
         (self.row, self.period_bound, self.lowest) = (Row::ZERO, PeriodBound::ZERO, None);
     }
 }
-
-/// Round-off of a time that is a sum of steps, as a part of it.
-const SAME_TIME: f64 = 1e-12;
 
 impl BarrierSlot {
     pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {

@@ -57,9 +57,14 @@ impl SafetyFilter {
         length("u", u.len(), self.input_dim)?;
         self.workspace.next.clone_from(&self.state);
         self.workspace.report.reset(t);
+        self.note_start(t);
         if !t.is_finite() || !all_finite(x) || !all_finite(u_ref) {
             self.workspace.report.barriers.fill(BarrierReport::BLANK);
             self.abstain(Status::InvalidInput, u);
+            return Ok(());
+        }
+        if !self.workspace.next.is_armed(t, self.arm_after) {
+            self.wait(t, x, u_ref, u);
             return Ok(());
         }
         let moment = self.moment(t, x, u_ref);
@@ -295,11 +300,37 @@ impl SafetyFilter {
         }
     }
 
+    /// Notes the first sample, where the filter is armed later. A sample before it is the first of another run.
+    #[inline]
+    fn note_start(&mut self, t: f64) {
+        let start = &mut self.workspace.next.start;
+        if self.arm_after > 0.0 && t.is_finite() && start.is_none_or(|start| t < start) {
+            *start = Some(t);
+        }
+    }
+
+    /// Lets u_ref pass within its bounds: the filter is not armed yet.
+    fn wait(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
+        let Workspace { next, report, .. } = &mut self.workspace;
+        report.status = Status::NotArmed;
+        for ((slot, b), promise) in self.slots.iter_mut().zip(&mut report.barriers).zip(&next.barriers) {
+            slot.source.evaluate(t, x, &mut slot.now.derivatives);
+            *b = BarrierReport { h: slot.now.derivatives.drift[0], ..BarrierReport::BLANK };
+            b.remember(promise);
+        }
+        for (i, u) in u.iter_mut().enumerate() {
+            *u = self.bounds.clamp(i, u_ref[i]);
+        }
+        next.input[..u.len()].copy_from_slice(u);
+    }
+
     /// Enforces nothing and gives the admissible input nearest 0. Promises stay as they were, but lose their guarantee.
     fn abstain(&mut self, status: Status, u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = status;
+        let start = next.start;
         next.clone_from(&self.state);
+        next.start = start;
         for (promise, b) in next.barriers.iter_mut().zip(&mut report.barriers) {
             promise.on_course = false;
             b.remember(promise);
@@ -313,7 +344,8 @@ impl SafetyFilter {
     pub(super) fn acting(&self) -> [f64; MAX_INPUTS] {
         match self.state.time {
             Some(_) => self.state.input,
-            None => core::array::from_fn(|i| self.bounds.clamp(i, 0.0)),
+            // That of a step that was not armed, or else 0.
+            None => core::array::from_fn(|i| self.bounds.clamp(i, self.state.input[i])),
         }
     }
 }

@@ -6,13 +6,15 @@ use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
-use crate::product::{BARRIER_OUTPUTS, Layout, Reading};
+use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading};
 use crate::{FilterLoop, LoopState};
 
 pub(super) struct FilterBlock {
     configuration: FilterConfiguration,
     parameters: Vec<Parameter<FilterConfiguration>>,
     layout: Layout,
+    /// The outputs that are enumerations; their codes follow the parameters.
+    enumerated: Vec<usize>,
     filter: FilterLoop,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
@@ -29,13 +31,26 @@ pub(super) struct FilterBlock {
 impl FilterBlock {
     pub(super) fn new(
         configuration: FilterConfiguration,
-        layout: Layout,
+        product: &Product,
     ) -> Result<Self, ConfigurationError> {
+        let (layout, enumerated) = (product.layout, product.enumerated().collect());
         let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
         let (kept, u) = (filter.state(), vec![0.0; layout.inputs]);
         let change = SampleDerivative::default();
         let noticed = None;
-        Ok(Self { configuration, parameters, layout, filter, rearm_seen: false, noticed, kept, u, change })
+        let rearm_seen = false;
+        Ok(Self {
+            configuration,
+            parameters,
+            layout,
+            enumerated,
+            filter,
+            rearm_seen,
+            noticed,
+            kept,
+            u,
+            change,
+        })
     }
 
     fn rearm_index(&self) -> usize {
@@ -117,6 +132,13 @@ impl FilterBlock {
         }
     }
 
+    /// Writes the number of each enumeration to its code.
+    fn write_codes(&self, values: &mut Values) {
+        for (code, &of) in (self.layout.end..).zip(&self.enumerated) {
+            values.integers[code] = values.integers[of];
+        }
+    }
+
     /// The reason why there is no derivative, with the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
@@ -157,6 +179,7 @@ impl FilterBlock {
         if self.filter.integrated_input().is_some() {
             values.reals[self.integral()] = integrated;
         }
+        self.write_codes(values);
     }
 }
 
@@ -246,6 +269,7 @@ impl Block for FilterBlock {
             configuration: _,
             parameters: _,
             layout: _,
+            enumerated: _,
             noticed: _,
             kept: _,
             u: _,
@@ -304,5 +328,6 @@ impl Block for FilterBlock {
             let shown = if self.filter.standing().is_some() { Standing::Undecided } else { standing };
             self.write_standing(shown, 0.0, values);
         }
+        self.write_codes(values);
     }
 }

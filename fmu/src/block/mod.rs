@@ -149,7 +149,7 @@ pub trait Block: Send {
 /// A configuration that cannot be built.
 pub fn build(product: &Product) -> Result<Box<dyn Block>, ConfigurationError> {
     Ok(match &product.configuration {
-        Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product.layout)?),
+        Configuration::Filter(c) => Box::new(FilterBlock::new(c.clone(), product)?),
         Configuration::Plant(c) => Box::new(PlantBlock::new(c.clone(), product.layout)?),
         Configuration::Controller(c) => Box::new(ControllerBlock::new(c.clone(), product.layout)?),
     })

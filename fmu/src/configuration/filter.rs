@@ -76,6 +76,8 @@ pub(super) struct RawFilter {
     actuation_delay: f64,
     #[serde(default)]
     period_max: f64,
+    #[serde(default)]
+    arm_after: f64,
     #[serde(default = "correction_limit")]
     correction_limit: f64,
     plant: RawModel,
@@ -125,6 +127,10 @@ pub struct FilterConfiguration {
     /// as long as the steps before were.
     #[serde(skip_serializing_if = "is_zero")]
     pub period_max: f64,
+    /// The time in s from the first step until the filter is armed, ≥ 0: every deadline counts from then. Before, nothing is
+    /// asked or promised.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub arm_after: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
     /// reported as `no_authority`.
     pub correction_limit: f64,
@@ -176,7 +182,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 21] = [
+        static KEYS: [Key; 22] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -226,6 +232,13 @@ pub(super) static SECTION: Section = Section {
                 Some("0"),
                 "the longest time between two steps; the promises then hold for steps of any length up to it. 0: as long as \
                  the ones before were",
+            ),
+            Key::new(
+                "arm_after",
+                Number(Is("s"), Range::NON_NEGATIVE),
+                Some("0: at the first step"),
+                "the time from the first step until the filter is [armed](fmu.md#arming): every deadline counts from the first \
+                 step with valid inputs then. Before, nothing is asked or promised, and u is u_ref within its bounds",
             ),
             Key::new(
                 "measurement_errors",
@@ -349,6 +362,7 @@ impl FilterConfiguration {
             unassured: String::new(),
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
+            arm_after: raw.arm_after,
             correction_limit: raw.correction_limit,
             plant,
             integrator: raw.integrator,
@@ -487,6 +501,12 @@ impl FilterConfiguration {
             rows.extend(barrier.parameters(i, &self.plant, degrees.get(i).copied()));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
+        // After all others, which kept their value references.
+        let names = ("arm_after".to_owned(), "arm_after".to_owned());
+        let description = "time from the first step until the filter is armed; before, nothing is promised";
+        rows.push(Parameter::new(names, "s", Range::NON_NEGATIVE, description, |c: &mut Self| {
+            Some(&mut c.arm_after)
+        }));
         rows
     }
 
@@ -567,6 +587,7 @@ impl FilterConfiguration {
             .and_then(|b| b.correction_limit(self.correction_limit))
             .and_then(|b| b.actuation_delay(self.actuation_delay))
             .and_then(|b| if self.period_max == 0.0 { Ok(b) } else { b.period_max(self.period_max) })
+            .and_then(|b| b.arm_after(self.arm_after))
             .and_then(|b| b.sampling(self.sampling(self.experiment.step_size)))
             .and_then(|b| b.measurement_errors(&errors))
             .and_then(FilterBuilder::build)
@@ -576,6 +597,13 @@ impl FilterConfiguration {
     /// The relative degree of each barrier; none for a configuration that cannot be built.
     pub fn relative_degrees(&self) -> Vec<usize> {
         self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
+    }
+
+    /// The same filter, armed at its first step.
+    #[must_use]
+    pub fn armed_at_once(mut self) -> Self {
+        self.arm_after = 0.0;
+        self
     }
 
     /// Whether the filter follows plans.

@@ -30,7 +30,7 @@ pub(super) enum Named {
 }
 
 /// Names, and first parts of names, of the FMU's own variables.
-const RESERVED: [(&str, &[Named]); 13] = {
+const RESERVED: [(&str, &[Named]); 15] = {
     const BOTH: &[Named] = &[Named::Barrier, Named::Parameter];
     [
         ("x", BOTH),
@@ -39,6 +39,8 @@ const RESERVED: [(&str, &[Named]); 13] = {
         ("u_min", BOTH),
         ("u_max", BOTH),
         ("status", BOTH),
+        ("status_code", BOTH),
+        ("arm_after", BOTH),
         ("rearm", BOTH),
         ("integrator", BOTH),
         ("measurement_error", BOTH),

@@ -127,12 +127,12 @@ fn value_references_are_indices_and_names_are_unique() {
             assert_eq!(variable.value_reference as usize, i, "{}", variable.name);
         }
         let Layout { outputs, parameters, end, .. } = product.layout;
-        assert_eq!(end, product.variables.len());
+        assert_eq!(end + product.enumerated().count(), product.variables.len());
         assert_eq!(product.ranges.len(), end - parameters);
         for (i, variable) in product.variables.iter().enumerate() {
             let wanted = match i {
                 i if i < outputs => Causality::Input,
-                i if i < parameters => Causality::Output,
+                i if i < parameters || i >= end => Causality::Output,
                 _ => Causality::Parameter,
             };
             assert_eq!(variable.causality, wanted, "{}", variable.name);
@@ -165,7 +165,7 @@ fn dependencies_say_whether_outputs_follow_inputs_at_once() {
             Configuration::Controller(_) => continue,
             _ => Vec::new(),
         };
-        for output in &product.variables[product.layout.outputs..product.layout.parameters] {
+        for output in product.variables.iter().filter(|v| v.causality == Causality::Output) {
             assert_eq!(output.dependencies.as_ref(), Some(&wanted), "{}", output.name);
         }
     }
@@ -214,6 +214,19 @@ fn enumerations_cover_every_status_and_phase() {
     assert_eq!(values(phase_type()), [0, 1, 2, 3, 4, 5]);
     let names = status_type().items.into_iter().map(|i| i.name).collect::<BTreeSet<_>>();
     assert_eq!(names.len(), Status::ALL.len(), "{names:?}");
+}
+
+/// Importers that drop enumerations find the same numbers as integers, after all that was there before.
+#[test]
+fn every_enumeration_has_an_integer_twin() {
+    let bounds = "bounds = { u_x = [-8, 8], u_y = [-8, 8] }\n";
+    let text = format!("kind = \"filter\"\nplant.model = \"point_mass\"\n{bounds}{BARRIER}");
+    let product = product(&text);
+    let twins: Vec<_> = product.variables[product.layout.end..].iter().collect();
+    let names: Vec<_> = twins.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["status_code", "goal.phase_code", "assurance_code"]);
+    assert!(twins.iter().all(|v| v.kind.base_type() == punctual_modeldescription::BaseType::Integer));
+    assert!(twins.iter().all(|v| matches!(v.kind, VariableKind::Integer(_))));
 }
 
 /// One valid change per field gives another GUID each, and no two the same.

@@ -45,7 +45,10 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("interface.guid", Error, "guid is not empty"),
     ("interface.flags", Warning, "the capability flags do not contradict each other"),
     ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
+    ("experiment.step", Warning, "stepSize is at most stopTime - startTime"),
+    ("log.unique", Error, "no log category is defined twice"),
     ("unit.unique", Error, "no unit or display unit is defined twice"),
+    ("unit.factor", Error, "factors of units and display units are finite and not 0"),
     ("unit.defined", Error, "units and display units used are defined"),
     ("type.unique", Error, "no type is defined twice or named like a variable"),
     ("type.defined", Error, "declaredType names a type of the same kind"),
@@ -92,6 +95,8 @@ pub enum Place {
     Interface(usize),
     /// The default experiment.
     Experiment,
+    /// A log category.
+    Category(usize),
     /// A unit.
     Unit(usize),
     /// A unit, and one of its display units.
@@ -136,6 +141,7 @@ impl Check<'_> {
     pub(crate) fn description(&mut self) {
         self.interface();
         self.experiment();
+        self.categories();
         self.units();
         self.types();
         self.variables();
@@ -193,6 +199,26 @@ impl Check<'_> {
                 complain(format!("{name} is {value}; must be finite and > 0"));
             }
         }
+        if let (Some(stop), Some(step)) = (experiment.stop_time, experiment.step_size)
+            && step > (stop - start) * (1.0 + ROUND_OFF)
+            && stop > start
+        {
+            let message = format!(
+                "stepSize is {step}; should be at most stopTime - startTime = {}, or no step fits into the experiment",
+                stop - start
+            );
+            self.add("experiment.step", Place::Experiment, message);
+        }
+    }
+
+    fn categories(&mut self) {
+        let mut seen = HashSet::new();
+        for (c, category) in self.description.log_categories.iter().enumerate() {
+            if !seen.insert(category.name.as_str()) {
+                let message = format!("the log category {:?} is defined twice", brief(&category.name));
+                self.add("log.unique", Place::Category(c), message);
+            }
+        }
     }
 
     fn units(&mut self) {
@@ -202,14 +228,26 @@ impl Check<'_> {
                 let message = format!("the unit {:?} is defined twice", unit.name);
                 self.add("unit.unique", Place::Unit(u), message);
             }
+            if let Some(base) = unit.base {
+                self.factor(Place::Unit(u), &unit.name, base.factor);
+            }
             let mut displayed = HashSet::new();
             for (d, display) in unit.display_units.iter().enumerate() {
+                self.factor(Place::DisplayUnit(u, d), &display.name, display.factor);
                 if !displayed.insert(display.name.as_str()) {
                     let message =
                         format!("the unit {:?} has the display unit {:?} twice", unit.name, display.name);
                     self.add("unit.unique", Place::DisplayUnit(u, d), message);
                 }
             }
+        }
+    }
+
+    fn factor(&mut self, place: Place, unit: &str, factor: f64) {
+        if factor == 0.0 || !factor.is_finite() {
+            let message =
+                format!("the unit {:?} has the factor {factor}; must be finite and not 0", brief(unit));
+            self.add("unit.factor", place, message);
         }
     }
 
@@ -258,6 +296,9 @@ impl Check<'_> {
         self.description.variable_naming_convention == NamingConvention::Structured
     }
 }
+
+/// Round-off of a time that is the difference of two, as a part of it.
+const ROUND_OFF: f64 = 1e-9;
 
 /// The beginning of a long text, for messages.
 pub fn brief(text: &str) -> String {

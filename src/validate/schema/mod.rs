@@ -7,6 +7,7 @@ use punctual_modeldescription::brief;
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::finding::{DESCRIPTION, Findings, Mark, Place};
+use crate::host::{declared_encoding, is_latin};
 use table::{Content, ELEMENTS, Element, Times, Use};
 
 /// The attributes that every element may have: those of the schema language itself.
@@ -20,7 +21,7 @@ pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Docume
     let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
     match Document::parse_with_options(text, options) {
         Ok(document) => {
-            declared_encoding(text, findings);
+            encoding(text, findings);
             Some(document)
         }
         Err(error) => {
@@ -34,18 +35,22 @@ pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Docume
     }
 }
 
-/// Checks the declared encoding. The standard asks for UTF-8; the parser goes by the bytes, other importers by
-/// the declaration.
-fn declared_encoding(text: &str, findings: &mut Findings) {
-    let declaration = text.strip_prefix("<?xml").and_then(|rest| rest.split_once("?>")).map(|(head, _)| head);
-    let Some((_, rest)) = declaration.and_then(|head| head.split_once("encoding")) else { return };
-    let Some(name) = rest.split(['"', '\'']).nth(1) else { return };
-    if !name.eq_ignore_ascii_case("utf-8") {
-        findings.add(
-            "xml.readable",
-            Mark::default(),
-            format!("the declared encoding is {name:?}; must be UTF-8"),
-        );
+/// Checks the declared encoding and the byte order mark. The standard asks for UTF-8; some importers go by the bytes, others
+/// by the declaration.
+fn encoding(text: &str, findings: &mut Findings) {
+    if text.starts_with('\u{feff}') {
+        let message =
+            "begins with a byte order mark; should begin with `<?xml`, as some importers do not skip it";
+        findings.add("xml.encoding", Mark::default(), message);
+    }
+    let Some(name) = declared_encoding(text.as_bytes()) else { return };
+    if is_latin(name) {
+        let message =
+            format!("the declared encoding is {name:?}, which not every importer reads; should be UTF-8");
+        findings.add("xml.encoding", Mark::default(), message);
+    } else if !name.eq_ignore_ascii_case("utf-8") {
+        let message = format!("the declared encoding is {name:?}; must be UTF-8");
+        findings.add("xml.readable", Mark::default(), message);
     }
 }
 
@@ -68,12 +73,33 @@ pub(super) fn check(document: &Document<'_>, findings: &mut Findings) {
         findings.add("schema.element", place(root), message);
         return;
     }
+    let exchanges = root.children().any(|child| child.has_tag_name("ModelExchange"));
     // A list replaces recursion, since the file decides the depth.
     let mut open = vec![(root, "fmiModelDescription")];
     while let Some((node, kind)) = open.pop() {
         let Some(element) = ELEMENTS.iter().find(|element| element.kind == kind) else { continue };
         attributes(node, element, findings);
+        if !exchanges {
+            of_exchange(node, findings);
+        }
         children(node, element, &mut open, findings);
+    }
+}
+
+/// Attributes that the standard has for model exchange alone, and forbids without it.
+const OF_EXCHANGE: [&str; 2] = ["reinit", "canHandleMultipleSetPerTimeInstant"];
+
+fn of_exchange(node: Node<'_, '_>, findings: &mut Findings) {
+    let is_of_variable =
+        |node: &Node<'_, '_>| node.ancestors().take(2).any(|n| n.has_tag_name("ScalarVariable"));
+    for attribute in
+        OF_EXCHANGE.iter().filter_map(|name| node.attribute_node(*name)).filter(|_| is_of_variable(&node))
+    {
+        let message = format!(
+            "{} is for model exchange, which this FMU does not offer; must not be there",
+            attribute.name()
+        );
+        findings.add("schema.exchange", mark(node, attribute.range().start), message);
     }
 }
 
