@@ -15,9 +15,9 @@ fn workshop() -> Workshop {
 fn every_example_configuration_is_built() {
     let workshop = Workshop::with_library();
     for (stem, says) in [
-        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 39 variables"),
+        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 42 variables"),
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
-        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 63 variables"),
+        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 67 variables"),
         ("escort-plant", "Reference plant: point mass in the plane with 11 variables"),
         ("tour-controller", "Nominal controller (waypoints) for a unicycle with 20 variables"),
     ] {
