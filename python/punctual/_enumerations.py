@@ -39,6 +39,8 @@ class Assurance(IntEnum):
     """Was assured: the plant is not where the model led."""
     IRREGULAR = 4
     """Was assured: a step came late, or early without a plan from there."""
+    EXPIRED = 5
+    """Was assured until now: no plan was found beyond."""
 
 
 class Phase(IntEnum):

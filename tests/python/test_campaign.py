@@ -198,7 +198,7 @@ def test_what_cannot_be_made_is_refused(whole, client, tmp_path, monkeypatch):
     # A worker whose engine is no good, which it says itself.
     output.unlink()
     client.run(broken)
-    with pytest.raises(punctual.Error, match="^the runs 0..1 were lost: Error: .*none/punctual: there is no such file"):
+    with pytest.raises(punctual.Error, match=r"^the runs (0\.\.1|1\.\.2) were lost: Error: .*none/punctual: there is no such file"):
         punctual.campaign(path, output, client=client, batch=1)
     # Without Dask.
     monkeypatch.setitem(sys.modules, "distributed", None)
