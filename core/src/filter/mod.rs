@@ -76,6 +76,15 @@ impl Clone for FilterState {
     }
 }
 
+impl FilterState {
+    /// Becomes `next`, which keeps memory alone.
+    #[inline(always)]
+    fn take(&mut self, next: &mut Self) {
+        core::mem::swap(&mut self.barriers, &mut next.barriers);
+        (self.time, self.period, self.input) = (next.time, next.period, next.input);
+    }
+}
+
 /// Periods that differ by less than this part of them count as equal.
 const SAME_PERIOD: f64 = 1e-6;
 
@@ -163,7 +172,7 @@ impl SafetyFilter {
     /// ```
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        core::mem::swap(&mut self.state, &mut self.workspace.next);
+        self.state.take(&mut self.workspace.next);
         Ok(&self.workspace.report)
     }
 
