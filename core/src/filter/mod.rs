@@ -99,6 +99,7 @@ struct Workspace {
     /// Room for one state.
     scratch: Vec<f64>,
     report: Report,
+    search: search::Scratch,
     qp: qp::Workspace,
 }
 

@@ -191,7 +191,7 @@ impl SafetyFilter {
     /// Solves the QP: over the period where all barriers have a row of it and a model to predict with
     /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
-        let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
+        let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
         // Over the period.
         if !requirements.is_empty() {
@@ -215,7 +215,7 @@ impl SafetyFilter {
                 is_backed: self.is_backed,
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
-            if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, qp, u) {
+            if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, search, qp, u) {
                 report.predicted = true;
                 return solution;
             }
