@@ -1,9 +1,19 @@
-"""Cost of a step in Python: the filter alone, rows of a batch, and FMPy's loop against its plain methods.
+"""Costs in one run: a step in Rust beside the same by hand, steps and batches in Python beside cbfpy, FMPy, a campaign.
 
-    PYTHON benches/python.py     # of an environment with the wheel and FMPy
+    PYTHON benches/python.py     # of an environment with the wheel and FMPy; with cbfpy too, where it is installed
+
+Single steps are the shortest of many rounds, or times of one thread on its processor, whatever else runs there. What runs
+on all cores is the shortest of many too.
 """
 
 import os
+
+# What cbfpy recommends; read when JAX is loaded.
+os.environ.setdefault("JAX_ENABLE_X64", "1")
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
+
+import resource
+import subprocess
 import tempfile
 import time
 from pathlib import Path
@@ -12,6 +22,13 @@ import numpy as np
 import punctual
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
+
+try:
+    import cbfpy
+    import jax
+    import jax.numpy as jnp
+except ImportError:
+    cbfpy = None
 
 GOAL = {"name": "goal", "centre": [45.0, 45.0], "radius": 2.0, "deadline": 10.0, "margin": 0.02}
 FILTER = {"kind": "filter", "plant": {"model": "unicycle"}, "barrier": [GOAL]}
@@ -27,6 +44,22 @@ def fastest(run, clock=time.thread_time):
         run()
         times.append(clock() - begin)
     return min(times)
+
+
+def shortest(run, rounds=100):
+    """The shortest of many times by the clock, in s: of something short one round at least is not disturbed."""
+    return min(once(run) for _ in range(rounds))
+
+
+def once(run):
+    begin = time.perf_counter()
+    run()
+    return time.perf_counter() - begin
+
+
+def resident():
+    """Memory of this process in bytes."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def plain_loop(filter_fmu, plant_fmu):
@@ -66,10 +99,160 @@ def plain_loop(filter_fmu, plant_fmu):
     return run
 
 
-def main():
+def in_rust():
+    """Steps of the library, of `cargo bench --bench table`: a name and a time in ns each."""
+    command = ["cargo", "bench", "--quiet", "--bench", "table"]
+    lines = subprocess.run(command, cwd=Path(__file__).parent, check=True, capture_output=True, text=True).stdout
+    return dict(line.split("\t") for line in lines.splitlines() if "\t" in line)
+
+
+def print_in_rust(times):
+    columns = ["pointwise", "1 ms", "10 ms", "50 ms", "witness"]
+    by_hand = float(times["by hand"])
+    print(f"a step in Rust, ns and times by hand ({by_hand:.1f} ns); the default at three periods; with a witness at 10 ms")
+    print(f"  {'':25}" + "".join(f"{column:>18}" for column in columns))
+    for vehicle in ["point mass", "unicycle", "bicycle"]:
+        for obstacles in [0, 10]:
+            row = f"{vehicle}, {obstacles} obstacles"
+            cells = [times[f"{row}, {column}"] for column in columns]
+            said = [cell if cell == "refused" else f"{float(cell):.0f} ({float(cell) / by_hand:.0f})" for cell in cells]
+            print(f"  {row:25}" + "".join(f"{cell:>18}" for cell in said))
+
+
+def obstacles(count):
+    """Discs beside the way to the goal, as benches/support has them."""
+    centres = [[-20.0 + 8.0 * i, 60.0] for i in range(count)]
+    return [{"name": f"rock{i}", "shape": "obstacle", "centre": c, "radius": 2.0} for i, c in enumerate(centres)]
+
+
+def unicycle(x, u):
+    return np.stack([x[:, 3] * np.cos(x[:, 2]), x[:, 3] * np.sin(x[:, 2]), u[:, 1], u[:, 0]], axis=1)
+
+
+def recorded(configuration, n, period, steps):
+    """States and reference inputs of `n` closed loops, step after step: what a batch is measured on."""
+    rng = np.random.default_rng(1)
+    x = rng.uniform([0.0, 0.0, -3.0, 0.0], [30.0, 30.0, 3.0, 10.0], (n, 4))
+    batch, samples = punctual.FilterBatch(configuration, n), []
+    for k in range(steps):
+        u_ref = rng.uniform([-3.0, -1.0], [3.0, 1.0], (n, 2))
+        samples.append((k * period, x, u_ref))
+        u, _, _ = batch.step(k * period, x, u_ref)
+        half = x + period / 2 * unicycle(x, u)
+        x = x + period * unicycle(half, u)
+    return samples
+
+
+def cbf(count, backend):
+    """cbfpy's filter of the same unicycle, goal and obstacles, with its own default gains: without a deadline."""
+    discs = jnp.array([GOAL["centre"], *(disc["centre"] for disc in obstacles(count))])
+    signs = jnp.array([1.0] + [-1.0] * count)
+
+    class Discs(cbfpy.CBFConfig):
+        def f(self, z):
+            return jnp.array([z[3] * jnp.cos(z[2]), z[3] * jnp.sin(z[2]), 0.0, 0.0])
+
+        def g(self, z):
+            return jnp.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+
+        def h_2(self, z):
+            away = discs - z[:2]
+            return signs * (jnp.sqrt(8.0) - jnp.sqrt((away * away).sum(axis=1) + 4.0))
+
+    tolerance = {"qpax": 1e-3, "elastiqp": 1e-6}[backend]
+    return cbfpy.CBF.from_config(Discs(n=4, m=2, backend=backend, solver_tol=tolerance))
+
+
+def rivals():
+    """cbfpy's filters by name: for each number of obstacles and each of its QP solvers."""
+    if cbfpy is None:
+        print("cbfpy is not installed: pip install cbfpy elastiqp")
+        return
+    for count in [0, 10]:
+        for backend in ["qpax", "elastiqp"]:
+            try:
+                yield f"cbfpy ({backend}), {count} obstacles", cbf(count, backend).safety_filter
+            except ImportError as missing:
+                print(f"cbfpy ({backend}): {missing}")
+
+
+def single_steps():
+    print("a step in Python, unicycle, us; cbfpy has no deadline and looks at the sample alone")
+    for count in [0, 10]:
+        for sampling in ["measured", "pointwise"]:
+            configuration = FILTER | {"barrier": [GOAL, *obstacles(count)], "sampling": sampling}
+            samples = [(t, x[0], u_ref[0]) for t, x, u_ref in recorded(configuration, 1, 0.01, 50)]
+            own = punctual.Filter(configuration)
+
+            def loop():
+                own.reset()
+                for t, x, u_ref in samples:
+                    own.step(t, x, u_ref).u
+
+            print(f"  Filter.step, {sampling}, {count} obstacles: {1e6 * shortest(loop) / len(samples):.2f}")
+    samples = recorded(FILTER, 1, 0.01, 50)
+    x, u_ref = (jnp.array([s[i][0] for s in samples]) for i in (1, 2)) if cbfpy else (None, None)
+    for name, safe in rivals():
+        one = jax.jit(safe)
+        in_turn = jax.jit(lambda x, u_ref, safe=safe: jax.lax.map(lambda pair: safe(*pair), (x, u_ref)))
+
+        pairs = [(x[k], u_ref[k]) for k in range(len(samples))]
+
+        def calls():
+            for pair in pairs:
+                one(*pair).block_until_ready()
+
+        times = [shortest(calls), shortest(lambda: in_turn(x, u_ref).block_until_ready())]
+        called, within = (1e6 * time / len(samples) for time in times)
+        print(f"  {name}: {called:.1f} a jitted call, {within:.1f} within a jitted loop")
+
+
+def batches(n=4096, period=0.02, steps=10):
+    print(f"a batch of {n} unicycles at {1e3 * period:.0f} ms, {os.cpu_count()} cores: ms a step, ns a row, ns of processor a row")
+
+    def told(name, run):
+        run()
+        wall, processor = shortest(run) / steps, fastest(run, time.process_time) / steps
+        print(f"  {name}: {1e3 * wall:.2f} ms, {1e9 * wall / n:.0f} ns, {1e9 * processor / n:.0f} ns")
+
+    for count in [0, 10]:
+        for sampling in ["measured", "pointwise"]:
+            configuration = FILTER | {"barrier": [GOAL, *obstacles(count)], "sampling": sampling}
+            samples = recorded(configuration, n, period, steps)
+            batch = punctual.FilterBatch(configuration, n)
+
+            def run():
+                batch.reset()
+                for t, x, u_ref in samples:
+                    batch.step(t, x, u_ref)
+
+            told(f"FilterBatch, {sampling}, {count} obstacles", run)
+    for name, safe in rivals():
+        many = jax.jit(jax.vmap(safe))
+        arrays = [(jnp.array(x), jnp.array(u_ref)) for _, x, u_ref in recorded(FILTER, n, period, steps)]
+
+        def run():
+            for x, u_ref in arrays:
+                many(x, u_ref).block_until_ready()
+
+        told(name, run)
+
+
+def memory(n=100_000):
+    """What a row of a batch takes: of a large one, so that memory that was free before does not count."""
+    configurations = {"1 barrier": FILTER, "11 barriers": FILTER | {"barrier": [GOAL, *obstacles(10)]}}
+    batches, said = [], []
+    for name, configuration in configurations.items():
+        before = resident()
+        batches.append(punctual.FilterBatch(configuration, n))
+        said.append(f"{(resident() - before) / n:.0f} ({name})")
+    print(f"memory of a row of FilterBatch, bytes: {', '.join(said)}")
+
+
+def in_python():
     for sampling in ["measured", "pointwise"]:
         configuration = FILTER | {"sampling": sampling}
-        print(f"sampling = {sampling}")
+        print(f"filter and plant as FMUs, sampling = {sampling}")
         with tempfile.TemporaryDirectory() as folder:
             paths = [str(Path(folder) / name) for name in ["filter.fmu", "plant.fmu"]]
             punctual.build(configuration, paths[0])
@@ -86,25 +269,37 @@ def main():
                 print(f"  simulate, recording {name}: {1e6 * step:.2f} us per step of the pair")
             print(f"  FMPy's getReal, setReal, doStep, recording nothing: {1e6 * fastest(plain_loop(*paths)) / STEPS:.2f} us")
 
-        run = np.random.default_rng(1).uniform([0.0, 0.0, -3.0, 0.0], [30.0, 30.0, 3.0, 10.0], (1000, 4))
-        own, u_ref = punctual.Filter(configuration), np.zeros(2)
 
-        def single():
-            own.reset()
-            for k in range(1000):
-                own.step(k * STEP, run[0], u_ref).u
+def campaigns():
+    """Runs of the example's campaign for each second of a processor."""
+    folder = Path(__file__).parent.parent / "examples" / "campaign"
+    print("a campaign, runs of 10,000 steps (examples/campaign) for each second of one processor")
+    for sampling, runs in [("measured", 40), ("pointwise", 300)]:
+        with tempfile.TemporaryDirectory() as work:
+            for name in folder.glob("*.toml"):
+                text = name.read_text()
+                if name.name == "unicycle-filter.toml":
+                    text = f'sampling = "{sampling}"\n' + text
+                Path(work, name.name).write_text(text.replace("runs = 1000", f"runs = {runs}"))
+            for name in ["unicycle-filter", "unicycle-plant"]:
+                punctual.build(str(Path(work, f"{name}.toml")), str(Path(work, f"{name}.fmu")))
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            begin = time.perf_counter()
+            command = [Path(punctual.__file__).parent / "_bin" / "punctual", "campaign", Path(work, "unicycle.toml")]
+            subprocess.run(command, cwd=work, check=True, capture_output=True)
+            wall = time.perf_counter() - begin
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            print(f"  {sampling}: {runs / spent:.0f}; {runs / wall:.0f} a second of the clock")
 
-        print(f"  Filter.step: {1e3 * fastest(single):.2f} us")
-        for n in [1, 100, 10_000]:
-            x, wanted = np.resize(run, (n, 4)), np.zeros((n, 2))
-            batch = punctual.FilterBatch(configuration, n)
 
-            def rows():
-                batch.reset()
-                for k in range(10):
-                    batch.step(k * STEP, x, wanted)
-
-            print(f"  FilterBatch.step, {n} rows, {os.cpu_count()} cores: {1e9 * fastest(rows, time.perf_counter) / (10 * n):.0f} ns per row")
+def main():
+    print_in_rust(in_rust())
+    single_steps()
+    batches()
+    memory()
+    in_python()
+    campaigns()
 
 
 if __name__ == "__main__":

@@ -75,14 +75,16 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
+    /// Samples of a round.
+    pub(crate) const SAMPLES: u32 = 50;
+
     /// The loop of a filter and `plant` at the `period` (s), without the first samples, in which the period is measured.
     pub(crate) fn recorded<P: ControlAffine<4, 2>>(builder: FilterBuilder, plant: &P, period: f64) -> Self {
         const FIRST: usize = 5;
-        const SAMPLES: usize = 55;
         let mut filter = builder.build().expect("valid filter");
         let (mut x, mut u) = ([0.0, 0.0, X[2], X[3]], [0.0; 2]);
         let (mut begin, mut samples) = (filter.state().clone(), Vec::new());
-        for k in 0..SAMPLES {
+        for k in 0..FIRST + Self::SAMPLES as usize {
             if k == FIRST {
                 begin = filter.state().clone();
             }

@@ -8,6 +8,7 @@ use alloc::vec::Vec;
 use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};
+use super::search::Scratch;
 use super::{
     BarrierSettings, BarrierSlot, Begin, End, FilterState, Report, SafetyFilter, Sampling, Strictness,
     Workspace,
@@ -460,6 +461,7 @@ impl FilterBuilder {
             next: state.clone(),
             scratch: vec![0.0; state_dim],
             report: Report::new(slots.len()),
+            search: Scratch::new(),
             qp: qp::Workspace::new(backend),
         };
         let deadlines = slots.iter().map(|slot| slot.promise.deadline());

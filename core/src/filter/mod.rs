@@ -86,6 +86,13 @@ impl FilterState {
         let reached = |start: f64| t - start >= after - SAME_TIME * t.abs().max(after);
         after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
     }
+
+    /// Becomes `next`, which keeps memory alone.
+    #[inline(always)]
+    fn take(&mut self, next: &mut Self) {
+        core::mem::swap(&mut self.barriers, &mut next.barriers);
+        (self.time, self.period, self.input, self.start) = (next.time, next.period, next.input, next.start);
+    }
 }
 
 /// Round-off of a time that is a sum of steps, as a part of it.
@@ -105,6 +112,7 @@ struct Workspace {
     /// Room for one state.
     scratch: Vec<f64>,
     report: Report,
+    search: search::Scratch,
     qp: qp::Workspace,
 }
 
@@ -180,7 +188,7 @@ impl SafetyFilter {
     /// ```
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        core::mem::swap(&mut self.state, &mut self.workspace.next);
+        self.state.take(&mut self.workspace.next);
         Ok(&self.workspace.report)
     }
 

@@ -17,6 +17,21 @@ pub(super) struct Outlook<'a> {
     pub(super) drift: &'a [f64; MAX_RELATIVE_DEGREE + 1],
 }
 
+/// From when until when (s after the sample at `t`) a promise has h ≥ 0 while an input is held for `hold` s, if it has
+/// within them. In a set that is kept, the hold may last as `long` (s).
+#[inline(always)]
+pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> Option<[f64; 2]> {
+    match promise.phase {
+        Phase::Stay => Some([0.0, long]),
+        Phase::Approach => {
+            let from = (promise.anchor_time + promise.deadline - t).max(0.0);
+            // The deadline at the very end of the hold is within it.
+            (from <= hold * (1.0 + SAME_PERIOD)).then(|| [from.min(hold), hold])
+        }
+        _ => None,
+    }
+}
+
 impl Outlook<'_> {
     /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order n of h, with h⁽ⁿ⁾ = `highest`.
     fn foreseen(&self, j: usize, highest: f64, s: f64) -> f64 {
@@ -42,25 +57,19 @@ impl Outlook<'_> {
         Row { normal: *normal, floor }
     }
 
-    /// The instant at which the promise is broken along the model in the `hold` (s) that begins, if it is. In a set
-    /// that is kept, the hold may last as `long` (s).
+    /// The instant of the [`span`] at which the promise is broken along the model, if it is.
     pub(super) fn look(
         &self,
         promise: &FixedTimeState,
         held: &Hold,
         normal: &[f64; MAX_INPUTS],
-        [hold, long]: [f64; 2],
+        [from, hold]: [f64; 2],
         scratch: &mut [f64],
     ) -> Option<Lowest> {
         /// Round-off, as a part of the size of h.
         const ROUND_OFF: f64 = 1e-12;
         /// The part of h that must be left for the model not to be asked.
         const CLEAR: f64 = 0.5;
-        let (from, hold) = match promise.phase {
-            Phase::Stay => (0.0, long),
-            Phase::Approach => ((promise.anchor_time + promise.deadline - held.t).max(0.0), hold),
-            _ => return None,
-        };
         let h = self.drift[0];
         let highest = self.drift[self.n] + dot(normal, held.u);
         // Far enough from the edge the model need not be asked. With n = 1 a set that moves faster than the samples
@@ -78,12 +87,9 @@ impl Outlook<'_> {
                 && self.moved(highest, hold) <= (1.0 - CLEAR) * h
                 && held.derivatives(hold).is_none_or(agrees)
         };
-        // The deadline at the very end of the hold is within it.
-        let begins = from <= hold * (1.0 + SAME_PERIOD);
-        if !begins || is_clear() {
+        if is_clear() {
             return None;
         }
-        let from = from.min(hold);
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));

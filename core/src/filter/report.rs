@@ -200,10 +200,17 @@ impl BarrierReport {
         sampling_loss: 0.0,
     };
 
-    /// The report before the QP is solved.
-    #[inline]
-    pub(super) fn of(promise: &FixedTimeState, h: f64, bound: DerivativeBound, row: Row) -> Self {
-        Self {
+    /// Writes the report before the QP is solved.
+    #[inline(always)]
+    pub(super) fn begin(
+        &mut self,
+        promise: &FixedTimeState,
+        h: f64,
+        bound: &DerivativeBound,
+        row: &Row,
+        deadline_unreachable: bool,
+    ) {
+        *self = Self {
             h,
             phase: promise.phase,
             profile: bound.profile,
@@ -216,14 +223,14 @@ impl BarrierReport {
             fallback: promise.fallback,
             recoveries: promise.recoveries,
             postponed: promise.postponed,
-            deadline_unreachable: false,
-            row,
+            deadline_unreachable,
+            row: *row,
             slack: 0.0,
             unmet_steps: 0,
             blocked_by: None,
             deadlocked: false,
             sampling_loss: 0.0,
-        }
+        };
     }
 
     /// Fills in the memory of the promise.

@@ -104,12 +104,24 @@ pub(super) struct PeriodProblem<'a> {
     pub(super) is_backed: bool,
 }
 
+/// Scratch memory of the search; its contents change no bit of the next one.
+pub(super) struct Scratch {
+    violations: [f64; MAX_ROWS],
+    ahead: Ahead,
+}
+
+impl Scratch {
+    pub(super) const fn new() -> Self {
+        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO }
+    }
+}
+
 /// Linear models of the sampled rows, and the violation of each at the present u in units of its terms.
 struct Linearised<'a> {
     rows: &'a mut [Row],
-    violations: [f64; MAX_ROWS],
+    violations: &'a mut [f64; MAX_ROWS],
     /// Room for one prediction.
-    ahead: Ahead,
+    ahead: &'a mut Ahead,
 }
 
 impl Linearised<'_> {
@@ -172,6 +184,7 @@ impl PeriodProblem<'_> {
         &self,
         rows: &mut [Row],
         last: Option<&[f64]>,
+        scratch: &mut Scratch,
         qp: &mut Workspace,
         u: &mut [f64],
     ) -> Option<Solution> {
@@ -179,19 +192,21 @@ impl PeriodProblem<'_> {
         match u {
             [a, b] => {
                 let mut two = [*a, *b];
-                let solution = self.solve_for(rows, last, qp, &mut two);
+                let solution = self.solve_for::<2>(rows, last, scratch, qp, &mut two);
                 (*a, *b) = (two[0], two[1]);
                 solution
             }
-            _ => self.solve_for(rows, last, qp, u),
+            _ => self.solve_for::<MAX_INPUTS>(rows, last, scratch, qp, u),
         }
     }
 
+    /// [`Self::solve`] for at most `N` inputs.
     #[inline(always)]
-    fn solve_for(
+    fn solve_for<const N: usize>(
         &self,
         rows: &mut [Row],
         last: Option<&[f64]>,
+        scratch: &mut Scratch,
         qp: &mut Workspace,
         u: &mut [f64],
     ) -> Option<Solution> {
@@ -199,8 +214,9 @@ impl PeriodProblem<'_> {
         for (i, row) in rows.iter_mut().enumerate() {
             *row = self.first_row(i);
         }
-        let mut at = Linearised { rows, violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO };
-        let mut pointwise = [0.0; MAX_INPUTS];
+        let Scratch { violations, ahead } = scratch;
+        let mut at = Linearised { rows, violations, ahead };
+        let mut pointwise = [0.0; N];
         let pointwise = &mut pointwise[..m];
         let first = qp.solve(&self.problem(at.rows), pointwise);
         // Nothing to do where u_ref meets the sampled rows.
@@ -211,7 +227,7 @@ impl PeriodProblem<'_> {
         let watched = doubtful | at.violated();
         let against = at.most_violated();
         // All but affine rows: a few corrections from u_ref.
-        if let Some(solution) = self.correct(u, last, [watched, unseen], against, &mut at, qp) {
+        if let Some(solution) = self.correct::<N>(u, last, [watched, unseen], against, &mut at, qp) {
             return Some(Solution { iterations: first.iterations + solution.iterations, ..solution });
         }
         for (i, row) in at.rows.iter_mut().enumerate() {
@@ -334,8 +350,17 @@ impl PeriodProblem<'_> {
     /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
     /// `None` where there is no finite prediction.
     fn linearise(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
+        // As in `solve`.
+        match u {
+            [a, b] => self.linearise_for(&[*a, *b], anew, at),
+            _ => self.linearise_for(u, anew, at),
+        }
+    }
+
+    #[inline(always)]
+    fn linearise_for(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
         let Linearised { rows, violations, ahead } = at;
-        let rows = rows.iter_mut().zip(violations);
+        let rows = rows.iter_mut().zip(violations.iter_mut());
         for (i, (requirement, (row, violation))) in self.requirements.iter().zip(rows).enumerate() {
             *violation = 0.0;
             if requirement.bound.is_zero() {
@@ -353,6 +378,7 @@ impl PeriodProblem<'_> {
     }
 
     /// Writes the row of a requirement linearised at `u`. Returns its violation there in units of its terms.
+    #[inline(always)]
     fn linearised(
         &self,
         requirement: &Requirement,
@@ -473,7 +499,7 @@ impl PeriodProblem<'_> {
                 }
                 let aside = &aside[..m];
                 let nearer = (self.distance(aside) - far) * normal;
-                if self.slack(&self.requirements[i], aside, &mut at.ahead).is_some_and(|s| s > nearer) {
+                if self.slack(&self.requirements[i], aside, at.ahead).is_some_and(|s| s > nearer) {
                     return true;
                 }
             }

@@ -174,7 +174,7 @@ impl BarrierSlot {
             self.now.idle();
             return Ok(false);
         }
-        if let Some(status) = defect(&self.now.derivatives) {
+        if let Some(status) = defect(&self.now.derivatives, self.degree(), moment.u_ref.len()) {
             return Err(status);
         }
         let (promise, n) = (&mut promises[index], self.degree());
@@ -373,12 +373,14 @@ impl BarrierSlot {
 
 /// The reason why derivatives cannot carry a constraint, if they cannot.
 #[inline]
-fn defect(derivatives: &Derivatives) -> Option<Status> {
+fn defect(derivatives: &Derivatives, n: usize, inputs: usize) -> Option<Status> {
     /// An input that enters below the declared degree by more than this part of the row is real.
     const OF_ROW: f64 = 1e-9;
     /// So is one by more than this part of the derivatives themselves; round-off of cancelling terms stays below.
     const OF_DERIVATIVES: f64 = 1e-13;
-    if !derivatives.is_finite() {
+    // A finite sum has finite terms.
+    let sum = derivatives.drift[..=n].iter().chain(&derivatives.row[..inputs]).fold(0.0, |sum, v| sum + v);
+    if !(sum + derivatives.lower_sensitivity).is_finite() && !derivatives.is_finite() {
         return Some(Status::Singular);
     }
     if derivatives.lower_sensitivity <= 0.0 {

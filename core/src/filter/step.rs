@@ -2,7 +2,7 @@
 
 use super::hold::Hold;
 use super::search::{PeriodProblem, Requirement};
-use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace};
+use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace, outlook};
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::elementary;
 use crate::error::{Error, length};
@@ -113,23 +113,23 @@ impl SafetyFilter {
         let promises = &mut next.barriers[..];
         for (i, (slot, report)) in self.slots.iter_mut().zip(&mut report.barriers).enumerate() {
             let h = slot.evaluate(moment, &acting[..moment.u_ref.len()]);
-            *report = BarrierReport { h, ..BarrierReport::BLANK };
             let deadline_unreachable = match slot.advance(promises, i, h, moment, &self.bounds, &self.errors)
             {
                 Ok(is_unreachable) => is_unreachable,
                 Err(status) => {
+                    *report = BarrierReport { h, ..BarrierReport::BLANK };
                     found = Err(status);
                     continue;
                 }
             };
             if slot.now.in_force {
                 is_sampled &= slot.form_row(&promises[i], moment);
-                let of = BarrierReport::of(&promises[i], h, slot.now.bound, slot.now.row);
-                *report = BarrierReport { deadline_unreachable, ..of };
+                report.begin(&promises[i], h, &slot.now.bound, &slot.now.row, deadline_unreachable);
                 if !slot.now.row.floor.is_finite() {
                     found = Err(Status::Singular);
                 }
             } else {
+                *report = BarrierReport { h, ..BarrierReport::BLANK };
                 report.remember(&promises[i]);
             }
             if let Some(ahead) = moment.period {
@@ -166,11 +166,13 @@ impl SafetyFilter {
         let (mut round, mut allowed) = (0, f64::INFINITY);
         loop {
             let solution = self.solve_once(moment, listed, u);
-            self.look(moment, u);
+            let breaks = self.look(moment, u);
             // An answer that is too far out does not count: an input that turns the plant by many radians makes any
             // prediction true.
-            let distance = u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r));
-            let met = matches!(solution.outcome, Outcome::Optimal) && distance <= allowed;
+            let distance =
+                || u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r));
+            let met = matches!(solution.outcome, Outcome::Optimal)
+                && (allowed == f64::INFINITY || distance() <= allowed);
             if self.workspace.requirements.len() > listed && !met {
                 // That instant cannot be had as well: solve without it, and the report says so.
                 self.workspace.requirements.truncate(listed);
@@ -179,11 +181,12 @@ impl SafetyFilter {
             }
             // Limit how far an instant may move the input. With n = 1 there is no limit: the model hardly turns, and an
             // instant soon after the sample may need a large input.
-            if self.slots.iter().any(|slot| slot.now.lowest.is_some() && slot.degree() > 1) {
-                let size = moment.u_ref.iter().fold(distance.max(1.0), |s: f64, r| s.max(r.abs()));
+            if breaks && self.slots.iter().any(|slot| slot.now.lowest.is_some() && slot.degree() > 1) {
+                let size = moment.u_ref.iter().fold(distance().max(1.0), |s: f64, r| s.max(r.abs()));
                 allowed = MUCH_FURTHER * size;
             }
-            if round == ROUNDS || !met || !self.workspace.report.predicted || !self.require_instants() {
+            let again = breaks && round < ROUNDS && met && self.workspace.report.predicted;
+            if !(again && self.require_instants()) {
                 return solution;
             }
             round += 1;
@@ -193,7 +196,7 @@ impl SafetyFilter {
     /// Solves the QP: over the period where all barriers have a row of it and a model to predict with
     /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
-        let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
+        let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
         // Over the period.
         if !requirements.is_empty() {
@@ -217,7 +220,7 @@ impl SafetyFilter {
                 is_backed: self.is_backed,
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
-            if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, qp, u) {
+            if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, search, qp, u) {
                 report.predicted = true;
                 return solution;
             }
@@ -232,17 +235,22 @@ impl SafetyFilter {
         qp.solve(&Problem { enforcement: &enforcement[..count], ..problem }, u)
     }
 
-    /// Looks at every instant until the next sample under the held input `u`.
-    fn look(&mut self, moment: &Moment, u: &[f64]) {
+    /// Looks at every instant until the next sample under the held input `u`. Returns whether a promise is broken at one.
+    fn look(&mut self, moment: &Moment, u: &[f64]) -> bool {
         let Workspace { next, scratch, .. } = &mut self.workspace;
+        let mut breaks = false;
         for (slot, promise) in self.slots.iter_mut().zip(&next.barriers) {
-            let held = Hold { source: slot.source.predict(), t: moment.begin, x: &slot.now.from, u };
-            let holds = [moment.hold, moment.long];
-            slot.now.lowest = match slot.now.in_force {
-                true => slot.outlook().look(promise, &held, &slot.now.row.normal, holds, scratch),
-                false => None,
-            };
+            slot.now.lowest = None;
+            if !slot.now.in_force {
+                continue;
+            }
+            if let Some(span) = outlook::span(promise, moment.begin, [moment.hold, moment.long]) {
+                let held = Hold { source: slot.source.predict(), t: moment.begin, x: &slot.now.from, u };
+                slot.now.lowest = slot.outlook().look(promise, &held, &slot.now.row.normal, span, scratch);
+                breaks |= slot.now.lowest.is_some();
+            }
         }
+        breaks
     }
 
     /// Asks for the instants at which the answer breaks a promise. Returns whether there are any.

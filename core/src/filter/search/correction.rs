@@ -23,11 +23,11 @@ const SKIPPED: f64 = 0.1;
 const CONVERGING: f64 = 0.5;
 
 /// Answer and way of a correction, and the length of the way.
-type Correction = ([f64; MAX_INPUTS], [f64; MAX_INPUTS], f64);
+type Correction<const N: usize> = ([f64; N], [f64; N], f64);
 
 /// The part of the way back from a correction's answer to that of the one before at which the `way` left would be least.
 #[inline(always)]
-fn secant(way: &[f64], before: &[f64; MAX_INPUTS]) -> f64 {
+fn secant(way: &[f64], before: &[f64]) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for (way, before) in way.iter().zip(before) {
         let change = way - before;
@@ -43,7 +43,7 @@ impl PeriodProblem<'_> {
     /// linearised but for `unseen` ones. `watched` are linearised all along, the others at the end. `None` where the
     /// answers do not come nearer fast, or others may exist.
     #[inline(always)]
-    pub(super) fn correct(
+    pub(super) fn correct<const N: usize>(
         &self,
         u: &mut [f64],
         last: Option<&[f64]>,
@@ -56,8 +56,8 @@ impl PeriodProblem<'_> {
         if !self.soft().is_empty() {
             return None;
         }
-        let mut target = [0.0; MAX_INPUTS];
-        let mut before: Option<Correction> = None;
+        let mut target = [0.0; N];
+        let mut before: Option<Correction<N>> = None;
         let (mut ratio, mut iterations) = (0.0_f64, 0);
         if !(watched & unseen).is_empty() {
             self.linearise(u, watched & unseen, at)?;
@@ -68,7 +68,7 @@ impl PeriodProblem<'_> {
             if solution.outcome != Outcome::Optimal {
                 return None;
             }
-            let mut way = [0.0; MAX_INPUTS];
+            let mut way = [0.0; N];
             let (mut size, mut length) = (1.0, 0.0);
             for i in 0..m {
                 way[i] = target[i] - u[i];
