@@ -403,10 +403,12 @@ fn tiny_and_huge_steps_are_answered() {
 #[test]
 fn a_plan_of_another_period_ends_as_irregular() {
     let mut seen = 0;
-    for seed in 1..=6_u64 {
+    for seed in 1..=12_u64 {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let vehicle = Vehicle::Unicycle;
-        let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
+        // So tight that the plan drives.
+        let deadline = random.between(4.5, 6.0);
+        let mut filter = vehicle.assured(deadline, [6.0, 2.0]);
         let (mut t, mut x, mut u) = (0.0, [0.0, 0.0, -0.4, 1.0], [0.0; 2]);
         let other = random.between(0.3, 2.7) * PERIOD;
         for step in 0..60 {
@@ -421,7 +423,7 @@ fn a_plan_of_another_period_ends_as_irregular() {
             if step > 41 && format!("{:?}", filter.commitment()).contains("is_even: false") {
                 seen += 1;
                 let lost = |x: &[f64]| {
-                    let mut copy = vehicle.assured(8.0, [6.0, 2.0]);
+                    let mut copy = vehicle.assured(deadline, [6.0, 2.0]);
                     copy.restore(filter.filter().state(), filter.commitment()).expect("its own");
                     copy.expect_hold(Some(other)).expect("a time");
                     copy.step(t, x, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").standing
@@ -432,6 +434,7 @@ fn a_plan_of_another_period_ends_as_irregular() {
             }
         }
     }
+    println!("kept through a change: {seen} samples");
     assert!(seen > 0, "no plan was kept through a change");
 }
 
@@ -595,8 +598,9 @@ fn a_lost_promise_is_taken_up_again() {
                 assert!(t + PERIOD < 8.0 || distance(GOAL.0) <= GOAL.1, "{run} {t}: {x:?}");
             }
         }
-        // At the first sample back.
-        assert_eq!((lost, again), if hits { (540, 0) } else { (6, 533) }, "{run}");
+        // At the first sample back, or where the search, which gets ever more seldom, is next due.
+        let is_back = if hits { (lost, again) == (540, 0) } else { (6..=8).contains(&lost) && again >= 532 };
+        assert!(is_back, "{run}: {lost}, {again}");
     }
 }
 
@@ -612,7 +616,7 @@ fn gusts_lose_promises_but_do_not_make_them_lie() {
     for seed in 1..=seeds {
         let random = &mut Random(0xd1b5_4a32_d192_ed03_u64.wrapping_mul(seed));
         let vehicle = if seed % 2 == 0 { Vehicle::PointMass } else { Vehicle::Unicycle };
-        let (deadline, size) = (random.between(4.0, 9.0), 10.0_f64.powf(random.between(-3.5, 0.3)));
+        let (deadline, size) = (random.between(4.0, 9.0), 10.0_f64.powf(random.between(-3.5, 0.9)));
         let often = random.between(0.01, 0.3);
         let bounds = match vehicle {
             Vehicle::PointMass => [random.between(3.0, 12.0); 2],

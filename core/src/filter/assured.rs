@@ -77,7 +77,7 @@ pub enum Standing {
     /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
     /// from there. It is taken up again as one that is withdrawn, after a late sample at the next one in time.
     Irregular = 4,
-    /// Was assured until a time, which has come: no plan was found beyond it.
+    /// Was assured until a time, which has come: no plan was found beyond it. It is taken up again as one that is withdrawn.
     Expired = 5,
 }
 
@@ -736,13 +736,16 @@ impl AssuredFilter {
         if self.next.standing == Standing::Undecided && is_valid {
             self.decide(t, hold, x, u);
         } else if self.commitment.is_followed() {
+            // What came to its end was kept until then.
+            let has_expired = self.commitment.standing == Standing::Expired;
+            let lost = |standing| if has_expired { Standing::Expired } else { standing };
             match (self.in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
                 (true, None) if is_valid => self.end(Standing::Assured, None),
                 (true, None) => {}
-                (false, None) => self.end(Standing::Irregular, None),
+                (false, None) => self.end(lost(Standing::Irregular), None),
                 // For good.
                 (_, failure) => {
-                    self.end(Standing::Withdrawn, failure);
+                    self.end(lost(Standing::Withdrawn), failure);
                     self.next.promises.fill(None);
                 }
             }
