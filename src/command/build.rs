@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::error::Error;
+use crate::host::PLATFORM;
 use crate::{output, package};
 
 /// Arguments of `punctual build`.
@@ -14,9 +15,10 @@ pub struct Arguments {
     /// The .fmu file to write; for a system file the .ssp file, with the FMUs it names, and those of the configurations it names
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// The shared library to put inside [default: the one beside this program]
-    #[arg(long, value_name = "FILE")]
-    library: Option<PathBuf>,
+    /// A shared library to put inside, for the platform that the file is for; repeat it for several [default: the one
+    /// beside this program]
+    #[arg(long = "library", value_name = "FILE")]
+    libraries: Vec<PathBuf>,
 }
 
 /// Builds the FMU and tries it, or packs the system.
@@ -31,7 +33,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return pack(arguments, file);
     }
     let configuration = package::read_configuration(file)?;
-    let fmu = package::build(configuration, arguments.library.as_deref(), &arguments.output)?;
+    let fmu = package::build(configuration, &arguments.libraries, &arguments.output)?;
+    if !fmu.platforms().iter().any(|platform| platform == PLATFORM) {
+        output::note(&format!("not tried: no library is for this platform, {PLATFORM}"));
+    }
     let description = fmu.description();
     output::result(&format!(
         "{}: {} with {} variables, guid {}",
@@ -63,7 +68,7 @@ pub fn execute_try_plugin(arguments: &TryPluginArguments) -> Result<ExitCode, Er
 }
 
 fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
-    if arguments.library.is_some() {
+    if !arguments.libraries.is_empty() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
     }

@@ -4,25 +4,65 @@ use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use punctual_fmu::product::MARK;
+
 use crate::error::Error;
+use crate::host::PLATFORM;
+use crate::validate::layout::ending;
+use crate::validate::symbols;
 
 /// The environment variable that names the library's file.
 pub const VARIABLE: &str = "PUNCTUAL_FMU_LIBRARY";
 
-/// Reads the shared library: `given` if there is one, else the one that [`VARIABLE`] names, else the one beside
-/// this executable (an installed `punctual`), in its `deps/` folder (`cargo run`), or in `../lib/`. Of several
-/// the newest is taken, which matters in a build folder only.
+/// A shared library that goes into an FMU.
+#[derive(Debug)]
+pub struct Library {
+    /// Its folder below `binaries/`, such as `linux64`.
+    pub platform: &'static str,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl Library {
+    /// Its name in the archive.
+    pub fn entry(&self, identifier: &str) -> String {
+        // Each platform that a file can be for has an ending.
+        let ending = ending(self.platform).unwrap_or(DLL_SUFFIX);
+        format!("binaries/{}/{identifier}{ending}", self.platform)
+    }
+}
+
+/// Reads the shared libraries of an FMU: those `given`, each for the platform that its file is for; where none is given the one
+/// that [`VARIABLE`] names, else the one beside this executable (an installed `punctual`), in its `deps/` folder (`cargo run`), or in
+/// `../lib/`. Of several in such places the newest is taken, which matters in a build folder only.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, or no library anywhere.
-pub fn read(given: Option<&Path>) -> Result<Vec<u8>, Error> {
+/// A file that cannot be read, or is no library of every FMU of this version; two for one platform; no library anywhere.
+pub fn read(given: &[PathBuf]) -> Result<Vec<Library>, Error> {
     let named = || std::env::var_os(VARIABLE).filter(|name| !name.is_empty()).map(PathBuf::from);
-    let path = match given.map(Path::to_owned).or_else(named) {
-        Some(path) => path,
-        None => find()?,
+    let own = match (given, named()) {
+        ([], Some(path)) => Some(path),
+        ([], None) => Some(find()?),
+        _ => None,
     };
-    std::fs::read(&path).map_err(|e| Error::io("read", &path, e))
+    let mut libraries: Vec<Library> = Vec::new();
+    for path in own.iter().chain(given) {
+        let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
+        let refused = |message: String| Error::configuration("library", message).in_file(path);
+        let platform = symbols::platform(&bytes).map_err(refused)?;
+        // One for this platform shows what it is by being tried.
+        if platform != PLATFORM && !bytes.windows(MARK.len()).any(|part| part == MARK.as_bytes()) {
+            let message = format!("is not the library of \"{}\", which this program is", MARK.trim_end());
+            return Err(refused(message));
+        }
+        if libraries.iter().any(|other| other.platform == platform) {
+            return Err(refused(format!("is for {platform}, as one before it; give one for each platform")));
+        }
+        libraries.push(Library { platform, bytes });
+    }
+    libraries.sort_by_key(|library| library.platform);
+    Ok(libraries)
 }
 
 fn find() -> Result<PathBuf, Error> {

@@ -9,7 +9,7 @@ pub mod merge;
 pub mod plugin;
 pub mod system;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use punctual_fmu::configuration::{Configuration, RESOURCE};
@@ -19,6 +19,7 @@ use punctual_modeldescription::{Archive, Timestamp};
 use crate::error::Error;
 use crate::host::{Fmu, PLATFORM, Slave};
 use crate::whole;
+use library::Library;
 
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
@@ -47,50 +48,61 @@ fn timestamp() -> Result<Timestamp, Error> {
     }
 }
 
-/// The entries of the FMU of `product` around the shared library `binary`. Entries carry the time of
+/// The entries of the FMU of `product` around its shared libraries. Entries carry the time of
 /// the environment variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
 ///
 /// # Errors
 ///
 /// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold; a plug-in that cannot be read.
-pub fn archive(product: &Product, binary: Vec<u8>) -> Result<Archive, Error> {
+pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Error> {
     let broken = |e: punctual_modeldescription::Error| broken(&e);
     let timestamp = timestamp()?;
     let description = product.model_description();
     let canonical = product.configuration.canonical()?;
     let page = documentation::page(product, &description, &canonical);
-    let suffix = std::env::consts::DLL_SUFFIX;
     let plugin = product.configuration.plugin();
     let plugin = plugin.map(|plugin| {
         let bytes = std::fs::read(&plugin.path).map_err(|e| Error::io("read", &plugin.path, e))?;
         Ok::<_, Error>((format!("resources/{PLATFORM}/{}", plugin.file), bytes))
     });
-    let library = format!("binaries/{PLATFORM}/{}{suffix}", description.co_simulation.model_identifier);
     let mut archive = Archive::new().with_timestamp(timestamp);
     archive.add("modelDescription.xml", description.to_xml().map_err(broken)?).map_err(broken)?;
     archive.add("model.png", ICON).map_err(broken)?;
     archive.add("documentation/index.html", page).map_err(broken)?;
     archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
-    archive.add(&library, binary).map_err(broken)?;
+    for library in libraries {
+        let entry = library.entry(&description.co_simulation.model_identifier);
+        archive.add(&entry, library.bytes).map_err(broken)?;
+    }
     if let Some((place, bytes)) = plugin.transpose()? {
         archive.add(&place, bytes).map_err(broken)?;
     }
     Ok(archive)
 }
 
-/// Writes the FMU of `configuration` to `file`, then opens the file as an importer would: reads its description,
-/// loads the library, makes an instance and initialises it. A product that does not work is removed again.
+/// Writes the FMU of `configuration` with the [`libraries`](library::read) to `file`. Then it opens the file as an importer would: it
+/// reads the description, loads the library for this platform if there is one, makes an instance and initialises it. A product
+/// that does not work is removed again.
 ///
 /// # Errors
 ///
-/// A file that cannot be written, or a product that does not work.
-pub fn build(configuration: Configuration, library: Option<&Path>, file: &Path) -> Result<Rc<Fmu>, Error> {
+/// A file that cannot be written, a plug-in with libraries for other platforms, or a product that does not work.
+pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<Rc<Fmu>, Error> {
     let product = Product::new(configuration)?;
-    let bytes = archive(&product, library::read(library)?)?
-        .to_bytes()
-        .map_err(|e| Error::configuration("", e.to_string()))?;
+    let libraries = library::read(libraries)?;
+    let other = libraries.iter().find(|library| library.platform != PLATFORM);
+    if let Some((other, plugin)) = other.zip(product.configuration.plugin()) {
+        let message = format!(
+            "one is for {}, where the plug-in {} would be missing; build there too, and join the FMUs by `punctual merge`",
+            other.platform, plugin.file
+        );
+        return Err(Error::configuration("--library", message));
+    }
+    let can_run = libraries.iter().any(|library| library.platform == PLATFORM);
+    let bytes = archive(&product, libraries)?.to_bytes().map_err(|e| Error::configuration("", e.to_string()))?;
     whole::write(file, bytes)?;
-    tried(&product, file).inspect_err(|_| {
+    let tried = || if can_run { tried(&product, file) } else { Fmu::open(file).map(Rc::new) };
+    tried().inspect_err(|_| {
         // If this fails too, the first error is the one to tell.
         let _ = std::fs::remove_file(file);
     })

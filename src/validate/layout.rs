@@ -22,7 +22,7 @@ pub(super) const ENDINGS: [(&str, &str); 4] =
     [("win", ".dll"), ("linux", ".so"), ("aarch64-linux", ".so"), ("darwin", ".dylib")];
 
 /// The ending of libraries for a platform, where it is one that the standard names.
-pub(super) fn ending(platform: &str) -> Option<&'static str> {
+pub(crate) fn ending(platform: &str) -> Option<&'static str> {
     ENDINGS.iter().find(|(head, _)| platform.starts_with(head)).map(|(_, ending)| *ending)
 }
 

@@ -13,9 +13,9 @@
 //! same model as where a description is written.
 
 mod finding;
-mod layout;
+pub(crate) mod layout;
 mod schema;
-mod symbols;
+pub(crate) mod symbols;
 pub mod trial;
 
 use std::path::Path;

@@ -15,6 +15,26 @@ use crate::host::Archive;
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
+/// The processors of libraries for a platform.
+const PROCESSORS: [(&str, &[Architecture]); 7] = [
+    ("linux64", &[Architecture::X86_64]),
+    ("linux32", &[Architecture::I386]),
+    ("aarch64-linux", &[Architecture::Aarch64]),
+    ("win64", &[Architecture::X86_64]),
+    ("win32", &[Architecture::I386]),
+    ("darwin64", &[Architecture::X86_64, Architecture::Aarch64]),
+    ("darwin32", &[Architecture::I386]),
+];
+
+/// The format of libraries for a platform, which may be one that the standard does not name.
+fn format(platform: &str) -> BinaryFormat {
+    match platform {
+        p if p.starts_with("win") => BinaryFormat::Pe,
+        p if p.starts_with("darwin") => BinaryFormat::MachO,
+        _ => BinaryFormat::Elf,
+    }
+}
+
 pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
     let Some(identifier) = model.model_identifier() else { return };
     for platform in archive.platforms() {
@@ -62,27 +82,47 @@ fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
     if is_fat(bytes) && platform.starts_with("darwin") {
         return fat_exports(bytes);
     }
-    let file = object::File::parse(bytes).map_err(|e| format!("is not a shared library: {e}"))?;
-    let format = match platform {
-        p if p.starts_with("win") => BinaryFormat::Pe,
-        p if p.starts_with("darwin") => BinaryFormat::MachO,
-        _ => BinaryFormat::Elf,
-    };
+    let file = parse(bytes)?;
+    let format = format(platform);
     if file.format() != format {
         return Err(format!("has the format {:?}; {platform} has {format:?}", file.format()));
     }
     let found = file.architecture();
-    let wanted: &[Architecture] = match platform {
-        "linux64" | "win64" => &[Architecture::X86_64],
-        "darwin64" => &[Architecture::X86_64, Architecture::Aarch64],
-        "linux32" | "win32" | "darwin32" => &[Architecture::I386],
-        "aarch64-linux" => &[Architecture::Aarch64],
-        _ => &[],
-    };
-    if !wanted.is_empty() && !wanted.contains(&found) {
+    let known = PROCESSORS.iter().find(|(name, _)| *name == platform);
+    if let Some((_, wanted)) = known.filter(|(_, wanted)| !wanted.contains(&found)) {
         return Err(format!("is for the processor {found:?}; {platform} has {:?}", wanted[0]));
     }
     names(&file)
+}
+
+/// The platform of a shared library with every function of FMI 2.0 co-simulation, by its file: nothing of it runs.
+///
+/// # Errors
+///
+/// What it is instead.
+pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
+    let name = if is_fat(bytes) {
+        "darwin64"
+    } else {
+        let file = parse(bytes)?;
+        let (kind, processor) = (file.format(), file.architecture());
+        let is_for = |name: &str, processors: &[Architecture]| format(name) == kind && processors.contains(&processor);
+        let found = PROCESSORS.iter().find(|(name, processors)| is_for(name, processors));
+        let (name, _) = found.ok_or_else(|| {
+            let names = PROCESSORS.map(|(name, _)| name).join(", ");
+            format!("is a {kind:?} file for the processor {processor:?}, none of {names}")
+        })?;
+        name
+    };
+    let exported = exports(bytes, name)?;
+    match FUNCTIONS.iter().find(|function| !exported.contains(**function)) {
+        Some(missing) => Err(format!("does not export {missing}, so it is not the library of an FMU")),
+        None => Ok(name),
+    }
+}
+
+fn parse(bytes: &[u8]) -> Result<object::File<'_>, String> {
+    object::File::parse(bytes).map_err(|e| format!("is not a shared library: {e}"))
 }
 
 fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
