@@ -35,18 +35,18 @@ fn line(name: &str, time: f64) {
 }
 
 /// The steps of a closed loop, over and over.
-fn rows<P>(plant: P, builder: FilterBuilder, period: f64) -> f64
+fn rows<P>(plant: &P, builder: FilterBuilder, period: f64) -> f64
 where
     P: ControlAffine<4, 2>,
 {
-    let mut drive = Drive::recorded(builder, &plant, period);
+    let mut drive = Drive::recorded(builder, plant, period);
     fastest(Drive::SAMPLES, || _ = black_box(drive.step()))
 }
 
 /// The times of the steps of a closed loop with plans behind them, in ns, sorted: those that give what the rows or u_ref
 /// wanted or near it, those that the plan decides, and the first. `None` where that finds no plan. The shortest of some
 /// runs of the same loop counts.
-fn witnessed<P>(plant: P, builder: impl Fn() -> FilterBuilder, bounds: [f64; 2]) -> Option<[Vec<f64>; 3]>
+fn witnessed<P>(plant: &P, builder: impl Fn() -> FilterBuilder, bounds: [f64; 2]) -> Option<[Vec<f64>; 3]>
 where
     P: ControlAffine<4, 2>,
 {
@@ -68,7 +68,7 @@ where
                 return None;
             }
             by_plan[k] = assurance.driver == Driver::Plan;
-            x = rk4_step(&plant, &x.into(), &u.into(), PERIOD).into();
+            x = rk4_step(plant, &x.into(), &u.into(), PERIOD).into();
         }
     }
     let those = |plan: bool| {
@@ -86,15 +86,15 @@ where
     for obstacles in OBSTACLES {
         line(
             &format!("{name}, {obstacles} obstacles, pointwise"),
-            rows(plant, obstructed(plant, obstacles), 0.01),
+            rows(&plant, obstructed(plant, obstacles), 0.01),
         );
         let held = || obstructed(plant, obstacles).sampling(Sampling::default()).expect("valid settings");
         for period in [1, 10, 50] {
-            let time = rows(plant, held(), 1e-3 * f64::from(period));
+            let time = rows(&plant, held(), 1e-3 * f64::from(period));
             line(&format!("{name}, {obstacles} obstacles, {period} ms"), time);
         }
         let row = format!("{name}, {obstacles} obstacles, witness");
-        let Some(times) = witnessed(plant, held, bounds) else {
+        let Some(times) = witnessed(&plant, held, bounds) else {
             println!("{row}\trefused");
             continue;
         };

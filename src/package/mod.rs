@@ -99,7 +99,8 @@ pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -
         return Err(Error::configuration("--library", message));
     }
     let can_run = libraries.iter().any(|library| library.platform == PLATFORM);
-    let bytes = archive(&product, libraries)?.to_bytes().map_err(|e| Error::configuration("", e.to_string()))?;
+    let bytes =
+        archive(&product, libraries)?.to_bytes().map_err(|e| Error::configuration("", e.to_string()))?;
     whole::write(file, bytes)?;
     let tried = || if can_run { tried(&product, file) } else { Fmu::open(file).map(Rc::new) };
     tried().inspect_err(|_| {

@@ -106,7 +106,8 @@ pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
     } else {
         let file = parse(bytes)?;
         let (kind, processor) = (file.format(), file.architecture());
-        let is_for = |name: &str, processors: &[Architecture]| format(name) == kind && processors.contains(&processor);
+        let is_for =
+            |name: &str, processors: &[Architecture]| format(name) == kind && processors.contains(&processor);
         let found = PROCESSORS.iter().find(|(name, processors)| is_for(name, processors));
         let (name, _) = found.ok_or_else(|| {
             let names = PROCESSORS.map(|(name, _)| name).join(", ");

@@ -84,7 +84,7 @@ fn one_fmu_for_several_platforms() {
     // What is joined from two is the same, but for the order of the files.
     for (library, name) in [("library", "here.fmu"), ("arm.so", "there.fmu")] {
         let done = workshop.punctual(["build", "filter.toml", "-o", name, "--library", library]);
-        assert_eq!(done.errors.contains("note: not tried"), name == "there.fmu", "{}", done.errors);
+        assert_eq!(done.stderr.contains("note: not tried"), name == "there.fmu", "{}", done.stderr);
         done.success();
     }
     workshop.punctual(["merge", "here.fmu", "there.fmu", "-o", "joined.fmu"]).success();
@@ -115,8 +115,10 @@ fn libraries_that_do_not_go_together() {
     with(&["arm.so", "again.so"])
         .fails(2, "again.so: library: is for aarch64-linux, as one before it; give one for each platform");
     let version = env!("CARGO_PKG_VERSION");
-    with(&["library", "other.so"])
-        .fails(2, &format!("other.so: library: is not the library of \"punctual {version}\", which this program is"));
+    with(&["library", "other.so"]).fails(
+        2,
+        &format!("other.so: library: is not the library of \"punctual {version}\", which this program is"),
+    );
     assert!(!workshop.files().iter().any(|file| file == "x.fmu"));
 }
 

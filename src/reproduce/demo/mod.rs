@@ -115,6 +115,10 @@ fn build(folder: &Path, stem: &str, text: &str, library: Option<&Path>) -> Resul
     let path = folder.join(format!("{stem}.toml"));
     write(&path, text)?;
     let configuration = Configuration::parse(text).map_err(|e| Error::from(e).in_file(&path))?;
-    package::build(configuration, library.map(Path::to_owned).as_slice(), &folder.join(format!("{stem}.fmu")))?;
+    package::build(
+        configuration,
+        library.map(Path::to_owned).as_slice(),
+        &folder.join(format!("{stem}.fmu")),
+    )?;
     Ok(())
 }
