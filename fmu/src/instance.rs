@@ -7,6 +7,12 @@
 //! which they were set. It is computed when read, and only looked at. A step computes the sample at its start and
 //! remembers it. After the step, outputs stay that sample (a filter) or show the new state (a plant) until inputs
 //! change.
+//!
+//! **Steps taken back.** Importers that go back by a restored state may forget to turn their own clock back. The first
+//! step after a restore may therefore be told any time up to where the steps had gone that the restore took back. It
+//! starts at the restored time whatever is told, since that is where the state is. That belongs to the talk with
+//! one importer, not to the state: a snapshot has nothing of it, and right times lead to the same bits with and
+//! without.
 
 mod access;
 mod derivative;
@@ -104,6 +110,17 @@ pub const LEGAL: [(Call, Mode); 8] = [
     (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
+/// A step that was told a time within the steps taken back, for the log.
+#[derive(Clone, Copy, Debug)]
+enum Mistimed {
+    /// None in this run.
+    Never,
+    /// The first, from `given` in place of `restored`, in s. To be told.
+    First { given: f64, restored: f64 },
+    /// Told.
+    Told,
+}
+
 /// The reason why a call failed, for the log: the value given and those allowed.
 pub type Failure = String;
 
@@ -150,6 +167,10 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
+    /// The time in s through which steps went without a gap. It ends after the present communication point only
+    /// between a restore and the next step: what is beyond was taken back.
+    unbroken: [f64; 2],
+    mistimed: Mistimed,
     /// Scratch: a direction and the derivative along it, at the indices of the variables.
     derivative: [Vec<f64>; 2],
 }
@@ -189,6 +210,8 @@ impl Instance {
             values,
             fresh: false,
             configured: false,
+            unbroken: [0.0; 2],
+            mistimed: Mistimed::Never,
             derivative: [vec![0.0; len], vec![0.0; len]],
         };
         instance.start_values();
@@ -266,6 +289,7 @@ impl Instance {
         self.check(Call::ExitInitializationMode)?;
         self.configure().map_err(|e| e.to_string())?;
         self.mode = Mode::STEP;
+        (self.unbroken, self.mistimed) = ([self.time; 2], Mistimed::Never);
         self.block.output(self.time, &mut self.values);
         self.fresh = true;
         Ok(())
@@ -290,6 +314,7 @@ impl Instance {
         self.last_step = 0.0;
         self.fresh = false;
         self.configured = false;
+        self.unbroken = [0.0; 2];
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
@@ -330,6 +355,8 @@ impl Instance {
             last_step,
             fresh,
             configured,
+            unbroken: _,
+            mistimed: _,
             derivative: _,
         } = self;
         state.guid.clone_from(&product.guid);
@@ -363,10 +390,15 @@ impl Instance {
         (self.mode, self.time, self.last_step) = (*mode, *time, *last_step);
         (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
         self.values.clone_from(values);
+        let [begin, end] = self.unbroken;
+        if !(begin..=end).contains(time) {
+            self.unbroken = [*time; 2];
+        }
         Ok(())
     }
 
-    /// Makes the communication step from `t` by `h` seconds.
+    /// Makes the communication step from `t` by `h` seconds. The first one after a restore starts at the restored
+    /// time, also where `t` is later than that and not after the steps taken back.
     ///
     /// # Errors
     ///
@@ -386,7 +418,12 @@ impl Instance {
 
     /// What the user should know of the last step, if there is anything; said once.
     pub fn notice(&mut self) -> Option<String> {
-        self.block.notice()
+        let Mistimed::First { given, restored } = self.mistimed else { return self.block.notice() };
+        self.mistimed = Mistimed::Told;
+        Some(format!(
+            "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step starts there, and so \
+             does every such step after a restore (told once)"
+        ))
     }
 
     fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
@@ -404,16 +441,25 @@ impl Instance {
             return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
         }
         let gap = t - self.time;
-        if self.stepped && !self.block.accepts_gaps() && gap > same.max(GAP * self.last_step) {
+        let late = gap > same.max(GAP * self.last_step);
+        let mistimed = late && t <= self.unbroken[1] + same;
+        if late && !mistimed && self.stepped && !self.block.accepts_gaps() {
             return Err(format!(
                 "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
                 self.time
             ));
         }
+        let given = t;
+        let t = if mistimed { self.time } else { t };
         let start = if gap <= same { self.time } else { t };
         self.block.step(start, h, &mut self.values)?;
+        if mistimed && matches!(self.mistimed, Mistimed::Never) {
+            self.mistimed = Mistimed::First { given, restored: start };
+        }
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
         self.time = (t + h).max(start);
+        let begin = if late && !mistimed { start } else { self.unbroken[0] };
+        self.unbroken = [begin, self.time];
         self.stepped = true;
         self.last_step = h;
         self.fresh = true;
