@@ -8,11 +8,10 @@
 //! remembers it. After the step, outputs stay that sample (a filter) or show the new state (a plant) until inputs
 //! change.
 //!
-//! **Steps taken back.** Importers that go back by a restored state may forget to turn their own clock back. The first
-//! step after a restore may therefore be told any time up to where the steps had gone that the restore took back. It
-//! starts at the restored time whatever is told, since that is where the state is. That belongs to the talk with
-//! one importer, not to the state: a snapshot has nothing of it, and right times lead to the same bits with and
-//! without.
+//! **Steps taken back.** Importers that restore a state may forget to turn their own clock back (MasterSim does). So the
+//! first step after a restore may be told any time within the steps that it took back, and starts at the
+//! restored one. How far these went is known to the instance and is no part of a snapshot: a restored state has the
+//! bytes that it had, and with right times it decides nothing.
 
 mod access;
 mod derivative;
@@ -110,14 +109,14 @@ pub const LEGAL: [(Call, Mode); 8] = [
     (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
-/// A step that was told a time within the steps taken back, for the log.
+/// Whether a step was told a time within the steps taken back, for the log.
 #[derive(Clone, Copy, Debug)]
 enum Mistimed {
-    /// None in this run.
+    /// Not in this run.
     Never,
-    /// The first, from `given` in place of `restored`, in s. To be told.
+    /// For the first time, `given` in place of `restored`, in s.
     First { given: f64, restored: f64 },
-    /// Told.
+    /// As was told.
     Told,
 }
 
@@ -167,8 +166,8 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
-    /// The time in s through which steps went without a gap. It ends after the present communication point only
-    /// between a restore and the next step: what is beyond was taken back.
+    /// The times in s from and to which steps went without a gap. Between a restore and the next step they end later
+    /// than the present communication point, by what was taken back.
     unbroken: [f64; 2],
     mistimed: Mistimed,
     /// Scratch: a direction and the derivative along it, at the indices of the variables.
@@ -397,8 +396,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Makes the communication step from `t` by `h` seconds. The first one after a restore starts at the restored
-    /// time, also where `t` is later than that and not after the steps taken back.
+    /// Makes the communication step from `t` by `h` seconds. The first one after a restore is made from the restored
+    /// time wherever `t` lies within the steps that were taken back; [`Self::notice`] tells it.
     ///
     /// # Errors
     ///
@@ -421,8 +420,8 @@ impl Instance {
         let Mistimed::First { given, restored } = self.mistimed else { return self.block.notice() };
         self.mistimed = Mistimed::Told;
         Some(format!(
-            "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step starts there, and so \
-             does every such step after a restore (told once)"
+            "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
+             as every such step after a restore (told once)"
         ))
     }
 
@@ -442,24 +441,23 @@ impl Instance {
         }
         let gap = t - self.time;
         let late = gap > same.max(GAP * self.last_step);
-        let mistimed = late && t <= self.unbroken[1] + same;
+        let [begin, end] = self.unbroken;
+        let mistimed = late && end > self.time && t <= end + same;
         if late && !mistimed && self.stepped && !self.block.accepts_gaps() {
             return Err(format!(
                 "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
                 self.time
             ));
         }
-        let given = t;
-        let t = if mistimed { self.time } else { t };
-        let start = if gap <= same { self.time } else { t };
+        let start = if mistimed || gap <= same { self.time } else { t };
         self.block.step(start, h, &mut self.values)?;
         if mistimed && matches!(self.mistimed, Mistimed::Never) {
-            self.mistimed = Mistimed::First { given, restored: start };
+            self.mistimed = Mistimed::First { given: t, restored: start };
         }
+        let end = if mistimed { start + h } else { t + h };
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
-        self.time = (t + h).max(start);
-        let begin = if late && !mistimed { start } else { self.unbroken[0] };
-        self.unbroken = [begin, self.time];
+        self.time = end.max(start);
+        self.unbroken = [if late && !mistimed { start } else { begin }, self.time];
         self.stepped = true;
         self.last_step = h;
         self.fresh = true;

@@ -19,7 +19,7 @@
 //! | `arming` | filters that are armed later than at their first step |
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
-//! | `mistimed` | wrong times after a restored state |
+//! | `mistimed` | times that a restore took back, told at the next step |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;

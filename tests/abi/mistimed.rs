@@ -143,7 +143,7 @@ fn any_time_within_the_steps_taken_back() {
         let (mut t, mut last, mut wrongs) = (0.0, 0.0, 0);
         for k in 0..40 {
             let states = slaves.each_ref().map(Slave::state);
-            // One step or two that are taken back, at once or in turns, and a look at the outputs.
+            // One step or two that are taken back.
             let tried = [(); 2].map(|()| Step::valid(&mut random, fmu));
             let mut end = t;
             for step in &tried[..=random.below(2) as usize] {
@@ -212,7 +212,10 @@ fn a_plant_takes_no_other_time() {
         assert!(message.contains("must be") && message.contains("the present one, 1.125"), "{message}");
     }
     slave.step(1.125, 0.125);
-    // A new run tells it anew; a state from before belongs to no step that this run could take back.
+    // A reset instance has made no step that a state from before could take back. A new run tells it anew.
+    slave.ok((API.reset)(slave.component));
+    slave.restore(state);
+    slave.refused(slave.try_step(1.25, 0.125));
     slave.ok((API.reset)(slave.component));
     slave.initialize();
     slave.restore(state);
@@ -275,6 +278,16 @@ fn right_times_stay_right() {
             all(&slave)
         };
         assert_eq!(run(true), run(false));
+        // A run that starts over begins where it wants, also within the one before.
+        let slave = Slave::new(&fmu);
+        let instantiated = slave.state();
+        slave.initialize();
+        slave.step(0.0, 1.5);
+        slave.restore(instantiated);
+        slave.ok((API.enter_initialization_mode)(slave.component));
+        slave.ok((API.exit_initialization_mode)(slave.component));
+        slave.step(1.25, 0.125);
+        assert_eq!((slave.time(), slave.log.messages()), (1.375, Vec::new()));
     }
 }
 
@@ -294,4 +307,10 @@ fn the_state_does_not_know() {
     slave.step(1.25, 0.125);
     other.step(1.0, 0.125);
     assert_eq!(all(&slave), all(&other));
+    // Of the steps of another instance this one took none back.
+    other.step(1.125, 4.0);
+    slave.restore(slave.read(&other.now()));
+    slave.step(5.125, 0.5);
+    slave.restore(state);
+    slave.refused(slave.try_step(3.0, 0.125));
 }
