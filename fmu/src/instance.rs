@@ -109,6 +109,24 @@ pub const LEGAL: [(Call, Mode); 8] = [
     (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
+/// Steps that followed each other without a gap, times in s.
+#[derive(Clone, Copy, Debug)]
+struct Unbroken {
+    begin: f64,
+    /// The present communication point, or a later one between a restore and the next step: where the steps ended that
+    /// were taken back.
+    end: f64,
+    /// The most by which a step began after the end of the one before, as those of a clock that rounds do.
+    rounding: f64,
+}
+
+impl Unbroken {
+    /// No step, at `time`.
+    fn at(time: f64) -> Self {
+        Self { begin: time, end: time, rounding: 0.0 }
+    }
+}
+
 /// Whether a step was told a time within the steps taken back, for the log.
 #[derive(Clone, Copy, Debug)]
 enum Mistimed {
@@ -166,9 +184,7 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
-    /// The times in s from and to which steps went without a gap. Between a restore and the next step they end later
-    /// than the present communication point, by what was taken back.
-    unbroken: [f64; 2],
+    unbroken: Unbroken,
     mistimed: Mistimed,
     /// Scratch: a direction and the derivative along it, at the indices of the variables.
     derivative: [Vec<f64>; 2],
@@ -209,7 +225,7 @@ impl Instance {
             values,
             fresh: false,
             configured: false,
-            unbroken: [0.0; 2],
+            unbroken: Unbroken::at(0.0),
             mistimed: Mistimed::Never,
             derivative: [vec![0.0; len], vec![0.0; len]],
         };
@@ -288,7 +304,7 @@ impl Instance {
         self.check(Call::ExitInitializationMode)?;
         self.configure().map_err(|e| e.to_string())?;
         self.mode = Mode::STEP;
-        (self.unbroken, self.mistimed) = ([self.time; 2], Mistimed::Never);
+        (self.unbroken, self.mistimed) = (Unbroken::at(self.time), Mistimed::Never);
         self.block.output(self.time, &mut self.values);
         self.fresh = true;
         Ok(())
@@ -313,7 +329,7 @@ impl Instance {
         self.last_step = 0.0;
         self.fresh = false;
         self.configured = false;
-        self.unbroken = [0.0; 2];
+        self.unbroken = Unbroken::at(0.0);
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
@@ -389,9 +405,8 @@ impl Instance {
         (self.mode, self.time, self.last_step) = (*mode, *time, *last_step);
         (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
         self.values.clone_from(values);
-        let [begin, end] = self.unbroken;
-        if !(begin..=end).contains(time) {
-            self.unbroken = [*time; 2];
+        if !(self.unbroken.begin..=self.unbroken.end).contains(time) {
+            self.unbroken = Unbroken::at(*time);
         }
         Ok(())
     }
@@ -440,10 +455,14 @@ impl Instance {
             return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
         }
         let gap = t - self.time;
-        let late = gap > same.max(GAP * self.last_step);
-        let [begin, end] = self.unbroken;
-        let mistimed = late && end > self.time && t <= end + same;
-        if late && !mistimed && self.stepped && !self.block.accepts_gaps() {
+        let rounding = GAP * self.last_step;
+        let mut unbroken = self.unbroken;
+        // A clock that rounds does so as before when it goes back; all else within what was taken back is a wrong time.
+        let mistimed = unbroken.end > self.time
+            && t <= unbroken.end + same
+            && gap > same.max(rounding.min(unbroken.rounding));
+        let late = !mistimed && gap > same.max(rounding);
+        if late && self.stepped && !self.block.accepts_gaps() {
             return Err(format!(
                 "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
                 self.time
@@ -454,10 +473,15 @@ impl Instance {
         if mistimed && matches!(self.mistimed, Mistimed::Never) {
             self.mistimed = Mistimed::First { given: t, restored: start };
         }
+        if late {
+            unbroken = Unbroken::at(start);
+        } else {
+            unbroken.rounding = unbroken.rounding.max(start - self.time);
+        }
         let end = if mistimed { start + h } else { t + h };
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
         self.time = end.max(start);
-        self.unbroken = [if late && !mistimed { start } else { begin }, self.time];
+        self.unbroken = Unbroken { end: self.time, ..unbroken };
         self.stepped = true;
         self.last_step = h;
         self.fresh = true;
