@@ -291,6 +291,23 @@ fn right_times_stay_right() {
     }
 }
 
+/// No more than a clock may round off in a plant, but the steps taken back had not begun late.
+#[test]
+fn a_wrong_time_close_to_the_right_one() {
+    let (h, late) = (2.0_f64.powi(-9), 2.0_f64.powi(-10));
+    for configuration in [FILTER, PLANT] {
+        let fmu = Fmu::new(configuration);
+        let slave = Slave::ready(&fmu);
+        slave.step(0.0, 1.0);
+        let state = slave.state();
+        slave.step(1.0, h);
+        slave.restore(state);
+        slave.step(1.0 + late, h);
+        assert_eq!(slave.time(), 1.0 + h);
+        warned(&slave, 1.0 + late, 1.0);
+    }
+}
+
 /// A state has nothing of the steps that it took back: its bytes are the same, and another instance is strict.
 #[test]
 fn the_state_does_not_know() {
