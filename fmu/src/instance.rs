@@ -7,6 +7,11 @@
 //! which they were set. It is computed when read, and only looked at. A step computes the sample at its start and
 //! remembers it. After the step, outputs stay that sample (a filter) or show the new state (a plant) until inputs
 //! change.
+//!
+//! **Steps taken back.** Importers that restore a state may forget to turn their own clock back (MasterSim does). So the
+//! first step after a restore may be told any time within the steps that it took back, and starts at the
+//! restored one. How far these went is known to the instance and is no part of a snapshot: a restored state has the
+//! bytes that it had, and with right times it decides nothing.
 
 mod access;
 mod derivative;
@@ -104,6 +109,35 @@ pub const LEGAL: [(Call, Mode); 8] = [
     (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
 ];
 
+/// Steps that followed each other without a gap, times in s.
+#[derive(Clone, Copy, Debug)]
+struct Unbroken {
+    begin: f64,
+    /// The present communication point, or a later one between a restore and the next step: where the steps ended that
+    /// were taken back.
+    end: f64,
+    /// The most by which a step began after the end of the one before, as those of a clock that rounds do.
+    rounding: f64,
+}
+
+impl Unbroken {
+    /// No step, at `time`.
+    fn at(time: f64) -> Self {
+        Self { begin: time, end: time, rounding: 0.0 }
+    }
+}
+
+/// Whether a step was told a time within the steps taken back, for the log.
+#[derive(Clone, Copy, Debug)]
+enum Mistimed {
+    /// Not in this run.
+    Never,
+    /// For the first time, `given` in place of `restored`, in s.
+    First { given: f64, restored: f64 },
+    /// As was told.
+    Told,
+}
+
 /// The reason why a call failed, for the log: the value given and those allowed.
 pub type Failure = String;
 
@@ -150,6 +184,8 @@ pub struct Instance {
     fresh: bool,
     /// Whether `block` has the parameters in `values`.
     configured: bool,
+    unbroken: Unbroken,
+    mistimed: Mistimed,
     /// Scratch: a direction and the derivative along it, at the indices of the variables.
     derivative: [Vec<f64>; 2],
 }
@@ -189,6 +225,8 @@ impl Instance {
             values,
             fresh: false,
             configured: false,
+            unbroken: Unbroken::at(0.0),
+            mistimed: Mistimed::Never,
             derivative: [vec![0.0; len], vec![0.0; len]],
         };
         instance.start_values();
@@ -266,6 +304,7 @@ impl Instance {
         self.check(Call::ExitInitializationMode)?;
         self.configure().map_err(|e| e.to_string())?;
         self.mode = Mode::STEP;
+        (self.unbroken, self.mistimed) = (Unbroken::at(self.time), Mistimed::Never);
         self.block.output(self.time, &mut self.values);
         self.fresh = true;
         Ok(())
@@ -290,6 +329,7 @@ impl Instance {
         self.last_step = 0.0;
         self.fresh = false;
         self.configured = false;
+        self.unbroken = Unbroken::at(0.0);
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
@@ -330,6 +370,8 @@ impl Instance {
             last_step,
             fresh,
             configured,
+            unbroken: _,
+            mistimed: _,
             derivative: _,
         } = self;
         state.guid.clone_from(&product.guid);
@@ -363,10 +405,14 @@ impl Instance {
         (self.mode, self.time, self.last_step) = (*mode, *time, *last_step);
         (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
         self.values.clone_from(values);
+        if !(self.unbroken.begin..=self.unbroken.end).contains(time) {
+            self.unbroken = Unbroken::at(*time);
+        }
         Ok(())
     }
 
-    /// Makes the communication step from `t` by `h` seconds.
+    /// Makes the communication step from `t` by `h` seconds. The first one after a restore is made from the restored
+    /// time wherever `t` lies within the steps that were taken back; [`Self::notice`] tells it.
     ///
     /// # Errors
     ///
@@ -386,7 +432,12 @@ impl Instance {
 
     /// What the user should know of the last step, if there is anything; said once.
     pub fn notice(&mut self) -> Option<String> {
-        self.block.notice()
+        let Mistimed::First { given, restored } = self.mistimed else { return self.block.notice() };
+        self.mistimed = Mistimed::Told;
+        Some(format!(
+            "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
+             as every such step after a restore (told once)"
+        ))
     }
 
     fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
@@ -404,16 +455,33 @@ impl Instance {
             return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
         }
         let gap = t - self.time;
-        if self.stepped && !self.block.accepts_gaps() && gap > same.max(GAP * self.last_step) {
+        let rounding = GAP * self.last_step;
+        let mut unbroken = self.unbroken;
+        // A clock that rounds does so as before when it goes back; all else within what was taken back is a wrong time.
+        let mistimed = unbroken.end > self.time
+            && t <= unbroken.end + same
+            && gap > same.max(rounding.min(unbroken.rounding));
+        let late = !mistimed && gap > same.max(rounding);
+        if late && self.stepped && !self.block.accepts_gaps() {
             return Err(format!(
                 "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
                 self.time
             ));
         }
-        let start = if gap <= same { self.time } else { t };
+        let start = if mistimed || gap <= same { self.time } else { t };
         self.block.step(start, h, &mut self.values)?;
+        if mistimed && matches!(self.mistimed, Mistimed::Never) {
+            self.mistimed = Mistimed::First { given: t, restored: start };
+        }
+        if late {
+            unbroken = Unbroken::at(start);
+        } else {
+            unbroken.rounding = unbroken.rounding.max(start - self.time);
+        }
+        let end = if mistimed { start + h } else { t + h };
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
-        self.time = (t + h).max(start);
+        self.time = end.max(start);
+        self.unbroken = Unbroken { end: self.time, ..unbroken };
         self.stepped = true;
         self.last_step = h;
         self.fresh = true;

@@ -24,7 +24,10 @@ use crate::configuration::{
 pub const LOG_CATEGORIES: [(&str, &str); 3] = [
     ("logStatusError", "calls that failed, with the reason"),
     ("logEvents", "what happened: instantiation, initialization, reset"),
-    ("logStatusWarning", "promises that were refused or withdrawn, with the reason, or given again"),
+    (
+        "logStatusWarning",
+        "promises that were refused or withdrawn, with the reason, or given again; times of steps that were taken back",
+    ),
 ];
 
 /// Everything derived from one configuration.

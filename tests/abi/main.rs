@@ -19,6 +19,7 @@
 //! | `arming` | filters that are armed later than at their first step |
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
+//! | `mistimed` | times that a restore took back, told at the next step |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
@@ -33,6 +34,7 @@ mod instantiate;
 mod legality;
 mod lifetime;
 mod logging;
+mod mistimed;
 mod outputs;
 mod plant;
 mod rollback;

@@ -48,7 +48,7 @@ inputs = { a = 1.0 }
 measurements = { x_p = 0.1, theta = 0.01 }
 ";
 
-fn every_fmu() -> Vec<Fmu> {
+pub(crate) fn every_fmu() -> Vec<Fmu> {
     let mut fmus = vec![
         Fmu::new(FILTER),
         Fmu::new(&format!("direct_feedthrough = false\n{}", FILTER.trim_start())),
@@ -64,7 +64,7 @@ fn every_fmu() -> Vec<Fmu> {
 }
 
 /// Pseudo-random numbers (SplitMix64).
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     fn next(&mut self) -> u64 {
@@ -75,7 +75,7 @@ impl Random {
         z ^ z >> 31
     }
 
-    fn below(&mut self, n: u64) -> u64 {
+    pub(crate) fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
@@ -91,12 +91,12 @@ impl Random {
 }
 
 /// The actions between two communication points.
-struct Step {
+pub(crate) struct Step {
     inputs: Vec<f64>,
     rearm: Option<bool>,
     /// Whether outputs are read before the step.
     look: bool,
-    h: f64,
+    pub(crate) h: f64,
 }
 
 impl Step {
@@ -114,8 +114,15 @@ impl Step {
         Self { inputs, rearm, look: random.below(2) == 0, h: random.step() }
     }
 
+    /// One that no FMU refuses.
+    pub(crate) fn valid(random: &mut Random, fmu: &Fmu) -> Self {
+        let mut step = Self::new(random, fmu);
+        step.inputs.iter_mut().filter(|input| input.is_nan()).for_each(|input| *input = 0.0);
+        step
+    }
+
     /// Sets the inputs.
-    fn begin(&self, slave: &Slave) {
+    pub(crate) fn begin(&self, slave: &Slave) {
         slave.set_inputs(&self.inputs);
         if let Some(rearm) = self.rearm {
             slave.set_flag("rearm", rearm);
@@ -126,7 +133,7 @@ impl Step {
     }
 
     /// Makes the step, which a plant may refuse.
-    fn end(&self, slave: &Slave, t: &mut f64) {
+    pub(crate) fn end(&self, slave: &Slave, t: &mut f64) {
         if slave.try_step(*t, self.h) == 0 {
             *t += self.h;
         }
@@ -153,7 +160,7 @@ fn values(slave: &Slave) -> Vec<u64> {
 }
 
 /// All visible values, and all that is remembered.
-fn all(slave: &Slave) -> (Vec<u64>, Vec<u8>) {
+pub(crate) fn all(slave: &Slave) -> (Vec<u64>, Vec<u8>) {
     (values(slave), slave.now())
 }
 

@@ -344,7 +344,7 @@ unsafe extern "C" fn fmi2DoStep(
     let body = |handle: &mut Handle| {
         let (t, h) = (current_communication_point, communication_step_size);
         handle.instance.do_step(t, h)?;
-        if let Some(notice) = handle.instance.notice() {
+        while let Some(notice) = handle.instance.notice() {
             handle.logger.warning(&notice);
         }
         Ok(Status::OK)
