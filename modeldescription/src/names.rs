@@ -105,8 +105,12 @@ fn is_word(byte: u8) -> bool {
 }
 
 /// The folder of this platform's binaries inside an FMI 2.0 archive (section 2.3), such as `linux64`.
-pub const PLATFORM: &str = if cfg!(target_os = "windows") {
-    if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
+pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "x86_64")) {
+    "win64"
+} else if cfg!(all(target_os = "windows", target_arch = "x86")) {
+    "win32"
+} else if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
+    "aarch64-windows"
 } else if cfg!(target_os = "macos") {
     "darwin64"
 } else if cfg!(all(target_os = "linux", target_arch = "x86_64")) {

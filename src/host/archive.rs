@@ -69,9 +69,8 @@ impl Archive {
     /// folder, or is neither stored nor deflated. Nothing is written before all of this is known.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let problem = |problem| Error::fmu(path, problem);
-        // The file is opened here first, to tell "no such file" from "not an archive".
-        let mut file = File::open(path).map_err(|e| Error::io("read", path, e))?;
-        let metadata = file.metadata().map_err(|e| Error::io("read", path, e))?;
+        // Asked first, to tell "no such file" and a folder, which Windows does not open, from "not an archive".
+        let metadata = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?;
         if !metadata.is_file() {
             return Err(problem(FmuProblem::Archive("it is not a file".into())));
         }
@@ -82,6 +81,7 @@ impl Archive {
                 "a TOML file is none; `punctual build` makes an FMU from one, `punctual check` checks it";
             return Err(problem(FmuProblem::Archive(message.into())));
         }
+        let mut file = File::open(path).map_err(|e| Error::io("read", path, e))?;
         announced_entries(&mut file).map_err(problem)?;
         let mut zip =
             ZipArchive::new(BufReader::new(file)).map_err(|e| problem(FmuProblem::Archive(chain(&e))))?;

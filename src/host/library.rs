@@ -67,7 +67,7 @@ impl Library {
     /// Loads the library, resolves every function used and asks for its version. Its undefined symbols are
     /// resolved now, so that none is missed in mid-run. Its own symbols stay its own.
     pub(super) fn load(path: &Path) -> Result<Self, FmuProblem> {
-        let library = open(path).map_err(|e| FmuProblem::Load(chain(&e)))?;
+        let library = open(path).map_err(|e| FmuProblem::Load(refused(path, &chain(&e))))?;
         let functions = Functions::resolve(&library)?;
         let asked = [
             ("fmi2GetVersion", functions.get_version, "2."),
@@ -89,6 +89,16 @@ impl Library {
         let get_string = unsafe { library.get::<fmi2::GetString>("fmi2GetString") };
         let get_string = get_string.ok().map(|symbol| *symbol);
         Ok(Self { functions, get_string, version, types_platform, _library: library })
+    }
+}
+
+/// The loader's words with the library's name, which those of Windows lack.
+fn refused(path: &Path, words: &str) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if words.contains(&*name) {
+        words.to_owned()
+    } else {
+        format!("{name}, or a library that it needs: {words}")
     }
 }
 

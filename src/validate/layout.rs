@@ -18,8 +18,13 @@ const TOP: [&str; 8] = [
 ];
 
 /// The ending of libraries in a folder of `binaries/`, by the beginning of its name.
-pub(super) const ENDINGS: [(&str, &str); 4] =
-    [("win", ".dll"), ("linux", ".so"), ("aarch64-linux", ".so"), ("darwin", ".dylib")];
+pub(super) const ENDINGS: [(&str, &str); 5] = [
+    ("win", ".dll"),
+    ("aarch64-windows", ".dll"),
+    ("linux", ".so"),
+    ("aarch64-linux", ".so"),
+    ("darwin", ".dylib"),
+];
 
 /// The ending of libraries for a platform, where it is one that the standard names.
 pub(crate) fn ending(platform: &str) -> Option<&'static str> {

@@ -16,12 +16,13 @@ use crate::host::Archive;
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
 /// The processors of libraries for a platform.
-const PROCESSORS: [(&str, &[Architecture]); 7] = [
+const PROCESSORS: [(&str, &[Architecture]); 8] = [
     ("linux64", &[Architecture::X86_64]),
     ("linux32", &[Architecture::I386]),
     ("aarch64-linux", &[Architecture::Aarch64]),
     ("win64", &[Architecture::X86_64]),
     ("win32", &[Architecture::I386]),
+    ("aarch64-windows", &[Architecture::Aarch64]),
     ("darwin64", &[Architecture::X86_64, Architecture::Aarch64]),
     ("darwin32", &[Architecture::I386]),
 ];
@@ -29,7 +30,7 @@ const PROCESSORS: [(&str, &[Architecture]); 7] = [
 /// The format of libraries for a platform, which may be one that the standard does not name.
 fn format(platform: &str) -> BinaryFormat {
     match platform {
-        p if p.starts_with("win") => BinaryFormat::Pe,
+        p if p.starts_with("win") || p.ends_with("-windows") => BinaryFormat::Pe,
         p if p.starts_with("darwin") => BinaryFormat::MachO,
         _ => BinaryFormat::Elf,
     }
