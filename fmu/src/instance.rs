@@ -16,7 +16,7 @@
 mod access;
 mod derivative;
 
-use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, VariableKind};
+use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
 use crate::configuration::{Configuration, ConfigurationError};
@@ -168,7 +168,7 @@ pub struct State {
 pub struct Instance {
     product: Product,
     /// Type and causality by value reference: checked at every read and write, in few bytes.
-    kinds: Vec<(BaseType, Causality)>,
+    kinds: Vec<(BaseType, Causality, Variability)>,
     block: Box<dyn Block>,
     /// The state of a new block, which remembers nothing yet.
     start: BlockState,
@@ -212,7 +212,8 @@ impl Instance {
         let values = Values::zeros(len);
         let mut start = BlockState::Plant { x: Vec::new() };
         block.save(&mut start);
-        let kinds = product.variables.iter().map(|v| (v.kind.base_type(), v.causality)).collect();
+        let kinds =
+            product.variables.iter().map(|v| (v.kind.base_type(), v.causality, v.variability)).collect();
         let mut instance = Self {
             product,
             kinds,
@@ -544,11 +545,18 @@ impl Instance {
                 self.product.ranges[i].check(name, value).map_err(|e| e.to_string())?;
             }
         }
+        let mut tuned = false;
         for (&reference, &value) in references.iter().zip(values) {
             self.values.reals[reference as usize] = value;
-            self.configured &= (reference as usize) < self.product.layout.parameters;
+            tuned |= reference as usize >= self.product.layout.parameters;
         }
         self.fresh &= references.is_empty();
+        if tuned && self.mode == Mode::STEP {
+            // The block reads from the values what may change in a run. It matters at once.
+            self.block.output(self.time, &mut self.values);
+        } else if tuned {
+            self.configured = false;
+        }
         Ok(())
     }
 

@@ -276,7 +276,10 @@ impl Table {
             unit: Some(row.unit.clone().into_owned()),
             ..Real::default()
         });
-        self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
+        let variable = self.add(row.name.clone(), &row.description, Causality::Parameter, kind);
+        if row.tunable {
+            variable.variability = Variability::Tunable;
+        }
         self.ranges.push(row.range);
     }
 

@@ -22,8 +22,10 @@ pub struct VarySection {
     mean: Option<f64>,
     /// Standard deviation before the cut, likewise, > 0.
     deviation: Option<f64>,
-    /// The values to choose from, each as likely as the others.
+    /// The values to choose from, each as likely as the others; of a course one after the other.
     values: Option<Vec<f64>>,
+    /// Time in s for which a value of a course lasts, > 0.
+    period: Option<f64>,
 }
 
 /// The distributions, as the file spells them.
@@ -34,6 +36,7 @@ enum DistributionName {
     LogUniform,
     Normal,
     Choice,
+    Course,
     Seed,
 }
 
@@ -45,6 +48,7 @@ impl DistributionName {
             Self::LogUniform => ("log_uniform", &["min", "max"], &[]),
             Self::Normal => ("normal", &["mean", "deviation"], &["min", "max"]),
             Self::Choice => ("choice", &["values"], &[]),
+            Self::Course => ("course", &["values", "period"], &[]),
             Self::Seed => ("seed", &[], &[]),
         }
     }
@@ -80,6 +84,13 @@ pub enum Distribution {
     },
     /// Picks one of these, each as likely as the others.
     Choice(Vec<f64>),
+    /// The same in every run: these values one after the other, from the start on; the last one stays.
+    Course {
+        /// The values, at least one.
+        values: Vec<f64>,
+        /// Time in s for which each lasts, > 0.
+        period: f64,
+    },
     /// The run's own seed.
     Seed,
 }
@@ -90,8 +101,13 @@ impl VarySection {
         let wrong = |key: &str, message: String| ConfigurationError::new(format!("{field}.{key}"), message);
         // The keys are those of the distribution.
         let (name, needed, allowed) = self.distribution.keys();
-        let numbers =
-            [("min", self.min), ("max", self.max), ("mean", self.mean), ("deviation", self.deviation)];
+        let numbers = [
+            ("min", self.min),
+            ("max", self.max),
+            ("mean", self.mean),
+            ("deviation", self.deviation),
+            ("period", self.period),
+        ];
         let present = numbers.iter().map(|(key, value)| (*key, value.is_some()));
         for (key, is_there) in present.chain([("values", self.values.is_some())]) {
             if needed.contains(&key) && !is_there {
@@ -131,7 +147,7 @@ impl VarySection {
                 Ok(Distribution::LogUniform { min, max })
             }
             DistributionName::Normal => self.normal(field, range),
-            DistributionName::Choice => {
+            DistributionName::Choice | DistributionName::Course => {
                 let values = self.values.clone().unwrap_or_default();
                 if values.is_empty() {
                     return Err(wrong("values", "is empty, must have at least one value".to_owned()));
@@ -139,7 +155,13 @@ impl VarySection {
                 for (i, value) in values.iter().enumerate() {
                     within(&format!("values[{i}]"), *value)?;
                 }
-                Ok(Distribution::Choice(values))
+                match self.period {
+                    None => Ok(Distribution::Choice(values)),
+                    Some(period) => {
+                        Range::POSITIVE.check(&format!("{field}.period"), period)?;
+                        Ok(Distribution::Course { values, period })
+                    }
+                }
             }
             // The range of a seed is [0, 2^53), so a variable with another range is a mistake.
             DistributionName::Seed if range.contains(-1.0) || range.max.is_some() => {
@@ -191,6 +213,10 @@ impl fmt::Display for Distribution {
                 let values: Vec<_> = values.iter().map(ToString::to_string).collect();
                 write!(f, "one of {}", values.join(", "))
             }
+            Self::Course { values, period } => {
+                let count = values.len();
+                write!(f, "a course of {count} values, each for {period} s, from {:?} on", values[0])
+            }
             Self::Seed => f.write_str("the seed of the run"),
         }
     }
@@ -212,6 +238,7 @@ impl Distribution {
                 (mean + deviation * quantile(from + u * (to - from))).clamp(*min, *max)
             }
             Self::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
+            Self::Course { values, .. } => values[0],
             Self::Seed => seed as f64,
         }
     }

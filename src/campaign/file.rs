@@ -15,9 +15,11 @@ use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{self, InProcess, Own, Simulation, System, check_fed, links, port};
+use crate::coupling::{
+    self, Course, Grid, InProcess, Own, Simulation, StartValue, System, check_fed, links, port,
+};
 use crate::error::Error;
-use crate::host::{Causality, Fmu, ScalarType};
+use crate::host::{Causality, Fmu, ScalarType, Variability};
 use crate::package;
 use crate::text;
 
@@ -141,6 +143,8 @@ pub struct Varied {
     pub component: usize,
     /// Its value reference.
     pub reference: u32,
+    /// Whether it may change in a run.
+    pub tunable: bool,
     /// Its distribution.
     pub distribution: Distribution,
 }
@@ -152,6 +156,9 @@ pub struct Choice {
     pub seed: u64,
     /// The values of the varied variables, in order.
     pub values: Vec<f64>,
+    /// Where not empty, the seeds of the pieces of the run, each of as many steps as [`Campaign::piece`] says, in place
+    /// of `seed`.
+    pub pieces: Vec<u64>,
 }
 
 /// A campaign ready to run.
@@ -309,8 +316,25 @@ impl Campaign {
                 description: variable.description.clone(),
                 component: port.component,
                 reference: variable.value_reference,
+                tunable: variable.causality == Causality::Input
+                    || variable.variability == Variability::Tunable,
                 distribution: section.checked(&field, range).map_err(in_file)?,
             });
+            let varied = &varied[varied.len() - 1];
+            if let Distribution::Course { period, .. } = varied.distribution {
+                let wrong =
+                    |key, message| Err(in_file(ConfigurationError::new(format!("{field}.{key}"), message)));
+                if !varied.tunable {
+                    let message =
+                        "is \"course\", which is for what may change in a run: inputs and tunable parameters";
+                    return wrong("distribution", message.to_owned());
+                }
+                let step = system.experiment().step;
+                if whole(period / step).is_none_or(|steps| steps < 1.0) {
+                    let message = format!("is {period}, must be a whole number of steps of {step} s");
+                    return wrong("period", message);
+                }
+            }
         }
         check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
         let CampaignSection { runs, seed, sampling, success, .. } = section;
@@ -358,6 +382,72 @@ impl Campaign {
         self.success
     }
 
+    /// The least number of steps in which the noise of every plant whose seed is varied has whole periods, so that a
+    /// change of the seed after them begins with a period. `None` where no seed is varied.
+    ///
+    /// # Errors
+    ///
+    /// A variable that takes the seed and is not that of a plant's `[disturbance]`; a period that is varied; a start time or
+    /// steps that its periods do not fit.
+    pub(super) fn piece(&self) -> Result<Option<u64>, Error> {
+        let experiment = self.system.experiment();
+        let mut periods = Vec::new();
+        for varied in self.varied.iter().filter(|varied| matches!(varied.distribution, Distribution::Seed)) {
+            let component = &self.system.components()[varied.component];
+            let wrong = |message: String| {
+                Err(Error::configuration(format!("vary.{:?}.distribution", varied.name), message))
+            };
+            let given = match &self.models[varied.component].configuration {
+                Configuration::Plant(plant) => plant.disturbance.as_ref().map(|given| given.period),
+                _ => None,
+            };
+            let Some(given) = given.filter(|_| varied.tunable) else {
+                return wrong(
+                    "is \"seed\"; --rare takes the seed of a plant's [disturbance] alone".to_owned(),
+                );
+            };
+            let name = format!("{}.disturbance.period", component.name);
+            if self.varied.iter().any(|varied| varied.name == name) {
+                return wrong(format!("is \"seed\" where {name} is varied too; --rare takes one of them"));
+            }
+            let period = match component.start.get("disturbance.period") {
+                Some(StartValue::Real(period)) => *period,
+                Some(StartValue::Integer(period)) => *period as f64,
+                _ => given,
+            };
+            if whole(experiment.start_time / period).is_none() {
+                let start = experiment.start_time;
+                return wrong(format!(
+                    "is \"seed\"; --rare needs a start time, now {start} s, of whole periods of {period} s"
+                ));
+            }
+            periods.push((period, varied));
+        }
+        let Some((longest, varied)) = periods.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Ok(None);
+        };
+        let fits = |steps: &u64| {
+            periods
+                .iter()
+                .all(|(period, _)| whole(*steps as f64 * experiment.step / period).is_some_and(|n| n > 0.0))
+        };
+        let steps = (1..=self.grid().steps()).find(fits).ok_or_else(|| {
+            let message = format!(
+                "is \"seed\"; --rare needs steps, now of {} s, a whole number of which is one of its periods of {longest} s",
+                experiment.step
+            );
+            Error::configuration(format!("vary.{:?}.distribution", varied.name), message)
+        })?;
+        // More pieces would only take memory.
+        Ok(Some(steps * self.grid().steps().div_ceil(steps * MOST_PIECES)))
+    }
+
+    /// The communication points.
+    pub(super) fn grid(&self) -> Grid {
+        let experiment = self.system.experiment();
+        Grid::new(experiment.start_time, experiment.stop_time, experiment.step)
+    }
+
     /// The campaign of one run, that from `choice`.
     ///
     /// # Errors
@@ -367,7 +457,16 @@ impl Campaign {
         let mut file: serde_json::Value = read_toml(&self.source.file)?;
         file["campaign"]["runs"] = 1.into();
         for (varied, value) in self.varied.iter().zip(&choice.values) {
-            file["vary"][&varied.name] = serde_json::json!({ "distribution": "choice", "values": [value] });
+            let alone = match (&varied.distribution, self.piece()?) {
+                (Distribution::Course { .. }, _) => continue,
+                (Distribution::Seed, Some(steps)) => serde_json::json!({
+                    "distribution": "course",
+                    "values": choice.pieces,
+                    "period": steps as f64 * self.system.experiment().step,
+                }),
+                _ => serde_json::json!({ "distribution": "choice", "values": [value] }),
+            };
+            file["vary"][&varied.name] = alone;
         }
         let source = Source { file: write_toml(&file)?, ..self.source.clone() };
         Self::of(source, Path::new("the worst run"), Path::new("the worst run"))
@@ -380,7 +479,7 @@ impl Campaign {
         for (value, varied) in values.iter_mut().zip(&self.varied) {
             *value = varied.distribution.value(*value, seed);
         }
-        Choice { seed, values }
+        Choice { seed, values, pieces: Vec::new() }
     }
 
     /// Couples the components in process as `system` says, which is the campaign's but for the signals that it
@@ -395,11 +494,24 @@ impl Campaign {
         Simulation::assembled(system, &descriptions, instance)
     }
 
-    /// Gives `simulation` the start values of a run.
+    /// Gives `simulation` the start values of a run, and what changes in it.
     pub fn start(&self, simulation: &mut Simulation<InProcess>, choice: &Choice) {
         for (varied, value) in self.varied.iter().zip(&choice.values) {
             simulation.set_start(varied.component, varied.reference, *value);
         }
+        let pieces: Vec<f64> = choice.pieces.iter().map(|seed| *seed as f64).collect();
+        let course = |varied: &Varied| {
+            let (values, steps) = match &varied.distribution {
+                Distribution::Course { values, period } => {
+                    (values, whole(period / self.system.experiment().step)? as u64)
+                }
+                Distribution::Seed if !pieces.is_empty() => (&pieces, self.piece().ok()??),
+                _ => return None,
+            };
+            let Varied { component, reference, .. } = *varied;
+            Some(Course { component, reference, steps, values: values.clone() })
+        };
+        simulation.set_courses(self.varied.iter().filter_map(course).collect());
     }
 }
 
@@ -447,6 +559,15 @@ fn parsed(text: &str) -> Result<Configuration, ConfigurationError> {
         _ => e,
     })
 }
+
+/// The whole number that `ratio` is but for round-off.
+fn whole(ratio: f64) -> Option<f64> {
+    let whole = ratio.round();
+    ((ratio - whole).abs() <= 1e-6).then_some(whole)
+}
+
+/// The most pieces of a run with seeds of their own.
+const MOST_PIECES: u64 = 1000;
 
 // Counts travel as 64-bit integers, seeds as doubles.
 const _: () = assert!(MAX_RUNS <= 1 << 53);

@@ -1,8 +1,9 @@
 //! The probability that a run of a campaign fails, however rare that is, with the worst run found.
 //!
-//! What is estimated: the probability that what `[vary]` draws leads to a run that fails. Nothing is drawn during a run,
-//! so the run is a function of what is drawn at its start, and subset simulation over that is what splitting is elsewhere
-//! ([`super::splitting`]). Its margin is the least h of all barriers from their deadlines on.
+//! What is estimated: the probability that what `[vary]` draws leads to a run that fails. A run is a function of the numbers
+//! drawn at its start and of the noise in it. The noise comes in pieces with a seed each, independent of each other. So
+//! subset simulation over numbers and seeds is what splitting is elsewhere ([`super::splitting`]). Its margin is the least
+//! h of all barriers from their deadlines on.
 
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -55,6 +56,9 @@ pub struct Value {
     pub unit: String,
     /// Its value.
     pub value: f64,
+    /// Of a seed, the number of values that it takes one after the other, of which this is the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes: Option<usize>,
 }
 
 /// Estimates the probability that a run of `campaign` fails, and writes the worst one found to `output`, as a campaign of
@@ -76,11 +80,14 @@ pub fn rare(
     let margins = Margins::new(&measures)?;
     let crew = Crew::new(campaign, &measures, threads)?;
     // After a stop all are alike, which ends the pilot and costs a repeat nothing.
-    let margin = |z: &[f64]| match stop.load(Ordering::Relaxed) {
+    let margin = |z: &[f64], pieces: &[u64]| match stop.load(Ordering::Relaxed) {
         true => f64::INFINITY,
-        false => margins.of(&crew.make(0, &choice(campaign, z))),
+        false => margins.of(&crew.make(0, &choice(campaign, z, pieces))),
     };
-    let problem = Problem { dimensions: campaign.varied().len(), seed: campaign.seed(), margin: &margin };
+    // The sample at the stop time is one more.
+    let seeds = campaign.piece()?.map_or(0, |steps| campaign.grid().steps() / steps + 1) as usize;
+    let problem =
+        Problem { dimensions: campaign.varied().len(), seeds, seed: campaign.seed(), margin: &margin };
     let found = crew.pool.install(|| {
         let plan = problem.pilot()?;
         tell(0);
@@ -122,11 +129,6 @@ fn check(campaign: &Campaign, output: &Path) -> Result<(), Error> {
     if campaign.varied().is_empty() {
         return wrong("vary", "is empty, so that all runs are alike");
     }
-    if let Some(varied) = campaign.varied().iter().find(|v| matches!(v.distribution, Distribution::Seed)) {
-        let message =
-            "is \"seed\"; --rare comes to failures by small steps, and seeds have none between them";
-        return wrong(&format!("vary.{:?}.distribution", varied.name), message);
-    }
     if output.exists() {
         let message = format!("{} is there already; remove it, or give another output", output.display());
         return wrong("--output", &message);
@@ -145,13 +147,14 @@ fn stalled(Stalled { margin, part, made }: Stalled) -> Error {
     Error::configuration("--rare", message)
 }
 
-/// What is drawn at a standard normal point.
-fn choice(campaign: &Campaign, z: &[f64]) -> Choice {
+/// What is drawn at a standard normal point, with the seeds of the pieces.
+fn choice(campaign: &Campaign, z: &[f64], pieces: &[u64]) -> Choice {
+    let seed = pieces.first().copied().unwrap_or(0);
     let value = |(z, varied): (&f64, &super::file::Varied)| {
         let u = below(*z).clamp(f64::EPSILON / 2.0, 1.0 - f64::EPSILON / 2.0);
-        varied.distribution.value(u, 0)
+        varied.distribution.value(u, seed)
     };
-    Choice { seed: 0, values: z.iter().zip(campaign.varied()).map(value).collect() }
+    Choice { seed, values: z.iter().zip(campaign.varied()).map(value).collect(), pieces: pieces.to_vec() }
 }
 
 /// Places of the cells that tell the margin.
@@ -192,7 +195,7 @@ impl Margins {
 
 /// Makes the run at `worst` as a campaign of its own.
 fn write(campaign: &Campaign, output: &Path, worst: &Point) -> Result<Failing, Error> {
-    let drawn = choice(campaign, &worst.z);
+    let drawn = choice(campaign, &worst.z, &worst.seeds);
     let alone = campaign.alone(&drawn)?;
     let options = Options { output: output.to_owned(), runs: None, threads: NonZeroUsize::new(1) };
     runner::run(&alone, &options, &AtomicBool::new(false), &|_| {})?;
@@ -200,6 +203,7 @@ fn write(campaign: &Campaign, output: &Path, worst: &Point) -> Result<Failing, E
         name: varied.name.clone(),
         unit: varied.unit.clone().unwrap_or_default(),
         value: *value,
+        changes: matches!(varied.distribution, Distribution::Seed).then_some(drawn.pieces.len()),
     };
     Ok(Failing {
         least_h: Some(worst.margin).filter(|h| h.is_finite()),

@@ -97,7 +97,7 @@ impl Sampler {
         let mut rng = self.rng.clone();
         rng.set_stream(number);
         rng.set_word_pos(0);
-        let seed = rng.next_u64() >> 11;
+        let seed = seed(rng.next_u64());
         point.clear();
         for dimension in &self.dimensions {
             let fine = unit(rng.next_u64());
@@ -154,6 +154,16 @@ impl Sequence {
     pub(super) fn unit(&mut self) -> f64 {
         unit(self.0.next_u64())
     }
+
+    /// The next seed, below 2⁵³.
+    pub(super) fn seed(&mut self) -> u64 {
+        seed(self.0.next_u64())
+    }
+}
+
+/// A seed from 53 bits: as many as a double has.
+fn seed(bits: u64) -> u64 {
+    bits >> 11
 }
 
 /// A number in (0, 1) from 52 bits: neither end is ever drawn.

@@ -358,7 +358,10 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
 fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {
     let Rare { probability, interval: [low, high], repeats, levels, runs, plain_runs, worst } = found;
     let mut rows = vec![["the worst", "value", "unit"].map(str::to_owned).to_vec()];
-    rows.extend(worst.values.iter().map(|v| vec![v.name.clone(), format!("{:?}", v.value), v.unit.clone()]));
+    rows.extend(worst.values.iter().map(|v| {
+        let value = v.changes.map_or(format!("{:?}", v.value), |seeds| format!("{seeds} seeds"));
+        vec![v.name.clone(), value, v.unit.clone()]
+    }));
     rows.push(vec!["least h".into(), worst.least_h.map_or("-".into(), number), String::new()]);
     format!(
         "probability of failure {probability:.3e}, 95 % interval {low:.2e} to {high:.2e}\n\n\

@@ -67,8 +67,23 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// Notes that hold for every run.
     standing_notes: usize,
     used: bool,
+    /// Values that change in a run.
+    courses: Vec<Course>,
     /// Set by somebody else to end a run.
     stop: Option<Arc<AtomicBool>>,
+}
+
+/// The values of a Real input or tunable parameter in the course of a run, each for as many steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Course {
+    /// Position of the component.
+    pub component: usize,
+    /// Value reference.
+    pub reference: u32,
+    /// Steps for which a value lasts, ≥ 1.
+    pub steps: u64,
+    /// The values; the first is the one at the start, and the last one stays.
+    pub values: Vec<f64>,
 }
 
 /// Result of a run.
@@ -215,6 +230,7 @@ impl<P: Participant> Simulation<P> {
             notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
             standing_notes: 0,
             used: false,
+            courses: Vec::new(),
             stop: None,
         };
         simulation.note_shortened_step(descriptions);
@@ -231,6 +247,27 @@ impl<P: Participant> Simulation<P> {
             Some(start) => *start = Start::Real(reference, value),
             None => starts.push(Start::Real(reference, value)),
         }
+    }
+
+    /// Gives Real inputs and tunable parameters courses of values, from the next run on, in place of any before.
+    pub fn set_courses(&mut self, courses: Vec<Course>) {
+        for course in &courses {
+            if let Some(first) = course.values.first() {
+                self.set_start(course.component, course.reference, *first);
+            }
+        }
+        self.courses = courses;
+    }
+
+    /// Sets the values of the courses that begin at point `k`.
+    fn change(&mut self, k: u64) -> Result<(), Error> {
+        for Course { component, reference, steps, values } in &self.courses {
+            let next = usize::try_from(k / steps).ok().filter(|_| k.is_multiple_of(*steps));
+            if let Some(value) = next.and_then(|next| values.get(next)) {
+                self.members[*component].participant.set_real(&[*reference], &[*value])?;
+            }
+        }
+        Ok(())
     }
 
     /// Ends a run at the next step once `stop` is set; what was recorded until then is kept.
@@ -317,6 +354,7 @@ impl<P: Participant> Simulation<P> {
             for i in 0..self.delayed.len() {
                 self.members[self.delayed[i]].participant.do_step(time, step)?;
             }
+            self.change(k + 1)?;
             for c in 0..self.members.len() {
                 self.read_states(c, self.grid.time(k + 1))?;
             }
@@ -349,6 +387,7 @@ impl<P: Participant> Simulation<P> {
             for member in &mut self.members {
                 member.participant.do_step(time, step)?;
             }
+            self.change(k + 1)?;
             for c in 0..self.members.len() {
                 self.read_states(c, self.grid.time(k + 1))?;
                 self.read_direct(c, self.grid.time(k + 1))?;

@@ -17,7 +17,7 @@ mod system;
 pub use alone::alone;
 pub use grid::Grid;
 pub use in_process::InProcess;
-pub use master::{Outcome, Simulation, Statistics};
+pub use master::{Course, Outcome, Simulation, Statistics};
 pub use model::{Model, Own, Reader};
 pub use network::{Link, Port, links, port};
 pub use participant::Participant;

@@ -260,3 +260,33 @@ fn contradicting_bounds_end_the_initialization_with_an_error() {
     let u = slave.real("u.u_x");
     assert!((60.0..=70.0).contains(&u), "u_x is {u}");
 }
+
+/// Noise of another seed from then on, and of the first one where its state is restored.
+#[test]
+fn the_seed_of_a_disturbance_may_change_in_a_run() {
+    let disturbed = format!("{PLANT}\n[disturbance]\nseed = 3\nmeasurements = {{ v = 1.0 }}\n");
+    let fmu = Fmu::new(&disturbed);
+    let told = |seeds: [f64; 2]| {
+        let slave = Slave::new(&fmu);
+        slave.set("disturbance.seed", seeds[0]);
+        slave.initialize();
+        slave.step(0.0, 0.1);
+        let before = (slave.real("x.v"), slave.state());
+        slave.set("disturbance.seed", seeds[1]);
+        let now = slave.real("x.v");
+        slave.step(0.1, 0.1);
+        let next = slave.real("x.v");
+        slave.restore(before.1);
+        assert_eq!(slave.real("disturbance.seed"), seeds[0]);
+        assert_eq!(slave.real("x.v"), before.0);
+        (before.0, now, next)
+    };
+    let (third, fifth, other) = (told([3.0, 3.0]), told([5.0, 5.0]), told([3.0, 5.0]));
+    assert_eq!(other, (third.0, fifth.1, fifth.2));
+    assert!(third.0 == third.1 && third.1 != fifth.1 && third.2 != fifth.2);
+    let slave = Slave::new(&fmu);
+    slave.initialize();
+    let message = slave.refused(slave.try_set("disturbance.seed", -1.0));
+    assert_eq!(message, "fmi2SetReal: disturbance.seed: is -1, must be finite and >= 0");
+    slave.refused(slave.try_set("disturbance.period", 1.0));
+}

@@ -814,11 +814,21 @@ fn a_rare_failure_is_estimated_and_shown() {
     let (system, _) = text.split_once("[vary.").expect("the first table");
     refused(system.to_owned(), "vary: is empty, so that all runs are alike");
     let plant = workshop.text("plant.toml");
-    workshop.write("plant.toml", plant + "[disturbance]\nperiod = 0.1\ninputs = { u = 0.1 }\n");
+    workshop.write("plant.toml", plant + "[disturbance]\nperiod = 0.3\ninputs = { u = 0.1 }\n");
     let seed = "[vary.\"plant.disturbance.seed\"]\ndistribution = \"seed\"\n";
     refused(
         text.clone() + seed,
-        "vary.\"plant.disturbance.seed\".distribution: is \"seed\"; --rare comes to failures by small steps",
+        "vary.\"plant.disturbance.seed\".distribution: is \"seed\"; --rare needs steps, now of 1 s, a whole number of \
+         which is one of its periods of 0.3 s",
+    );
+    refused(
+        text.clone() + &seed.replace("disturbance.seed", "x0.x"),
+        "vary.\"plant.x0.x\".distribution: is \"seed\", which is for variables that may be any number >= 0",
+    );
+    let period = "[vary.\"plant.disturbance.period\"]\ndistribution = \"choice\"\nvalues = [0.1]\n";
+    refused(
+        text.clone() + seed + period,
+        "is \"seed\" where plant.disturbance.period is varied too; --rare takes one of them",
     );
     // A start that nothing makes fail: there is no way on, which is no probability.
     let narrow = text.replace(
@@ -826,4 +836,74 @@ fn a_rare_failure_is_estimated_and_shown() {
         "distribution = \"choice\"\nvalues = [0.0, 0.1]",
     );
     refused(narrow, "--rare: found no way to a failure: the least h that ");
+}
+
+/// A wall that noise alone comes to: as often by `--rare` as by plain sampling, and the worst course again.
+#[test]
+fn a_rare_course_of_noise_is_estimated_and_shown() {
+    let workshop = Workshop::new();
+    // x(2) is a fifth of the sum of ten numbers uniform from -1 to 1: about one in 100 comes to 0.84.
+    let text = drifting(&workshop, 0.84);
+    let (system, _) = text.split_once("[vary.").expect("the first table");
+    let text = system.replace("step = 1.0", "step = 0.1")
+        + "[vary.\"plant.disturbance.seed\"]\ndistribution = \"seed\"\n";
+    let plant = workshop.text("plant.toml") + "[disturbance]\nperiod = 0.2\ninputs = { u = 1.0 }\n";
+    workshop.write("plant.toml", &plant);
+    workshop.write("c.toml", text.replace("runs = 1\n", "runs = 20000\n"));
+    let campaign = |more: &[&str]| {
+        serde_json::from_str(&workshop.punctual([&["campaign", "c.toml", "--json"], more].concat()).success())
+            .expect("JSON")
+    };
+    let plain: Value = campaign(&[]);
+    let rare: Value = campaign(&["--rare=10"]);
+    let [plain, found] = [&plain["summary"]["failure"]["interval"], &rare["interval"]].map(numbers);
+    assert!(plain[0] < found[1] && found[0] < plain[1], "{plain:?}, {found:?}");
+    assert!(
+        plain[0] > 0.004 && plain[1] < 0.02 && found[0] > 0.5 * plain[0] && found[1] < 2.0 * plain[1],
+        "{found:?}"
+    );
+
+    // The worst course is a file of its own, with a seed for each period.
+    assert_eq!(rare["worst"]["values"][0]["changes"], 11, "{rare}");
+    let least = rare["worst"]["least_h"].as_f64().expect("a number");
+    assert!(least < 0.0);
+    let again = workshop.punctual(["replay", "c-worst.parquet", "--run", "0", "--out", "out"]).success();
+    assert!(again.contains("the row is as recorded, bit for bit") && again.contains("not kept"), "{again}");
+    let (names, rows) = rows(&workshop.path("c-worst.parquet"));
+    let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
+    assert_eq!(number(&rows[0][place]).map(f64::to_bits), Some(least.to_bits()));
+}
+
+/// A course of values: what may change in a run takes it, at the times that it says.
+#[test]
+fn a_course_is_the_same_in_every_run() {
+    let workshop = Workshop::new();
+    let text = drifting(&workshop, 9.0).replace("runs = 1\n", "runs = 2\n");
+    let (system, _) = text.split_once("[vary.").expect("the first table");
+    let system = system.replace("start = { \"u.u\" = 0.0, inner", "start = { inner");
+    let course = "[vary.\"plant.u.u\"]\ndistribution = \"course\"\nvalues = [1.0, -3.0]\nperiod = 1.0\n";
+    workshop.write("c.toml", system.clone() + course);
+    workshop.punctual(["campaign", "c.toml"]).success();
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
+    // x(1) = 1 is the greatest.
+    for row in &rows {
+        assert_eq!(number(&row[place]), Some(8.0));
+    }
+    let refused = |course: String, message: &str| {
+        workshop.write("c.toml", system.clone() + &course);
+        workshop.punctual(["campaign", "c.toml", "-o", "none.parquet"]).fails_like(2, message, &[]);
+    };
+    refused(
+        course.replace("1.0\n", "1.5\n"),
+        "vary.\"plant.u.u\".period: is 1.5, must be a whole number of steps of 1 s",
+    );
+    refused(course.replace("1.0\n", "0.0\n"), "vary.\"plant.u.u\".period: is 0, must be finite and >= 1e-9");
+    refused(
+        course.replace("values = [1.0, -3.0]\n", ""),
+        "vary.\"plant.u.u\".values: missing; distribution = \"course\" needs values, period",
+    );
+    let fixed = course.replace("plant.u.u", "plant.x0.x")
+        + "[vary.\"plant.u.u\"]\ndistribution = \"choice\"\nvalues = [0.0]\n";
+    refused(fixed, "vary.\"plant.x0.x\".distribution: is \"course\", which is for what may change in a run");
 }

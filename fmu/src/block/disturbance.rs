@@ -9,7 +9,6 @@ const ROUND_OFF: f64 = 1e-6;
 /// Noise on the inputs and measurements of a plant.
 #[derive(Default)]
 pub(super) struct Disturbance {
-    seed: f64,
     period: f64,
     /// By input; empty without a disturbance.
     inputs: Vec<f64>,
@@ -33,28 +32,27 @@ impl Disturbance {
             signals.iter().map(bound).collect()
         };
         Self {
-            seed: given.seed,
             period: given.period,
             inputs: bounds(&given.inputs, configuration.plant.inputs()),
             measurements: bounds(&given.measurements, configuration.plant.states()),
         }
     }
 
-    /// Adds to the inputs `u` the disturbance in force at time `t` (s).
-    pub(super) fn push(&self, t: f64, u: &mut [f64]) {
-        self.add(Kind::Input, &self.inputs, t, u);
+    /// Adds to the inputs `u` the disturbance in force at time `t` (s) under `seed`.
+    pub(super) fn push(&self, seed: f64, t: f64, u: &mut [f64]) {
+        self.add(Kind::Input, &self.inputs, seed, t, u);
     }
 
-    /// Adds to the measurements `x` the disturbance in force at time `t` (s).
-    pub(super) fn blur(&self, t: f64, x: &mut [f64]) {
-        self.add(Kind::Measurement, &self.measurements, t, x);
+    /// Adds to the measurements `x` the disturbance in force at time `t` (s) under `seed`.
+    pub(super) fn blur(&self, seed: f64, t: f64, x: &mut [f64]) {
+        self.add(Kind::Measurement, &self.measurements, seed, t, x);
     }
 
-    fn add(&self, kind: Kind, bounds: &[f64], t: f64, signals: &mut [f64]) {
+    fn add(&self, kind: Kind, bounds: &[f64], seed: f64, t: f64, signals: &mut [f64]) {
         for (i, (bound, signal)) in bounds.iter().zip(signals).enumerate() {
             if *bound != 0.0 {
                 let interval = (t / self.period + ROUND_OFF).floor();
-                *signal += bound * uniform([self.seed.to_bits(), kind as u64, i as u64, interval.to_bits()]);
+                *signal += bound * uniform([seed.to_bits(), kind as u64, i as u64, interval.to_bits()]);
             }
         }
     }
@@ -80,16 +78,16 @@ fn mixed(state: u64) -> u64 {
 mod tests {
     use super::*;
 
-    fn example(seed: f64) -> Disturbance {
-        Disturbance { seed, period: 0.1, inputs: vec![2.0, 0.0], measurements: vec![0.5] }
+    fn example() -> Disturbance {
+        Disturbance { period: 0.1, inputs: vec![2.0, 0.0], measurements: vec![0.5] }
     }
 
     #[test]
     fn numbers_are_uniform_and_of_one_time_each() {
-        let disturbance = example(3.0);
+        let disturbance = example();
         let at = |t: f64| {
             let mut u = [1.0, 1.0];
-            disturbance.push(t, &mut u);
+            disturbance.push(3.0, t, &mut u);
             u
         };
         let all: Vec<f64> = (0..10_000).map(|k| at(0.1 * f64::from(k))[0] - 1.0).collect();
@@ -111,11 +109,11 @@ mod tests {
     fn seeds_and_kinds_have_their_own_sequences() {
         let drawn = |seed: f64, blur: bool| {
             let mut x = [0.0];
-            let disturbance = example(seed);
+            let disturbance = example();
             if blur {
-                disturbance.blur(1.0, &mut x);
+                disturbance.blur(seed, 1.0, &mut x);
             } else {
-                disturbance.push(1.0, &mut x);
+                disturbance.push(seed, 1.0, &mut x);
             }
             x[0]
         };

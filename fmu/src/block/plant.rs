@@ -20,6 +20,8 @@ pub(super) struct PlantBlock {
     /// What is told beside the states, if anything is.
     outputs: Option<Functions<f64>>,
     disturbance: Disturbance,
+    /// Place of the disturbance's seed among the parameters: it may change in a run.
+    seed: Option<usize>,
     x: Vec<f64>,
     /// Scratch: the state after the step under way.
     next: Vec<f64>,
@@ -33,7 +35,23 @@ impl PlantBlock {
         let outputs = configuration.outputs()?;
         let (x, u) = (vec![0.0; layout.states], vec![0.0; layout.inputs]);
         let disturbance = Disturbance::new(&configuration);
-        Ok(Self { next: x.clone(), x, u, configuration, parameters, layout, plant, outputs, disturbance })
+        let seed = parameters.iter().position(|parameter| parameter.tunable);
+        Ok(Self {
+            next: x.clone(),
+            x,
+            u,
+            configuration,
+            parameters,
+            layout,
+            plant,
+            outputs,
+            disturbance,
+            seed,
+        })
+    }
+
+    fn seed(&self, values: &Values) -> f64 {
+        self.seed.map_or(0.0, |place| values.reals[self.layout.parameters + place])
     }
 }
 
@@ -51,10 +69,11 @@ impl Block for PlantBlock {
     }
 
     fn output(&mut self, t: f64, values: &mut Values) {
+        let seed = self.seed(values);
         let told = &mut values.reals[self.layout.outputs..self.layout.parameters];
         let (measured, others) = told.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
-        self.disturbance.blur(t, measured);
+        self.disturbance.blur(seed, t, measured);
         if let Some(outputs) = &mut self.outputs {
             others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
         }
@@ -85,10 +104,10 @@ impl Block for PlantBlock {
             ));
         }
         self.next.copy_from_slice(&self.x);
-        let inner = h / substeps;
+        let (inner, seed) = (h / substeps, self.seed(values));
         for k in 0..substeps as u64 {
             self.u.copy_from_slice(u);
-            self.disturbance.push(t + k as f64 * inner, &mut self.u);
+            self.disturbance.push(seed, t + k as f64 * inner, &mut self.u);
             self.plant.rk4_step(&mut self.next, &self.u, inner).map_err(|e| e.to_string())?;
         }
         if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
@@ -126,6 +145,7 @@ impl Block for PlantBlock {
             plant: _,
             outputs: _,
             disturbance: _,
+            seed: _,
             next: _,
             u: _,
         } = self;

@@ -80,6 +80,8 @@ pub struct Parameter<C> {
     pub range: Range,
     /// Meaning, for a human.
     pub description: String,
+    /// Whether it may change in a run: the block reads it from the values at every step.
+    pub tunable: bool,
     access: Access<C>,
 }
 
@@ -97,8 +99,14 @@ impl<C> Parameter<C> {
             unit: unit.into(),
             range,
             description: description.into(),
+            tunable: false,
             access: Box::new(access),
         }
+    }
+
+    /// The same, as one that may change in a run.
+    pub(super) fn tunable(self) -> Self {
+        Self { tunable: true, ..self }
     }
 
     /// The value in `configuration`; not a number where the configuration does not have it.

@@ -314,9 +314,10 @@ impl PlantConfiguration {
                 "seed",
                 "1".to_owned(),
                 SEED,
-                "another number, another sequence".to_owned(),
+                "another number, another sequence, from then on".to_owned(),
                 Box::new(|d| Some(&mut d.seed)),
-            ),
+            )
+            .tunable(),
             row(
                 "period",
                 "period",

@@ -1,6 +1,6 @@
 //! The value references that may be read and written.
 
-use punctual_modeldescription::{BaseType, Causality, Variable};
+use punctual_modeldescription::{BaseType, Causality, Variability, Variable};
 
 use super::{Call, Failure, Instance, Mode};
 
@@ -12,28 +12,30 @@ impl Instance {
         references: &[u32],
     ) -> Result<(), Failure> {
         self.check(call)?;
-        self.check_each(base, references, |_| true)
+        self.check_each(base, references, |_, _| true)
     }
 
     pub(super) fn check_settable(&self, base: BaseType, references: &[u32]) -> Result<(), Failure> {
         self.check(Call::Set)?;
         let fixed = self.mode == Mode::STEP;
-        let settable = |c| c == Causality::Input || (c == Causality::Parameter && !fixed);
+        let settable = |c, v| {
+            c == Causality::Input || (c == Causality::Parameter && (!fixed || v == Variability::Tunable))
+        };
         self.check_each(base, references, settable)
     }
 
-    /// Checks that each of `references` is a variable of the type `base` with an `allowed` causality.
+    /// Checks that each of `references` is a variable of the type `base` with an `allowed` causality and variability.
     fn check_each(
         &self,
         base: BaseType,
         references: &[u32],
-        allowed: impl Fn(Causality) -> bool,
+        allowed: impl Fn(Causality, Variability) -> bool,
     ) -> Result<(), Failure> {
         // Reads the small table, since this is done at every step; only the message looks at the variables
         // themselves.
         let fits = |reference: u32| {
             let kind = self.kinds.get(reference as usize);
-            kind.is_some_and(|&(found, causality)| found == base && allowed(causality))
+            kind.is_some_and(|&(found, c, v)| found == base && allowed(c, v))
         };
         match references.iter().find(|&&reference| !fits(reference)) {
             None => Ok(()),
