@@ -823,12 +823,12 @@ fn a_rare_failure_is_estimated_and_shown() {
     );
     refused(
         text.clone() + &seed.replace("disturbance.seed", "x0.x"),
-        "vary.\"plant.x0.x\".distribution: is \"seed\", which is for variables that may be any number >= 0",
+        "c.toml: vary.\"plant.x0.x\".distribution: is \"seed\", which is for variables that may be any number >= 0",
     );
     let period = "[vary.\"plant.disturbance.period\"]\ndistribution = \"choice\"\nvalues = [0.1]\n";
     refused(
         text.clone() + seed + period,
-        "is \"seed\" where plant.disturbance.period is varied too; --rare takes one of them",
+        "vary.\"plant.disturbance.seed\".distribution: is \"seed\" where plant.disturbance.period is varied too; --rare takes one of them",
     );
     // A start that nothing makes fail: there is no way on, which is no probability.
     let narrow = text.replace(
@@ -856,7 +856,7 @@ fn a_rare_course_of_noise_is_estimated_and_shown() {
     };
     let plain: Value = campaign(&[]);
     let rare: Value = campaign(&["--rare=10"]);
-    let [plain, found] = [&plain["summary"]["failure"]["interval"], &rare["interval"]].map(numbers);
+    let [plain, found] = [&plain["failure"]["interval"], &rare["interval"]].map(numbers);
     assert!(plain[0] < found[1] && found[0] < plain[1], "{plain:?}, {found:?}");
     assert!(
         plain[0] > 0.004 && plain[1] < 0.02 && found[0] > 0.5 * plain[0] && found[1] < 2.0 * plain[1],
@@ -892,18 +892,19 @@ fn a_course_is_the_same_in_every_run() {
     }
     let refused = |course: String, message: &str| {
         workshop.write("c.toml", system.clone() + &course);
-        workshop.punctual(["campaign", "c.toml", "-o", "none.parquet"]).fails_like(2, message, &[]);
+        workshop.punctual(["campaign", "c.toml", "-o", "none.parquet"]).fails_like(
+            2,
+            &format!("c.toml: vary.\"plant.{message}"),
+            &[],
+        );
     };
-    refused(
-        course.replace("1.0\n", "1.5\n"),
-        "vary.\"plant.u.u\".period: is 1.5, must be a whole number of steps of 1 s",
-    );
-    refused(course.replace("1.0\n", "0.0\n"), "vary.\"plant.u.u\".period: is 0, must be finite and >= 1e-9");
+    refused(course.replace("1.0\n", "1.5\n"), "u.u\".period: is 1.5, must be a whole number of steps of 1 s");
+    refused(course.replace("1.0\n", "0.0\n"), "u.u\".period: is 0, must be finite and >= 1e-9");
     refused(
         course.replace("values = [1.0, -3.0]\n", ""),
-        "vary.\"plant.u.u\".values: missing; distribution = \"course\" needs values, period",
+        "u.u\".values: missing; distribution = \"course\" needs values, period",
     );
     let fixed = course.replace("plant.u.u", "plant.x0.x")
         + "[vary.\"plant.u.u\"]\ndistribution = \"choice\"\nvalues = [0.0]\n";
-    refused(fixed, "vary.\"plant.x0.x\".distribution: is \"course\", which is for what may change in a run");
+    refused(fixed, "x0.x\".distribution: is \"course\", which is for what may change in a run");
 }
