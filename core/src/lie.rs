@@ -210,6 +210,25 @@ where
         ahead::values::<P, B, NX, NU, K>((&self.plant, &self.barrier), (t, duration), x, u, out);
     }
 
+    fn values_of_row(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        let model = (&self.plant, &self.barrier);
+        macro_rules! by_degree {
+            ($($n:literal => $k:literal),*) => {
+                $(if const { K == $k } {
+                    ahead::values::<P, B, NX, NU, $n>(model, (t, duration), x, u, out);
+                })*
+            };
+        }
+        by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9);
+    }
+
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
         let (x, u) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
         out.copy_from_slice(self.plant.derivative(&x, &u).as_slice());

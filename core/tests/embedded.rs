@@ -33,6 +33,20 @@ fn the_picked_states_are_the_source_s_own() {
     picked.ahead(0.0, &X, &[1.0, -1.0], 0.1, &mut found);
     model.ahead(0.0, &OWN, &[1.0, -1.0], 0.1, &mut wanted);
     assert_eq!(found, wanted);
+    picked.values_of_row(0.0, &X, &[1.0, -1.0], 0.1, &mut found.value);
+    assert_eq!(found.value[..2], wanted.value[..2]);
+}
+
+#[test]
+fn all_states_in_another_order_are_picked() {
+    let (model, _) = sources();
+    for (picks, x) in [([0, 1, 2, 3], OWN), ([2, 3, 0, 1], [OWN[2], OWN[3], OWN[0], OWN[1]])] {
+        let picked = embedded(sources().0, 4, &picks).expect("valid picks");
+        let (mut found, mut wanted) = (Derivatives::ZERO, Derivatives::ZERO);
+        picked.evaluate(0.0, &x, &mut found);
+        model.evaluate(0.0, &OWN, &mut wanted);
+        assert_eq!(found, wanted, "{picks:?}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod support;
 
 use punctual_core::ErrorKind;
 use punctual_core::filter::{BarrierSettings, SafetyFilter, Status};
-use punctual_core::lie::{self, Derivatives};
+use punctual_core::lie::{self, Ahead, Derivatives};
 use punctual_reference::plants::{PointMass, Unicycle};
 use support::{SpeedLimit, quadratic_disc, source};
 
@@ -106,5 +106,26 @@ fn degrees_out_of_range_are_refused() {
         let Err(error) = lie::along(PointMass, quadratic_disc(), n) else { panic!("{n} accepted") };
         assert_eq!(error.kind(), ErrorKind::RelativeDegree);
         assert_eq!(error.to_string(), format!("relative_degree: is {n}, must be 1 to 2"));
+    }
+}
+
+/// What the search takes for a row, in place of all derivatives, is the same to the bit.
+#[test]
+fn what_a_row_takes_is_part_of_all_derivatives() {
+    let (x, u) = ([1.0, -2.0, 0.8, 6.0], [0.7, -1.3]);
+    for n in 1..=2 {
+        let source = lie::along(Unicycle, quadratic_disc(), n).expect("in range");
+        let model = source.predict().expect("a model");
+        // One Runge-Kutta step and two.
+        for duration in [0.0, 0.001, 0.5] {
+            let (mut all, mut of_row) = (Ahead::ZERO, Ahead::ZERO);
+            model.ahead(0.3, &x, &u, duration, &mut all);
+            model.ahead_of_row(0.3, &x, &u, duration, &mut of_row);
+            assert_eq!(of_row.value[..n], all.value[..n], "n {n}, {duration} s");
+            assert_eq!(of_row.gradient[..n], all.gradient[..n], "n {n}, {duration} s");
+            model.values_ahead(0.3, &x, &u, duration, &mut all.value);
+            model.values_of_row(0.3, &x, &u, duration, &mut of_row.value);
+            assert_eq!(of_row.value[..n], all.value[..n], "n {n}, {duration} s");
+        }
     }
 }

@@ -427,7 +427,7 @@ impl PeriodProblem<'_> {
         }
         let (slot, bound) = (&self.slots[requirement.barrier], &requirement.bound);
         let held = (self.t, &slot.now.from, requirement.ahead);
-        slot.source.predict()?.values_ahead(held.0, held.1, u, held.2, &mut ahead.value);
+        slot.source.predict()?.values_of_row(held.0, held.1, u, held.2, &mut ahead.value);
         let n = slot.degree();
         let reached = (0..n).fold(-bound.floor, |sum, k| sum + bound.weights[k] * ahead.value[k]);
         Some(reached / requirement.divisor)
@@ -467,8 +467,8 @@ impl PeriodProblem<'_> {
         let mut values = [[0.0; MAX_RELATIVE_DEGREE + 1]; 2];
         let [here, there] = &mut values;
         let (later, duration) = (self.t * (1.0 + 0.7 * PART), requirement.ahead);
-        source.values_ahead(self.t, x, u, duration, here);
-        source.values_ahead(later, &moved[..states], u, duration, there);
+        source.values_of_row(self.t, x, u, duration, here);
+        source.values_of_row(later, &moved[..states], u, duration, there);
         let (n, weights) = (slot.degree(), &requirement.bound.weights);
         let change = |k: usize| (weights[k] * (there[k] - here[k])).abs() / PART;
         let size = (0..n).map(change).sum::<f64>() / requirement.divisor;

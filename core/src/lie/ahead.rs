@@ -291,7 +291,7 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     }
 }
 
-/// The values that [`evaluate`] writes, alone.
+/// The values that [`evaluate`] writes, alone. Leaves the rest of `out` as it is.
 #[inline]
 pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),

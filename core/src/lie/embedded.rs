@@ -100,6 +100,18 @@ impl Predict for Embedded {
         source.values_ahead(t, &self.picked(x)[..self.picks.len()], u, duration, out);
     }
 
+    fn values_of_row(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        let Some(source) = self.source.predict() else { return };
+        source.values_of_row(t, &self.picked(x)[..self.picks.len()], u, duration, out);
+    }
+
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
         let Some(source) = self.source.predict() else { return };
         let mut own = [0.0; MAX_PICKED];
@@ -191,6 +203,10 @@ pub fn embedded(
     if let Some(i) = picks.iter().position(|&pick| pick >= state_dim) {
         let message = format!("is {}, must be < {state_dim}, the number of states", picks[i]);
         return Err(Error::new(ErrorKind::Range, format!("picks[{}]", i + 1), message));
+    }
+    if picks.iter().copied().eq(0..state_dim) {
+        // All states in order: nothing to pick.
+        return Ok(source);
     }
     Ok(Box::new(Embedded { source, state_dim, picks: picks.to_vec() }))
 }

@@ -78,6 +78,18 @@ pub trait Predict {
         *out = ahead.value;
     }
 
+    /// Writes what [`Self::values_ahead`] does for k < n, with the same bits. The other numbers of `out` mean nothing.
+    fn values_of_row(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.values_ahead(t, x, u, duration, out);
+    }
+
     /// Writes ẋ at `x` under `u`.
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
 
