@@ -358,10 +358,6 @@ mod tests {
             least_distance(limit, z.iter().copied().chain(seeds.iter().map(uniform)))
         };
         let (covered, mean, part) = judged(truth, times, &noise, [dimensions, seeds]);
-        println!(
-            "{truth:.3e}: {covered} of {times} intervals cover it; mean / truth {}, part {part:.2e}",
-            mean / truth
-        );
         // One in twenty may miss it. Of 4 three do so once in 2000 times, of 100 thirteen likewise.
         assert!(times - covered <= 2 + times / 10, "{covered} of {times}");
         assert!((mean / truth - 1.0).abs() < 0.6 / (times as f64).sqrt(), "{mean}");
