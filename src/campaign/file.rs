@@ -156,8 +156,8 @@ pub struct Choice {
     pub seed: u64,
     /// The values of the varied variables, in order.
     pub values: Vec<f64>,
-    /// Where not empty, the seeds of the pieces of the run, each of as many steps as [`Campaign::piece`] says, in place
-    /// of `seed`.
+    /// Where not empty, the seeds of the pieces of the run, in place of `seed`: pieces of equal numbers of steps, in
+    /// which noise has whole periods.
     pub pieces: Vec<u64>,
 }
 
