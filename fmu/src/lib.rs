@@ -13,7 +13,7 @@
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
 //! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |
 //!
-//! [`fmi2`] has the C types of `abi` and the table of its functions, for whoever calls such a library.
+//! [`fmi2`] and [`fmi3`] have the C types of each version and the table of its functions, for whoever calls such a library.
 #![deny(unsafe_code)]
 // Elementary functions are those of the core: clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
@@ -32,5 +32,5 @@ pub mod state;
 
 #[cfg(windows)]
 pub use abi::loadable;
-pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2};
+pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2, fmi3};
 pub use filter_loop::{FilterLoop, LoopState};

@@ -14,6 +14,8 @@
 
 #[macro_use]
 pub mod fmi2;
+#[macro_use]
+pub mod fmi3;
 #[cfg(old_glibc)]
 mod glibc;
 mod guard;
