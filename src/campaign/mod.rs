@@ -21,7 +21,7 @@ pub use distribution::{Distribution, VarySection};
 pub use file::{Campaign, Choice, Source, Success, Varied};
 pub use join::join;
 pub use measures::Measures;
-pub use rare::{Failing, Rare, Value, rare};
+pub use rare::{Ended, Failing, Rare, Value, rare};
 pub use runner::{Options, Progress, kept, recorded, run, runs, version};
 pub use sampling::{Sampler, Sampling};
 pub use summary::{Case, Lack, Rate, Spread, Summary, summary};

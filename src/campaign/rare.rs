@@ -4,20 +4,25 @@
 //! drawn at its start and of the noise in it. The noise comes in pieces with a seed each, independent of each other. So
 //! subset simulation over numbers and seeds is what splitting is elsewhere ([`super::splitting`]). Its margin is the least
 //! h of all barriers from their deadlines on.
+//!
+//! The pilot's plan and each repeat are kept beside the output, in the folder `<output>.rare.parts`, until the estimate is
+//! made. So an interrupted one goes on from there, with the same numbers.
 
+use std::fs;
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::distribution::{Distribution, below};
 use super::file::{Campaign, Choice, Success};
 use super::measures::Measures;
-use super::runner::{self, Crew, Options};
-use super::splitting::{Estimate, Point, Problem, Stalled};
+use super::runner::{self, Crew, Options, Parts};
+use super::splitting::{self, Estimate, Plan, Point, Problem, Repeat, Stalled};
 use super::table::{Cell, Row};
 use crate::error::Error;
+use crate::whole;
 
 /// Estimate of the probability of failure.
 #[derive(Clone, Debug, Serialize)]
@@ -61,12 +66,23 @@ pub struct Value {
     pub changes: Option<usize>,
 }
 
+/// How an estimate ended.
+#[derive(Clone, Debug)]
+pub enum Ended {
+    /// It is there.
+    Done(Box<Rare>),
+    /// It was stopped, with so many repeats kept for the next time.
+    Stopped(usize),
+}
+
 /// Estimates the probability that a run of `campaign` fails, and writes the worst one found to `output`, as a campaign of
-/// that run alone. `None` where `stop` was set. `tell` gets the number of repeats done, 0 after the pilot.
+/// that run alone. Ends early once `stop` is set; what was made until then is kept beside `output`. `tell` gets the number
+/// of repeats there are, 0 after the pilot.
 ///
 /// # Errors
 ///
-/// A campaign that this does not fit; no way to failure; a file that is in the way or cannot be written.
+/// A campaign that this does not fit; no way to failure; a file that is in the way, is another campaign's, or cannot be
+/// written.
 pub fn rare(
     campaign: &Campaign,
     output: &Path,
@@ -74,7 +90,7 @@ pub fn rare(
     repeats: usize,
     stop: &AtomicBool,
     tell: &(dyn Fn(usize) + Sync),
-) -> Result<Option<Rare>, Error> {
+) -> Result<Ended, Error> {
     check(campaign, output)?;
     let measures = Measures::new(campaign);
     let margins = Margins::new(&measures)?;
@@ -88,17 +104,39 @@ pub fn rare(
     let seeds = campaign.piece()?.map_or(0, |steps| campaign.grid().steps() / steps + 1) as usize;
     let problem =
         Problem { dimensions: campaign.varied().len(), seeds, seed: campaign.seed(), margin: &margin };
-    let found = crew.pool.install(|| {
-        let plan = problem.pilot()?;
-        tell(0);
-        let estimate = problem.estimate(&plan, repeats, tell);
-        Ok((plan, estimate))
-    });
-    if stop.load(Ordering::Relaxed) {
-        return Ok(None);
+    // The plan and the repeats, those of an earlier time first.
+    let store = Store::open(campaign, output)?;
+    let mut made = match store.read()? {
+        Some(made) => made,
+        None => {
+            let plan = crew.pool.install(|| problem.pilot());
+            let stopped = stop.load(Ordering::Relaxed);
+            match plan {
+                Ok(plan) if !stopped => Made { plan, repeats: Vec::new() },
+                plan => {
+                    // Of a pilot nothing is kept.
+                    store.remove()?;
+                    let failure = plan.err().filter(|_| !stopped);
+                    return failure.map_or(Ok(Ended::Stopped(0)), |failure| Err(stalled(failure)));
+                }
+            }
+        }
+    };
+    store.write(&made)?;
+    tell(made.repeats.len().min(repeats));
+    while made.repeats.len() < repeats {
+        let repeat = crew.pool.install(|| problem.repeat(&made.plan, made.repeats.len() + 1));
+        if stop.load(Ordering::Relaxed) {
+            return Ok(Ended::Stopped(made.repeats.len()));
+        }
+        made.repeats.push(repeat);
+        store.write(&made)?;
+        tell(made.repeats.len());
     }
-    let (plan, estimate) = found.map_err(stalled)?;
-    let Estimate { probability, interval, deviation, worst: Some(worst), made } = estimate else {
+    let Made { plan, repeats: found } = &made;
+    let Estimate { probability, interval, deviation, worst: Some(worst), made } =
+        splitting::estimate(plan, &found[..repeats])
+    else {
         let message = format!(
             "none of {repeats} repeats came to a failure that the pilot had found; give more, such as --rare={}",
             10 * repeats
@@ -106,15 +144,64 @@ pub fn rare(
         return Err(Error::configuration("--rare", message));
     };
     let worst = write(campaign, output, &worst)?;
-    Ok(Some(Rare {
+    let runs = plan.made + made;
+    store.remove()?;
+    Ok(Ended::Done(Box::new(Rare {
         probability,
         interval,
         repeats,
-        runs: plan.made + made,
+        runs,
         plain_runs: (1.0 - probability) / (probability * deviation * deviation),
-        levels: plan.levels,
+        levels: plan.levels.iter().map(|level| level.margin).collect(),
         worst,
-    }))
+    })))
+}
+
+/// What an estimate is made of: the plan of its pilot, and its repeats from the first on.
+#[derive(Debug, Deserialize, Serialize)]
+struct Made {
+    plan: Plan,
+    repeats: Vec<Repeat>,
+}
+
+/// Where that is kept until the estimate is there.
+struct Store {
+    parts: Parts,
+    file: PathBuf,
+}
+
+impl Store {
+    fn open(campaign: &Campaign, output: &Path) -> Result<Self, Error> {
+        let mut beside = output.as_os_str().to_owned();
+        beside.push(".rare");
+        let parts = Parts::open(Path::new(&beside), campaign, None)?;
+        let file = parts.file("made");
+        Ok(Self { parts, file })
+    }
+
+    fn read(&self) -> Result<Option<Made>, Error> {
+        let text = match fs::read_to_string(&self.file) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            text => text.map_err(|e| Error::io("read", &self.file, e))?,
+        };
+        let wrong = |e: serde_json::Error| {
+            Error::io("use", &self.file, std::io::Error::other(format!("{e}; remove it")))
+        };
+        serde_json::from_str(&text).map(Some).map_err(wrong)
+    }
+
+    /// Writes all or nothing.
+    fn write(&self, made: &Made) -> Result<(), Error> {
+        // Numbers alone are always written.
+        whole::write(&self.file, serde_json::to_string(made).unwrap_or_default())
+    }
+
+    fn remove(self) -> Result<(), Error> {
+        match fs::remove_file(&self.file) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", &self.file, e)),
+            _ => self.parts.remove(),
+        }
+    }
 }
 
 /// Refuses what the method does not fit.

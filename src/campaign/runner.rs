@@ -184,6 +184,11 @@ impl Parts {
         self.folder.join("unfinished")
     }
 
+    /// Path of a file of another name in the folder.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
     /// Renames a file that is complete on the disk.
     pub(super) fn settle(&self, from: &Path, to: &Path) -> Result<(), Error> {
         fs::rename(from, to).map_err(|e| Error::io("write", to, e))?;

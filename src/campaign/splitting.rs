@@ -21,6 +21,7 @@ use punctual_core::elementary;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
+use serde::{Deserialize, Serialize};
 
 use super::distribution::student;
 use super::sampling::Sequence;
@@ -54,26 +55,59 @@ fn normal(rng: &mut Sequence, z: &mut [f64]) {
     }
 }
 
+/// Numbers that may be infinite in JSON, which has none: their bits.
+mod exact {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    /// A number as its bits.
+    pub(super) fn serialize<S: Serializer>(number: &f64, to: S) -> Result<S::Ok, S::Error> {
+        number.to_bits().serialize(to)
+    }
+
+    /// The number with these bits.
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        u64::deserialize(from).map(f64::from_bits)
+    }
+}
+
 /// A point with its margin.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct Point {
     /// Standard normal numbers.
     pub(super) z: Vec<f64>,
     /// Seeds below 2⁵³.
     pub(super) seeds: Vec<u64>,
     /// Negative where it fails.
+    #[serde(with = "exact")]
     pub(super) margin: f64,
 }
 
 /// What a pilot found for the repeats.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct Plan {
     /// The margins to reach, falling; below the last one comes failure.
-    pub(super) levels: Vec<f64>,
-    /// The width σ of the moves at each.
-    widths: Vec<f64>,
+    pub(super) levels: Vec<Level>,
     /// Points whose margin was computed for it.
     pub(super) made: u64,
+}
+
+/// A level of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub(super) struct Level {
+    /// The margin to reach.
+    #[serde(with = "exact")]
+    pub(super) margin: f64,
+    /// The width σ of the moves there.
+    width: f64,
+}
+
+/// One repeat by a plan.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub(super) struct Repeat {
+    /// Its estimate.
+    probability: f64,
+    /// Its failing point with the least margin; the first of equal ones.
+    worst: Option<Point>,
 }
 
 /// An estimate with its interval.
@@ -146,7 +180,7 @@ impl Problem<'_> {
 
     /// Finds levels and widths.
     pub(super) fn pilot(&self) -> Result<Plan, Stalled> {
-        let mut plan = Plan { levels: Vec::new(), widths: Vec::new(), made: POINTS as u64 };
+        let mut plan = Plan { levels: Vec::new(), made: POINTS as u64 };
         let mut points = self.first(0);
         let mut width = 0.6;
         let mut part = 1.0;
@@ -158,12 +192,11 @@ impl Problem<'_> {
                 return Ok(plan);
             }
             let through = margins.partition_point(|margin| *margin <= level) as f64 / POINTS as f64;
-            if plan.levels.len() == MOST_LEVELS || plan.levels.last().is_some_and(|last| level >= *last) {
+            if plan.levels.len() == MOST_LEVELS || plan.levels.last().is_some_and(|l| level >= l.margin) {
                 return Err(Stalled { margin: margins[0], part, made: plan.made });
             }
             part *= through;
-            plan.levels.push(level);
-            let l = plan.levels.len();
+            let l = plan.levels.len() + 1;
             points = resampled(points, level, &mut generator(self.seed, 0, l, POINTS));
             let mut generators: Vec<_> = (0..POINTS).map(|i| generator(self.seed, 0, l, i)).collect();
             // Twice as many as later, so that the width settles.
@@ -177,51 +210,47 @@ impl Problem<'_> {
                 let accepted = moved as f64 / POINTS as f64;
                 width = (width * elementary::exp(STEERING * (accepted - WANTED))).clamp(1e-3, 1.0);
             }
-            plan.widths.push(width);
+            plan.levels.push(Level { margin: level, width });
         }
     }
 
-    /// One repeat by `plan`: its estimate, and its worst point where one fails.
-    fn repeat(&self, plan: &Plan, repeat: usize) -> (f64, Option<Point>) {
+    /// Repeat number `repeat`, from 1, by `plan`: a function of the problem, the plan and the number alone.
+    pub(super) fn repeat(&self, plan: &Plan, repeat: usize) -> Repeat {
         let mut points = self.first(repeat);
         let mut probability = 1.0;
-        for (l, (level, width)) in plan.levels.iter().zip(&plan.widths).enumerate() {
-            let through = points.iter().filter(|point| point.margin <= *level).count();
+        for (l, level) in plan.levels.iter().enumerate() {
+            let through = points.iter().filter(|point| point.margin <= level.margin).count();
             probability *= through as f64 / POINTS as f64;
             if through == 0 {
-                return (0.0, None);
+                return Repeat { probability: 0.0, worst: None };
             }
-            points = resampled(points, *level, &mut generator(self.seed, repeat, l + 1, POINTS));
+            points = resampled(points, level.margin, &mut generator(self.seed, repeat, l + 1, POINTS));
             points.par_iter_mut().enumerate().for_each(|(i, point)| {
-                self.moved(point, &mut generator(self.seed, repeat, l + 1, i), *level, *width, MOVES);
+                let rng = &mut generator(self.seed, repeat, l + 1, i);
+                self.moved(point, rng, level.margin, level.width, MOVES);
             });
         }
         let failing = points.iter().filter(|point| point.margin < 0.0);
         probability *= failing.clone().count() as f64 / POINTS as f64;
-        (probability, failing.cloned().reduce(worse))
+        Repeat { probability, worst: failing.cloned().reduce(worse) }
     }
+}
 
-    /// The mean of `repeats` ≥ 2 repeats. `tell` gets the number of each that is done.
-    pub(super) fn estimate(&self, plan: &Plan, repeats: usize, tell: &(dyn Fn(usize) + Sync)) -> Estimate {
-        let (mut found, mut worst) = (Vec::new(), None);
-        for repeat in 1..=repeats {
-            let (probability, point) = self.repeat(plan, repeat);
-            found.push(probability);
-            worst = worst.into_iter().chain(point).reduce(worse);
-            tell(repeat);
-        }
-        let n = repeats as f64;
-        let probability = found.iter().sum::<f64>() / n;
-        let variance = found.iter().map(|p| elementary::powi(p - probability, 2)).sum::<f64>() / (n - 1.0);
-        // Where none arrives, nothing is known of it.
-        let deviation = if probability > 0.0 { (variance / n).sqrt() / probability } else { f64::INFINITY };
-        // Of the logarithm, since estimates of rare events are skewed to the right.
-        let factor = elementary::exp(student(n - 1.0) * deviation);
-        let made = (repeats * POINTS * (1 + MOVES * plan.levels.len())) as u64;
-        let high = if probability > 0.0 { (probability * factor).min(1.0) } else { 1.0 };
-        let interval = [probability / factor, high];
-        Estimate { probability, interval, deviation, worst, made }
-    }
+/// The mean of two or more `repeats` by `plan`.
+pub(super) fn estimate(plan: &Plan, repeats: &[Repeat]) -> Estimate {
+    let n = repeats.len() as f64;
+    let probability = repeats.iter().map(|r| r.probability).sum::<f64>() / n;
+    let variance =
+        repeats.iter().map(|r| elementary::powi(r.probability - probability, 2)).sum::<f64>() / (n - 1.0);
+    // Where none arrives, nothing is known of it.
+    let deviation = if probability > 0.0 { (variance / n).sqrt() / probability } else { f64::INFINITY };
+    // Of the logarithm, since estimates of rare events are skewed to the right.
+    let factor = elementary::exp(student(n - 1.0) * deviation);
+    let made = (repeats.len() * POINTS * (1 + MOVES * plan.levels.len())) as u64;
+    let high = if probability > 0.0 { (probability * factor).min(1.0) } else { 1.0 };
+    let interval = [probability / factor, high];
+    let worst = repeats.iter().filter_map(|r| r.worst.clone()).reduce(worse);
+    Estimate { probability, interval, deviation, worst, made }
 }
 
 /// The one with the lesser margin; the first of equal ones.
@@ -339,7 +368,8 @@ mod tests {
         for seed in 0..times {
             let problem = Problem { dimensions, seeds, seed, margin };
             let plan = problem.pilot().unwrap();
-            let found = problem.estimate(&plan, 20, &|_| {});
+            let repeats: Vec<_> = (1..=20).map(|repeat| problem.repeat(&plan, repeat)).collect();
+            let found = estimate(&plan, &repeats);
             covered += u64::from(found.interval[0] <= truth && truth <= found.interval[1]);
             mean += found.probability / times as f64;
             let plain = (1.0 - truth) / (truth * found.deviation * found.deviation);

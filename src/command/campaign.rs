@@ -338,9 +338,14 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
         counter.update(done as u64);
     })?;
     drop(counter);
-    let Some(found) = found else {
-        output::note("interrupted; of an estimate nothing is kept");
-        return Ok(ExitCode::from(INTERRUPTED));
+    let found = match found {
+        campaign::Ended::Done(found) => *found,
+        campaign::Ended::Stopped(kept) => {
+            output::note(&format!(
+                "interrupted with {kept} of {repeats} repeats kept; the same command goes on from there"
+            ));
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
     };
     let report = RareReport {
         campaign: arguments.campaign.display().to_string(),

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use punctual::campaign::{self, Campaign, Cell, Measures, Row};
@@ -163,7 +164,7 @@ fn begin(workshop: &Workshop, more: &[&str]) -> Child {
         .current_dir(workshop.path(""))
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .expect("the binary under test starts")
 }
@@ -182,9 +183,9 @@ fn wait(workshop: &Workshop, child: &mut Child, kept_before: u64, more: Duration
     while kept(workshop) <= kept_before {
         assert!(begin.elapsed() < Duration::from_secs(60), "no segment in a minute");
         assert!(child.try_wait().expect("a child").is_none(), "it was done before it could be ended");
-        std::thread::sleep(Duration::from_millis(1));
+        thread::sleep(Duration::from_millis(1));
     }
-    std::thread::sleep(more);
+    thread::sleep(more);
 }
 
 /// Enough runs to be ended three times, and not many more, since a debug build is slow.
@@ -872,6 +873,50 @@ fn a_rare_course_of_noise_is_estimated_and_shown() {
     let (names, rows) = rows(&workshop.path("c-worst.parquet"));
     let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
     assert_eq!(number(&rows[0][place]).map(f64::to_bits), Some(least.to_bits()));
+}
+
+/// Killed and interrupted, an estimate goes on with the same numbers.
+#[test]
+fn a_rare_estimate_can_be_ended_at_any_point() {
+    let workshop = Workshop::new();
+    workshop.write("c.toml", drifting(&workshop, 2.170_090 * 2.0 * (1.0 - (-2.0_f64).exp())));
+    let rare = |repeats: &str, output: &str| {
+        workshop.punctual(["campaign", "c.toml", repeats, "--json", "-o", output])
+    };
+    let made = workshop.path("cut.parquet.rare.parts/made");
+    let kept = || {
+        let made: Value = serde_json::from_str(&fs::read_to_string(&made).ok()?).ok()?;
+        made["repeats"].as_array().map(Vec::len)
+    };
+    let mut before = 0;
+    for ending in ["-KILL", "-INT"] {
+        let mut child = begin(&workshop, &["--rare=10000"]);
+        while kept().is_none_or(|now| now <= before) {
+            assert!(child.try_wait().expect("a child").is_none(), "it ended before");
+            thread::sleep(Duration::from_millis(1));
+        }
+        let sent = Command::new("kill").args([ending, &child.id().to_string()]).status().expect("kill");
+        assert!(sent.success());
+        let output = child.wait_with_output().expect("a child");
+        assert_eq!(output.status.code(), (ending == "-INT").then_some(130));
+        before = kept().expect("repeats");
+        let told = String::from_utf8_lossy(&output.stderr);
+        let note =
+            format!("interrupted with {before} of 10000 repeats kept; the same command goes on from there");
+        assert_eq!(told.contains(&note), ending == "-INT", "{told}");
+    }
+    // Another campaign does not go on from there.
+    let text = workshop.text("c.toml");
+    workshop.write("c.toml", text.clone() + "# another\n");
+    let message = "--output: cut.parquet.rare.parts is of another campaign (fingerprint ";
+    workshop.punctual(["campaign", "c.toml", "--rare", "-o", "cut.parquet"]).fails_like(2, message, &[]);
+    workshop.write("c.toml", text);
+    let repeats = format!("--rare={}", before.max(4) + 1);
+    let resumed = rare(&repeats, "cut.parquet").success();
+    let whole = rare(&repeats, "whole.parquet").success();
+    assert_eq!(resumed.replace("cut.parquet", "whole.parquet"), whole);
+    assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+    assert!(!made.parent().expect("a folder").exists());
 }
 
 /// A course of values: what may change in a run takes it, at the times that it says.
