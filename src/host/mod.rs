@@ -28,7 +28,7 @@ pub use description::{
 };
 pub use logging::LogMessage;
 pub use number::{DataType, Family};
-pub use participant::{Participant, Slave};
+pub use participant::{Anew, Participant, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
 pub use status::Status;
 

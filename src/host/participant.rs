@@ -1,8 +1,10 @@
 //! The calls of co-simulation that a master makes, whoever answers them and whatever their version is; and those
 //! that somebody makes who looks at an FMU more closely.
 
+use std::rc::Rc;
+
 use super::number::DataType;
-use super::{LogMessage, Version};
+use super::{Description, Fmu, LogMessage, Version};
 use crate::error::Error;
 
 /// An instance that a master steps: an FMU's, or one of this program's own blocks in process.
@@ -141,24 +143,32 @@ macro_rules! calls {
     )*};
 }
 
+/// All calls but `reset`.
+macro_rules! calls_of_a_run {
+    () => {
+        calls! {
+            enter_configuration_mode();
+            exit_configuration_mode();
+            setup_experiment(start_time: f64, stop_time: f64);
+            enter_initialization_mode();
+            exit_initialization_mode();
+            do_step(time: f64, step: f64);
+            terminate();
+            get(of: DataType, references: &[u32], values: &mut [f64]);
+            set(of: DataType, references: &[u32], values: &[f64]);
+            set_text(reference: u32, texts: &[String]);
+        }
+    };
+}
+
 impl Participant for Box<dyn Participant> {
     fn name(&self) -> &str {
         self.as_ref().name()
     }
 
-    calls! {
-        reset();
-        enter_configuration_mode();
-        exit_configuration_mode();
-        setup_experiment(start_time: f64, stop_time: f64);
-        enter_initialization_mode();
-        exit_initialization_mode();
-        do_step(time: f64, step: f64);
-        terminate();
-        get(of: DataType, references: &[u32], values: &mut [f64]);
-        set(of: DataType, references: &[u32], values: &[f64]);
-        set_text(reference: u32, texts: &[String]);
-    }
+    calls! { reset(); }
+
+    calls_of_a_run! {}
 
     fn asks_to_end(&self) -> bool {
         self.as_ref().asks_to_end()
@@ -166,5 +176,49 @@ impl Participant for Box<dyn Participant> {
 
     fn remark(&self) -> Option<String> {
         self.as_ref().remark()
+    }
+}
+
+/// An instance of an FMU of others, made anew for every run: what a reset forgets differs from FMU to FMU.
+pub struct Anew {
+    fmu: Rc<Fmu>,
+    description: Rc<Description>,
+    slave: Box<dyn Slave>,
+}
+
+impl Anew {
+    /// An instance of `fmu` called `name`.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Fmu::instantiate`].
+    pub fn new(fmu: Rc<Fmu>, description: Rc<Description>, name: &str) -> Result<Self, Error> {
+        let slave = fmu.instantiate(&description, name)?;
+        Ok(Self { fmu, description, slave })
+    }
+
+    fn as_mut(&mut self) -> &mut dyn Slave {
+        self.slave.as_mut()
+    }
+}
+
+impl Participant for Anew {
+    fn name(&self) -> &str {
+        self.slave.name()
+    }
+
+    fn reset(&mut self) -> Result<(), Error> {
+        self.slave = self.fmu.instantiate(&self.description, self.slave.name())?;
+        Ok(())
+    }
+
+    calls_of_a_run! {}
+
+    fn asks_to_end(&self) -> bool {
+        self.slave.asks_to_end()
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.slave.remark()
     }
 }
