@@ -76,6 +76,7 @@ mod archive;
 mod calendar;
 mod description;
 mod error;
+pub mod fmi3;
 mod names;
 #[cfg(feature = "read")]
 mod read;

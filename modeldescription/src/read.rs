@@ -209,6 +209,7 @@ impl Located {
                 name: at.text("name"),
                 factor: at.value("factor", double).unwrap_or(1.0),
                 offset: at.value("offset", double).unwrap_or(0.0),
+                inverse: at.flag("inverse"),
             }
         });
         Unit { name, base, display_units: display.collect() }
@@ -273,7 +274,7 @@ impl Located {
             name: at.required("name", |text| Some(text.to_owned())),
             value_reference: at.required("valueReference", unsigned),
             description: at.text("description"),
-            causality: at.value("causality", Causality::parse).unwrap_or(Causality::Local),
+            causality: at.value("causality", causality).unwrap_or(Causality::Local),
             variability: at.value("variability", Variability::parse).unwrap_or(Variability::Continuous),
             initial: at.value("initial", Initial::parse),
             kind,
@@ -309,6 +310,11 @@ impl Located {
         };
         found.into_iter().flat_map(|n| children(n, "Unknown")).enumerate().map(unknown).collect()
     }
+}
+
+/// A causality of FMI 2.0.
+fn causality(word: &str) -> Option<Causality> {
+    Causality::parse(word).filter(|_| Causality::WORDS_OF_FMI2.contains(&word))
 }
 
 fn children<'n, 'i>(node: Node<'n, 'i>, name: &'static str) -> impl Iterator<Item = Node<'n, 'i>> {

@@ -5,21 +5,19 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use punctual_fmu::configuration::{
-    Configuration, ConfigurationError, FileKind, RESOURCE, Range, read_toml, write_toml,
+    Configuration, ConfigurationError, FileKind, Range, read_toml, write_toml,
 };
-use punctual_fmu::product::Product;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::distribution::{Distribution, VarySection};
+use super::part::Part;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{
-    self, Course, Grid, InProcess, Own, Simulation, StartValue, System, check_fed, links, port,
-};
+use crate::coupling::{self, Course, Grid, Simulation, StartValue, System, check_fed, links, port};
 use crate::error::Error;
-use crate::host::{Causality, Fmu, ScalarType, Variability};
+use crate::host::{Causality, DataType, Variability};
 use crate::package;
 use crate::text;
 
@@ -102,7 +100,7 @@ pub struct Source {
     pub file: String,
     /// The system file, where the campaign file names one.
     pub system: Option<String>,
-    /// The configuration of each component in turn, with every value stated.
+    /// The configuration of each component in turn, with every value stated; or what tells an FMU of another program.
     pub configurations: Vec<String>,
 }
 
@@ -165,7 +163,7 @@ pub struct Choice {
 pub struct Campaign {
     source: Source,
     system: System,
-    models: Vec<Own>,
+    models: Vec<Part>,
     varied: Vec<Varied>,
     sampling: Sampling,
     sampler: Sampler,
@@ -176,12 +174,12 @@ pub struct Campaign {
 
 impl Campaign {
     /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
-    /// components' FMUs of this program (or configurations that these are built from, `.toml`). What
-    /// [`Campaign::packed`] gave stands for all of them.
+    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave stands for
+    /// all of them.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read; a key or value that cannot be used; an FMU of another program.
+    /// A file that cannot be read; a key or value that cannot be used.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source_text = text::read(path)?;
         // No text of TOML begins so.
@@ -215,14 +213,12 @@ impl Campaign {
             }
             SystemSource::Inline(system) => (*system, None),
         };
-        let configuration = |(i, component): (usize, &coupling::Component)| {
+        let text = |(i, component): (usize, &coupling::Component)| {
             let name = system_path.with_file_name(&component.fmu);
             let prefix = if system_text.is_none() { "system." } else { "" };
-            configuration(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
+            Part::text(&name, &format!("{prefix}component[{i}].fmu")).map_err(|e| e.in_file(&system_path))
         };
-        let configurations =
-            system.components().iter().enumerate().map(configuration).collect::<Result<Vec<_>, _>>()?;
-        let configurations = configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
+        let configurations = system.components().iter().enumerate().map(text).collect::<Result<_, _>>()?;
         Self::of(Source { file: source_text, system: system_text, configurations }, path, &system_path)
     }
 
@@ -244,7 +240,19 @@ impl Campaign {
     }
 
     /// The campaign with all that it needs, as one text.
-    pub fn packed(&self) -> String {
+    ///
+    /// # Errors
+    ///
+    /// A component that is no text: an FMU of another program.
+    pub fn packed(&self) -> Result<String, Error> {
+        let parts = self.models.iter().zip(self.system.components());
+        for (_, component) in parts.filter(|(part, _)| part.configuration().is_none()) {
+            let message = format!(
+                "{} of component {:?} is an FMU of another program, which is not packed; run shards where its file is",
+                component.fmu, component.name
+            );
+            return Err(Error::configuration("--pack", message));
+        }
         let packed = Packed {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             fingerprint: self.source.fingerprint(),
@@ -252,7 +260,7 @@ impl Campaign {
             source: self.source.clone(),
         };
         // Texts and numbers alone are always written.
-        serde_json::to_string_pretty(&packed).unwrap_or_default() + "\n"
+        Ok(serde_json::to_string_pretty(&packed).unwrap_or_default() + "\n")
     }
 
     /// Checks a campaign whose texts are given; errors name `path` or `system_path`.
@@ -282,12 +290,11 @@ impl Campaign {
             in_file(ConfigurationError::new(e.field().replace("experiment.", "campaign."), e.message()))
         })?;
         // The components, from their configurations.
-        let models = source
-            .configurations
-            .iter()
-            .map(|text| Own::new(parsed(text)?))
+        let components = source.configurations.iter().zip(system.components());
+        let models = components
+            .map(|(text, component)| Part::of(text, component, system_path))
             .collect::<Result<Vec<_>, Error>>()?;
-        let refer: Vec<_> = models.iter().map(|model| &model.description).collect();
+        let refer: Vec<_> = models.iter().map(Part::description).collect();
         let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
         // The varied variables.
         let (mut varied, mut given) = (Vec::new(), Vec::new());
@@ -296,23 +303,26 @@ impl Campaign {
             let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
             let variable = &refer[port.component].variables[port.variable];
             let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
-            let of = variable.kind.scalar_type();
-            if !settable || of != ScalarType::Real {
-                let (causality, kind) = (variable.causality.as_str(), of.as_str());
+            if !settable || variable.of != DataType::Float64 {
+                let (causality, kind) = (variable.causality.as_str(), variable.type_name);
                 let message =
                     format!("is a {kind} {causality}; only Real parameters and inputs can be varied");
+                return Err(in_file(ConfigurationError::new(field, message)));
+            }
+            if variable.count > 1 {
+                let message = "is an element of an array; only scalars can be varied";
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
             if connected.iter().any(|link| link.to == port) {
                 let message = "is a connected input, whose values come from there";
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
-            let (min, max) = variable.kind.range();
+            let (min, max) = variable.range;
             let range = Range { min, max };
             given.push(port);
             varied.push(Varied {
                 name: name.clone(),
-                unit: variable.kind.unit().map(str::to_owned),
+                unit: variable.unit.clone(),
                 description: variable.description.clone(),
                 component: port.component,
                 reference: variable.value_reference,
@@ -353,7 +363,7 @@ impl Campaign {
     }
 
     /// The components, in the order of the system.
-    pub fn models(&self) -> &[Own] {
+    pub fn models(&self) -> &[Part] {
         &self.models
     }
 
@@ -397,8 +407,8 @@ impl Campaign {
             let wrong = |message: String| {
                 Err(Error::configuration(format!("vary.{:?}.distribution", varied.name), message))
             };
-            let given = match &self.models[varied.component].configuration {
-                Configuration::Plant(plant) => plant.disturbance.as_ref().map(|given| given.period),
+            let given = match self.models[varied.component].configuration() {
+                Some(Configuration::Plant(plant)) => plant.disturbance.as_ref().map(|given| given.period),
                 _ => None,
             };
             let Some(given) = given.filter(|_| varied.tunable) else {
@@ -482,20 +492,20 @@ impl Campaign {
         Choice { seed, values, pieces: Vec::new() }
     }
 
-    /// Couples the components in process as `system` says, which is the campaign's but for the signals that it
-    /// records.
+    /// Couples the components as `system` says, which is the campaign's but for the signals that it records. FMUs of
+    /// others are loaded for it alone.
     ///
     /// # Errors
     ///
-    /// A signal to record or draw that does not exist.
-    pub fn simulation(&self, system: &System) -> Result<Simulation<InProcess>, Error> {
-        let descriptions: Vec<_> = self.models.iter().map(|model| &model.description).collect();
+    /// A signal to record or draw that does not exist; an FMU that is another one by now, or cannot be loaded.
+    pub fn simulation(&self, system: &System) -> Result<Simulation, Error> {
+        let descriptions: Vec<_> = self.models.iter().map(Part::description).collect();
         let instance = |c: usize| self.models[c].instance(&system.components()[c].name);
         Simulation::assembled(system, &descriptions, instance)
     }
 
     /// Gives `simulation` the start values of a run, and what changes in it.
-    pub fn start(&self, simulation: &mut Simulation<InProcess>, choice: &Choice) {
+    pub fn start(&self, simulation: &mut Simulation, choice: &Choice) {
         for (varied, value) in self.varied.iter().zip(&choice.values) {
             simulation.set_start(varied.component, varied.reference, *value);
         }
@@ -513,51 +523,6 @@ impl Campaign {
         };
         simulation.set_courses(self.varied.iter().filter_map(course).collect());
     }
-}
-
-/// Reads the configuration of the component at `path`; an FMU carries its own.
-fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
-    if text::is_toml(path) {
-        return package::read_configuration(path);
-    }
-    if !path.exists() {
-        let message = format!(
-            "there is no file {}; `punctual build` makes an FMU from a configuration",
-            path.display()
-        );
-        return Err(Error::configuration(field, message));
-    }
-    let fmu = Fmu::open(path)?;
-    let Some(text) = fmu.resource(RESOURCE) else {
-        let message = format!(
-            "{} is not an FMU of Punctual (it has no resources/{RESOURCE}), and only these run in process",
-            path.display()
-        );
-        return Err(Error::configuration(field, message));
-    };
-    let configuration = parsed(&text).map_err(|e| Error::from(e).in_file(path))?;
-    let product = Product::new(configuration)?;
-    if product.guid != fmu.description().guid {
-        let message = format!(
-            "{} is the work of another version of Punctual (its GUID is {}, must be {}); build it anew",
-            path.display(),
-            fmu.description().guid,
-            product.guid
-        );
-        return Err(Error::configuration(field, message));
-    }
-    Ok(product.configuration)
-}
-
-/// Parses a configuration, if it needs no library.
-fn parsed(text: &str) -> Result<Configuration, ConfigurationError> {
-    Configuration::parse(text).map_err(|e| match e.field() {
-        "plant.plugin" => ConfigurationError::new(
-            e.field(),
-            "is a shared library, which campaigns do not load; `punctual run` does",
-        ),
-        _ => e,
-    })
 }
 
 /// The whole number that `ratio` is but for round-off.

@@ -5,7 +5,7 @@ use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
 use super::table::{Cell, Column, Kind, Row};
-use crate::coupling::{InProcess, Kept, Own, Promise, Simulation};
+use crate::coupling::{Kept, Promise, Simulation};
 use crate::error::Error;
 
 /// A filter of the system.
@@ -46,12 +46,13 @@ impl Measures {
     /// Measures for the runs of `campaign`.
     pub fn new(campaign: &Campaign) -> Self {
         let mut filters = Vec::new();
-        for (c, Own { configuration, description, .. }) in campaign.models().iter().enumerate() {
-            let Configuration::Filter(filter) = configuration else { continue };
+        for (c, part) in campaign.models().iter().enumerate() {
+            let Some(Configuration::Filter(filter)) = part.configuration() else { continue };
+            let description = part.description();
             let component = &campaign.system().components()[c];
             let unit = |variable: &str| {
                 let found = description.index_of(variable).map(|i| &description.variables[i]);
-                found.and_then(|v| v.kind.unit()).unwrap_or_default().to_owned()
+                found.and_then(|v| v.unit.clone()).unwrap_or_default()
             };
             filters.push(FilterPlan {
                 component: component.name.clone(),
@@ -98,7 +99,7 @@ impl Measures {
     }
 
     /// Makes run `number` and measures it. `simulation` records [`Measures::signals`] at every step.
-    pub fn run(&self, campaign: &Campaign, simulation: &mut Simulation<InProcess>, number: u64) -> Row {
+    pub fn run(&self, campaign: &Campaign, simulation: &mut Simulation, number: u64) -> Row {
         self.run_from(campaign, simulation, number, &campaign.choice(number))
     }
 
@@ -106,7 +107,7 @@ impl Measures {
     pub(super) fn run_from(
         &self,
         campaign: &Campaign,
-        simulation: &mut Simulation<InProcess>,
+        simulation: &mut Simulation,
         number: u64,
         choice: &Choice,
     ) -> Row {
@@ -118,6 +119,11 @@ impl Measures {
             Err(error) => (Some(error), Vec::new()),
         };
         self.row(number, choice, &seen, &promises, failure.as_ref())
+    }
+
+    /// The row of a run that could not be made.
+    pub(super) fn unmade(&self, number: u64, choice: &Choice, why: &Error) -> Row {
+        self.row(number, choice, &self.nothing(), &[], Some(why))
     }
 
     fn nothing(&self) -> Seen {

@@ -6,13 +6,13 @@
 //! all runs are there, the segments are joined. Their cuts do not show in the result. A part of the runs is made in
 //! the same way, and its file tells which they are.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -23,7 +23,7 @@ use super::arrow;
 use super::file::{Campaign, Choice, Source};
 use super::measures::Measures;
 use super::table::{Cell, GROUP, Reader, Row, Writer};
-use crate::coupling::{InProcess, Simulation};
+use crate::coupling::Simulation;
 use crate::error::Error;
 
 /// Time that the runs of a segment take together: the most that is lost when the process is killed.
@@ -401,13 +401,23 @@ pub(super) fn copy(
     Ok(())
 }
 
-/// The threads and their simulations.
+thread_local! {
+    /// The simulation of this thread of a crew's pool. One with FMUs of others never leaves the thread that loaded them.
+    static SIMULATION: RefCell<Option<Simulation>> = const { RefCell::new(None) };
+}
+
+/// The threads, each with a simulation of its own.
 pub(super) struct Crew<'a> {
     campaign: &'a Campaign,
     measures: &'a Measures,
     pub(super) pool: ThreadPool,
-    /// Simulations by thread; each is only ever used by its own.
-    simulations: Vec<Mutex<Simulation<InProcess>>>,
+}
+
+impl Drop for Crew<'_> {
+    fn drop(&mut self) {
+        // The threads end some time after the pool. FMUs of others are unloaded, and their files removed, before.
+        self.pool.broadcast(|_| drop(SIMULATION.take()));
+    }
 }
 
 impl<'a> Crew<'a> {
@@ -417,14 +427,18 @@ impl<'a> Crew<'a> {
         threads: Option<NonZeroUsize>,
     ) -> Result<Self, Error> {
         let system = campaign.system().clone().recording(measures.signals());
+        let one = campaign.models().iter().any(|part| part.description().only_once);
         let pool = ThreadPoolBuilder::new()
-            .num_threads(threads.map_or(0, NonZeroUsize::get))
+            .num_threads(if one { 1 } else { threads.map_or(0, NonZeroUsize::get) })
             .build()
             .map_err(|e| Error::configuration("--threads", e.to_string()))?;
-        let simulations = (0..pool.current_num_threads())
-            .map(|_| campaign.simulation(&system).map(Mutex::new))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { campaign, measures, pool, simulations })
+        let crew = Self { campaign, measures, pool };
+        let made = crew.pool.broadcast(|_| {
+            SIMULATION.set(Some(campaign.simulation(&system)?));
+            Ok(())
+        });
+        made.into_iter().collect::<Result<(), Error>>()?;
+        Ok(crew)
     }
 
     /// Makes `runs`, and gives their rows to `keep` in order, some at a time. `tell` gets the number after the last
@@ -438,7 +452,8 @@ impl<'a> Crew<'a> {
     ) -> Result<(), Error> {
         let done = AtomicU64::new(runs.start);
         let mut next = runs.start;
-        let mut size = self.simulations.len();
+        let threads = self.pool.current_num_threads();
+        let mut size = threads;
         while next < runs.end && !stop.load(Ordering::Relaxed) {
             let end = runs.end.min(next + size as u64);
             let begin = Instant::now();
@@ -454,7 +469,7 @@ impl<'a> Crew<'a> {
                 self.pool.install(|| (next..end).into_par_iter().map(make).collect());
             let rows: Vec<Row> = rows.into_iter().map_while(|row| row).collect();
             let ratio = SEGMENT.as_secs_f64() / begin.elapsed().as_secs_f64().max(1e-6);
-            size = ((size as f64 * ratio) as usize).clamp(self.simulations.len(), size * GROWTH).min(GROUP);
+            size = ((size as f64 * ratio) as usize).clamp(threads, size * GROWTH).min(GROUP);
             let first = next;
             next += rows.len() as u64;
             if next > first {
@@ -466,10 +481,12 @@ impl<'a> Crew<'a> {
 
     /// Makes run `number` from `choice`, on a thread of the pool.
     pub(super) fn make(&self, number: u64, choice: &Choice) -> Row {
-        let thread = rayon::current_thread_index().unwrap_or(0) % self.simulations.len();
         // A run that panicked leaves nothing behind, since the next one begins with a reset.
-        let mut simulation =
-            self.simulations[thread].lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        self.measures.run_from(self.campaign, &mut simulation, number, choice)
+        SIMULATION.with_borrow_mut(|simulation| match simulation {
+            Some(simulation) => self.measures.run_from(self.campaign, simulation, number, choice),
+            None => {
+                self.measures.unmade(number, choice, &Error::broken("a run", "is on no thread of its crew"))
+            }
+        })
     }
 }

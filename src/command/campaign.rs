@@ -181,7 +181,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return list(arguments, &campaign, range);
     }
     if let Some(path) = &arguments.pack {
-        whole::write(path, campaign.packed())?;
+        whole::write(path, campaign.packed()?)?;
         output::result(&format!("written: {}", path.display()));
         return Ok(ExitCode::SUCCESS);
     }

@@ -367,10 +367,10 @@ impl Counts {
 /// The deadline of `barrier` in s, where it is the same for all runs.
 fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
     let components = campaign.system().components().iter().zip(campaign.models());
-    let find = |(component, model): (&crate::coupling::Component, &crate::coupling::Own)| {
+    let find = |(component, part): (&crate::coupling::Component, &crate::campaign::Part)| {
         let variable = format!("{}.deadline", barrier.strip_prefix(&format!("{}.", component.name))?);
-        let own = &model.description.variables[model.description.index_of(&variable)?];
-        component.start.get(&variable).map_or(own.kind.start_number(), StartValue::number)
+        let own = &part.description().variables[part.description().index_of(&variable)?];
+        component.start.get(&variable).map_or(own.start, StartValue::number)
     };
     components.filter_map(find).next().filter(|deadline| deadline.is_finite())
 }
@@ -393,12 +393,11 @@ fn percent(part: f64) -> String {
 
 /// The heading: what was run, and how many runs succeed.
 fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
-    let components =
-        campaign.system().components().iter().zip(campaign.models()).map(|(component, model)| {
-            let (name, model) = (&component.name, &model.description.model_name);
-            let of = if name == model { String::new() } else { format!(" ({})", escape(model)) };
-            format!("<b>{}</b>{of}", escape(name))
-        });
+    let components = campaign.system().components().iter().zip(campaign.models()).map(|(component, part)| {
+        let (name, model) = (&component.name, &part.description().model_name);
+        let of = if name == model { String::new() } else { format!(" ({})", escape(model)) };
+        format!("<b>{}</b>{of}", escape(name))
+    });
     let experiment = campaign.system().experiment();
     let wanted = match campaign.success() {
         Success::Kept => "every promise is kept and every sample meets its constraint",

@@ -10,6 +10,7 @@ use punctual::campaign::{self, Campaign, Cell, Measures, Row};
 use serde_json::Value;
 
 use crate::html::{body, cells, data};
+use crate::misbehaving;
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
@@ -917,6 +918,67 @@ fn a_rare_estimate_can_be_ended_at_any_point() {
     assert_eq!(resumed.replace("cut.parquet", "whole.parquet"), whole);
     assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
     assert!(!made.parent().expect("a folder").exists());
+}
+
+/// An FMU of another program runs too, in an instance of its own for each run, since its reset forgets nothing.
+#[test]
+fn a_campaign_takes_fmus_of_others() {
+    let workshop = Workshop::new();
+    // Its output counts its steps, so the plant goes 1 m and then 2 m further.
+    misbehaving::write(
+        &workshop,
+        "counter.fmu",
+        misbehaving::description("no-reset", &[]),
+        &misbehaving::library(&[]),
+    );
+    let counter = "[[system.component]]\nname = \"counter\"\nfmu = \"counter.fmu\"\n\
+                   [[system.connection]]\nfrom = \"counter.y\"\nto = \"plant.u.u\"\n[campaign]\n";
+    let way = 1.0 - (-2.0_f64).exp();
+    let d = 2.170_090 * 2.0 * way + 3.0;
+    let text = drifting(&workshop, d).replace("\"u.u\" = 0.0, ", "").replace("[campaign]\n", counter);
+    workshop.write("c.toml", text.replace("runs = 1\n", "runs = 9\n"));
+    let campaign = |more: &[&str]| workshop.punctual([&["campaign", "c.toml"], more].concat());
+    campaign(&[]).success();
+    let (names, found) = rows(&workshop.path("c.parquet"));
+    let place = |name: &str| names.iter().position(|n| n == name).expect("a column");
+    for row in &found {
+        let of = |name: &str| number(&row[place(name)]).expect("a number");
+        let sum: f64 = ["a", "b", "c", "d"].iter().map(|state| of(&format!("plant.x0.{state}"))).sum();
+        // Where the states pull back, it may be furthest before the end.
+        let reached = [0.0, sum * (1.0 - (-1.0_f64).exp()) + 1.0, sum * way + 3.0];
+        let expected = d - reached.into_iter().fold(0.0, f64::max);
+        let least = of("filter.wall.least_h");
+        assert!((least - expected).abs() < 1e-3, "{least}, not {expected}");
+    }
+    let alone = campaign(&["--threads", "1", "-o", "alone.parquet"]);
+    alone.success();
+    assert!(workshop.bytes("alone.parquet") == workshop.bytes("c.parquet"), "the bytes differ");
+    let replay = || workshop.punctual(["replay", "c.parquet", "--run", "8"]);
+    let again = replay().success();
+    assert!(again.contains("the row is as recorded, bit for bit"), "{again}");
+    // Fifteen failures in a thousand, as without it.
+    let rare: Value = serde_json::from_str(&campaign(&["--rare=5", "--json"]).success()).expect("JSON");
+    let interval = numbers(&rare["interval"]);
+    assert!(interval[0] < 0.015 && 0.015 < interval[1] && interval[1] < 0.03, "{rare}");
+
+    campaign(&["--pack", "c.json"]).fails(
+        2,
+        "--pack: counter.fmu of component \"counter\" is an FMU of another program, which is not packed; run shards where its \
+         file is",
+    );
+    misbehaving::write(
+        &workshop,
+        "counter.fmu",
+        misbehaving::description("none", &[]),
+        &misbehaving::library(&[]),
+    );
+    replay().fails(2, "component \"counter\": counter.fmu is another FMU than the campaign was made with");
+    campaign(&[]).fails_like(2, "--output: c.parquet is of another campaign", &[]);
+    fs::remove_file(workshop.path("counter.fmu")).expect("a file");
+    replay().fails(
+        2,
+        "component \"counter\": there is no file counter.fmu, the FMU that the campaign was made with",
+    );
 }
 
 /// A course of values: what may change in a run takes it, at the times that it says.
