@@ -28,3 +28,6 @@ pub use variable::{
 
 /// One value of an enumeration type, of 64 bits.
 pub type EnumerationItem = crate::EnumerationItem<i64>;
+
+/// Stands for a dimension of a variable among the attributes that cannot be read.
+pub(crate) const DIMENSION: &str = "Dimension";
