@@ -8,11 +8,13 @@
 //! | `validate` | conditions on a description that is to be written |
 //! | `xml` | the file `modelDescription.xml`, written |
 //! | `read` | the same file, read |
+//! | `terminals` | the file `terminalsAndIcons.xml`, written and read |
 
 mod description;
 #[cfg(feature = "read")]
 mod read;
 mod structure;
+mod terminals;
 mod validate;
 mod variable;
 mod xml;
@@ -21,6 +23,9 @@ pub use description::{CoSimulation, Interface, ModelDescription, ModelExchange, 
 #[cfg(feature = "read")]
 pub use read::Located;
 pub use structure::{ModelStructure, Unknown};
+#[cfg(feature = "read")]
+pub use terminals::LocatedTerminals;
+pub use terminals::{StreamMember, TERMINALS, Terminal, TerminalMember, Terminals};
 pub use variable::{
     Alias, Binary, Clock, DataType, Dimension, Float, Integer, IntervalVariability, Plain, Variable,
     VariableKind,

@@ -29,13 +29,7 @@ impl ModelDescription {
         };
         fmi3::description(self, &mut Check { unread: &Unread::new(), report: &mut report });
         if let Some(Violation { rule, place, message }) = broken {
-            let paths = Paths {
-                interfaces: &["model_exchange", "co_simulation", "scheduled_execution"],
-                units: &self.units,
-                of_type: &|t| &self.types[t].name,
-                of_variable: &|v| &self.variables[v].name,
-            };
-            return Err(Error::rule(rule, paths.of(place), message));
+            return Err(Error::rule(rule, self.paths(|paths| paths.of(place)), message));
         }
         header("instantiation_token", &self.header())?;
         units(&self.units)?;
@@ -62,6 +56,18 @@ impl ModelDescription {
             }
         }
         Ok(())
+    }
+}
+
+impl ModelDescription {
+    /// Gives the paths of places in an error.
+    pub(super) fn paths<T>(&self, with: impl FnOnce(&Paths<'_>) -> T) -> T {
+        with(&Paths {
+            interfaces: &["model_exchange", "co_simulation", "scheduled_execution"],
+            units: &self.units,
+            of_type: &|t| &self.types[t].name,
+            of_variable: &|v| &self.variables[v].name,
+        })
     }
 }
 

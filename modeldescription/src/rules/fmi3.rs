@@ -3,7 +3,9 @@
 use super::structure::{Listed, Numbering};
 use super::variables::{AnyType, AnyVariable, Scope};
 use super::{Check, Place, UnknownList, brief};
-use crate::fmi3::{DataType, Dimension, ModelDescription, TypeDefinition, Unknown, Variable, VariableKind};
+use crate::fmi3::{
+    DataType, Dimension, ModelDescription, Terminals, TypeDefinition, Unknown, Variable, VariableKind,
+};
 use crate::{Causality, Initial, InitialRule, NamingConvention, Variability};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -142,6 +144,49 @@ pub(crate) fn description(description: &ModelDescription, check: &mut Check<'_>)
     check.structure_of(description, &references);
 }
 
+/// Checks every rule on terminals.
+pub(crate) fn terminals(terminals: &Terminals, description: &ModelDescription, check: &mut Check<'_>) {
+    let mut variables = HashMap::new();
+    for variable in &description.variables {
+        let aliases = variable.aliases.iter().map(|alias| alias.name.as_str());
+        for name in aliases.chain([variable.name.as_str()]) {
+            variables.entry(name).or_insert(variable);
+        }
+    }
+    let mut levels = HashSet::new();
+    for (t, terminal) in terminals.terminals.iter().enumerate() {
+        let (name, place) = (brief(&terminal.name), Place::Terminal(t));
+        if !levels.insert((terminal.inside, terminal.name.as_str())) {
+            check.add("terminal.unique", place, format!("the terminal {name:?} is there twice on its level"));
+        }
+        // Names of members with the variables that they stand for; streams have two.
+        let members =
+            terminal.members.iter().map(|m| vec![(m.member_name.as_str(), m.variable_name.as_str())]);
+        let streams = terminal.streams.iter().map(|m| {
+            let (inward, outward) = (m.in_member_name.as_str(), m.out_member_name.as_str());
+            vec![(inward, m.in_variable_name.as_str()), (outward, m.out_variable_name.as_str())]
+        });
+        let by_name = matches!(terminal.matching_rule.as_str(), "plug" | "bus");
+        let mut seen = HashSet::new();
+        for (m, pairs) in members.chain(streams).enumerate() {
+            let place = Place::Member(t, m);
+            for (member, variable) in pairs {
+                if member.is_empty() && by_name {
+                    let rule = &terminal.matching_rule;
+                    let message = format!(
+                        "a member of the terminal {name:?} has no memberName; must have one, as matchingRule = {rule}"
+                    );
+                    check.add("terminal.name", place, message);
+                } else if !member.is_empty() && !seen.insert(member) {
+                    let message = format!("the terminal {name:?} has the member {:?} twice", brief(member));
+                    check.add("terminal.unique", place, message);
+                }
+                check.member(place, &name, variable, variables.get(variable).copied());
+            }
+        }
+    }
+}
+
 impl<'a> From<&'a Unknown> for Listed<'a> {
     fn from(unknown: &'a Unknown) -> Self {
         Self {
@@ -153,6 +198,21 @@ impl<'a> From<&'a Unknown> for Listed<'a> {
 }
 
 impl Check<'_> {
+    fn member(&mut self, place: Place, terminal: &str, name: &str, variable: Option<&Variable>) {
+        use Causality::{CalculatedParameter, Input, Output, Parameter};
+        let name = brief(name);
+        let message = match variable {
+            None => format!("the terminal {terminal:?} names {name:?}; must name a variable"),
+            Some(of) if ![Input, Output, Parameter, CalculatedParameter].contains(&of.causality) => format!(
+                "the terminal {terminal:?} names {name:?}, which has causality = {}; allowed: input, output, parameter, \
+                 calculatedParameter",
+                of.causality.as_str()
+            ),
+            Some(_) => return,
+        };
+        self.add("terminal.member", place, message);
+    }
+
     fn interfaces(&mut self, description: &ModelDescription) {
         let exchange = description.model_exchange.as_ref().map(|of| &of.interface);
         let co_simulation = description.co_simulation.as_ref().map(|of| &of.interface);
