@@ -73,7 +73,7 @@ fn path(description: &ModelDescription, place: Place) -> String {
         Place::Item(t, i) => format!("{}.items[{i}]", of_type(t)),
         Place::Variable(v) => format!("variables[{:?}]", description.variables[v].name),
         Place::Start(v) => variable_path(&description.variables[v], "start"),
-        Place::Root | Place::Unknowns(_) | Place::Unknown(..) => "description".to_owned(),
+        Place::Root | Place::Unknowns(_) | Place::Unknown(..) | Place::Alias(..) => "description".to_owned(),
     }
 }
 

@@ -7,14 +7,19 @@
 //! | `structure` | outputs, derivatives and initial unknowns, by value reference |
 //! | `validate` | conditions on a description that is to be written |
 //! | `xml` | the file `modelDescription.xml`, written |
+//! | `read` | the same file, read |
 
 mod description;
+#[cfg(feature = "read")]
+mod read;
 mod structure;
 mod validate;
 mod variable;
 mod xml;
 
 pub use description::{CoSimulation, Interface, ModelDescription, ModelExchange, TypeDefinition};
+#[cfg(feature = "read")]
+pub use read::Located;
 pub use structure::{ModelStructure, Unknown};
 pub use variable::{
     Alias, Binary, Clock, DataType, Dimension, Float, Integer, IntervalVariability, Plain, Variable,

@@ -121,7 +121,8 @@ impl UnknownList {
 pub enum Place {
     /// The whole.
     Root,
-    /// A co-simulation interface: the model's is the first.
+    /// An interface. In FMI 2.0 one for co-simulation: the model's is the first. In FMI 3.0 the one for model exchange,
+    /// co-simulation or scheduled execution, in this order.
     Interface(usize),
     /// The default experiment.
     Experiment,
@@ -139,6 +140,8 @@ pub enum Place {
     Variable(usize),
     /// The start value of a variable.
     Start(usize),
+    /// A variable, and one of its aliases.
+    Alias(usize, usize),
     /// A list of the structure.
     Unknowns(UnknownList),
     /// One of a list of the structure.
