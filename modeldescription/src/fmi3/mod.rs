@@ -36,3 +36,24 @@ pub type EnumerationItem = crate::EnumerationItem<i64>;
 
 /// Stands for a dimension of a variable among the attributes that cannot be read.
 pub(crate) const DIMENSION: &str = "Dimension";
+
+/// The folder of this platform's binaries inside an archive of FMI 3.0 (section 2.5.1.4.2), such as `x86_64-linux`.
+pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "x86_64")) {
+    "x86_64-windows"
+} else if cfg!(all(target_os = "windows", target_arch = "x86")) {
+    "x86-windows"
+} else if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
+    "aarch64-windows"
+} else if cfg!(all(target_os = "macos", target_arch = "x86_64")) {
+    "x86_64-darwin"
+} else if cfg!(all(target_os = "macos", target_arch = "aarch64")) {
+    "aarch64-darwin"
+} else if cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+    "x86_64-linux"
+} else if cfg!(all(target_os = "linux", target_arch = "x86")) {
+    "x86-linux"
+} else if cfg!(all(target_os = "linux", target_arch = "aarch64")) {
+    "aarch64-linux"
+} else {
+    "unknown"
+};
