@@ -176,7 +176,10 @@ mod tests {
         for x in angles.iter().flat_map(|x| [*x, -*x]) {
             let (found, wanted) = (sin_cos(x), (sin(x), cos(x)));
             let bits = |(s, c): (f64, f64)| (s.to_bits(), c.to_bits());
-            assert!(bits(found) == bits(wanted) || x.is_nan() || x.is_infinite(), "{x}: {found:?}, {wanted:?}");
+            assert!(
+                bits(found) == bits(wanted) || x.is_nan() || x.is_infinite(),
+                "{x}: {found:?}, {wanted:?}"
+            );
             assert!(found.0.is_nan() == wanted.0.is_nan(), "{x}");
         }
     }
