@@ -8,13 +8,13 @@
 //!
 //! At an input u with r and ∇r = a there, r is taken for the quadratic r + aᵀs + ½ sᵀHs of the way s from u, and (K) of that
 //! is solved: s = (I − λH)⁻¹(λa + u_ref − u), with λ by Newton's method on the one equation that is left. The Hessian H is
-//! learned on the way. It is 0 at first, and then changes as little as it must for H s to be the change of ∇r (Powell's
+//! learned on the way. It is 0 before, and then changes as little as it must for H s to be the change of ∇r (Powell's
 //! symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps shorten faster
 //! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
 //!
-//! It begins at the answer of the pointwise row. It stands under the terms of [`correction`](super::correction): the rows are
+//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. It stands under the terms of [`correction`](super::correction): the rows are
 //! all but affine from u_ref to there, every other row holds, and no other answer is in sight. λH, without a unit, is how far
-//! the normal turns on the way from u_ref, and what r misses at u_ref by tells it too.
+//! the normal turns on the way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, norm};
@@ -190,54 +190,59 @@ impl PeriodProblem<'_> {
         }
         // Does u_ref violate the row over the period too?
         let requirement = &self.requirements[chosen];
-        let at_reference = self.reached(requirement, u_ref, at.ahead)?;
-        if at_reference.value >= -MET * at_reference.terms {
+        let from = self.weighted(requirement, u_ref, at.ahead)?;
+        let normal: [f64; M] = *from.normal.first_chunk()?;
+        let moved: f64 = (0..M).map(|i| (normal[i] * u_ref[i]).abs()).sum();
+        if from.value >= -MET * (from.terms + moved) {
             return None;
         }
         // From the answer of the pointwise row to that of the row itself.
-        let mut row = Bent { value: 0.0, normal: [0.0; M], hessian: [[0.0; M]; M] };
-        let (mut before, mut ratio) = (None::<([f64; M], [f64; M])>, 0.0_f64);
+        let mut row = Bent { value: from.value, normal, hessian: [[0.0; M]; M] };
+        let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
+        let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
         let (mut bends_aside, mut rounds) = (false, 0);
         let lambda = loop {
             let here = self.weighted(requirement, &u, at.ahead)?;
-            (row.value, row.normal) = (here.value, *here.normal.first_chunk()?);
+            let before = core::mem::replace(&mut row.normal, *here.normal.first_chunk()?);
+            row.value = here.value;
+            row.learn(&step, &core::array::from_fn(|i| row.normal[i] - before[i]));
             let back: [f64; M] = core::array::from_fn(|i| u_ref[i] - u[i]);
-            if let Some((step, normal)) = before {
-                row.learn(&step, &core::array::from_fn(|i| row.normal[i] - normal[i]));
-                // Does the step show how the row bends aside of the way from u_ref?
-                let (square, along) = (product(&step, &step), product(&step, &back));
-                let aside = square - along * along / product(&back, &back);
-                bends_aside |=
-                    aside >= ASIDE_OF_STEP * square && largest(&step) >= TELLING * largest(&u).max(1.0);
-            }
-            let (step, lambda) = row.nearest(&back)?;
+            // Does the step show how the row bends aside of the way from u_ref?
+            let (square, along) = (product(&step, &step), product(&step, &back));
+            let aside = square - along * along / product(&back, &back);
+            bends_aside |=
+                aside >= ASIDE_OF_STEP * square && largest(&step) >= TELLING * largest(&u).max(1.0);
+            let lambda;
+            (step, lambda) = row.nearest(&back)?;
             let target: [f64; M] = core::array::from_fn(|i| u[i] + step[i]);
             // Not-a-number is not within bounds.
             if !self.bounds.contain(&target) || lambda <= 0.0 {
                 return None;
             }
-            let (length, size) = (largest(&step), largest(&u).max(largest(&target)).max(1.0));
-            let shortened = before.map(|(step, _)| length / largest(&step));
-            (at.rows[chosen], before) = (Row::linear(&row.normal, row.value, &u), Some((step, row.normal)));
-            u = target;
-            match shortened {
-                Some(by) if by > CONVERGING => return None,
-                Some(by) if by * length <= SKIPPED * MET * size => break lambda,
-                _ if length == 0.0 => break lambda,
-                _ => {}
+            at.rows[chosen] = Row::linear(&row.normal, row.value, &u);
+            let (shortened, size) = (largest(&step) / length, largest(&u).max(largest(&target)).max(1.0));
+            (u, length) = (target, largest(&step));
+            if length == 0.0 || rounds > 0 && shortened * length <= SKIPPED * MET * size {
+                break lambda;
             }
-            // The first two steps tell by how much the normal turns.
-            ratio = ratio.max(shortened.filter(|_| rounds == 1).unwrap_or(0.0));
             rounds += 1;
-            if rounds == CORRECTIONS {
+            if shortened > CONVERGING || rounds == CORRECTIONS {
                 return None;
             }
+            // The first two steps tell by how much the normal turns.
+            ratio = if rounds == 2 { shortened } else { ratio };
         };
-        // How far the normal turns between u_ref and the answer, as a part of itself.
+        // How far the row bends between u_ref and the answer, and how far its normal turns there, as parts of themselves.
         let square = product(&row.normal, &row.normal);
-        let missed = (at_reference.value + lambda * square).abs() / (lambda * square);
+        let missed = (from.value + lambda * square).abs() / (lambda * square);
+        let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
+        let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
         let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
-        let ratio = ratio.max(missed).max(turn);
+        let ratio = ratio.max(bend).max(turn);
+        // Not-a-number is no number at most.
+        if !matches!(ratio, 0.0..=CONVERGING) {
+            return None;
+        }
         let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let limit = known.fold(1.0, |s: f64, v| s.max(v.abs()));
