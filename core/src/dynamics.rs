@@ -51,7 +51,10 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
         let g = self.input_map(x);
         for j in 0..NU {
             for i in 0..NX {
-                dx[i] += g[(i, j)] * u[j];
+                // Known to the compiler where it is a constant.
+                if !g[(i, j)].is_zero() {
+                    dx[i] += g[(i, j)] * u[j];
+                }
             }
         }
         dx

@@ -70,7 +70,7 @@ impl PeriodBound {
 
     /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their
     /// gradients by so many `inputs`.
-    #[inline]
+    #[inline(always)]
     pub fn weighted(
         &self,
         value: &[f64],

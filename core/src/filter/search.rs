@@ -27,6 +27,7 @@
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
 //! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
+mod bent_row;
 mod correction;
 mod wide;
 
@@ -211,11 +212,14 @@ impl PeriodProblem<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
-        for (i, row) in rows.iter_mut().enumerate() {
-            *row = self.first_row(i);
-        }
         let Scratch { violations, ahead } = scratch;
         let mut at = Linearised { rows, violations, ahead };
+        if let Some(solution) = self.bent_row(u, last, &mut at, qp) {
+            return Some(solution);
+        }
+        for (i, row) in at.rows.iter_mut().enumerate() {
+            *row = self.first_row(i);
+        }
         let mut pointwise = [0.0; N];
         let pointwise = &mut pointwise[..m];
         let first = qp.solve(&self.problem(at.rows), pointwise);
@@ -377,6 +381,25 @@ impl PeriodProblem<'_> {
         Some(())
     }
 
+    /// A requirement under the input `u`, as a row on h⁽ⁿ⁾. `None` where there is no prediction.
+    #[inline(always)]
+    fn weighted(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<Weighted> {
+        let slot = &self.slots[requirement.barrier];
+        slot.source.predict()?.ahead_of_row(self.t, &slot.now.from, u, requirement.ahead, ahead);
+        let (n, bound) = (slot.degree(), &requirement.bound);
+        Some(bound.weighted(&ahead.value[..n], &ahead.gradient, u.len(), requirement.divisor))
+    }
+
+    /// [`Self::weighted`] without the gradient.
+    #[inline(always)]
+    fn reached(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<Weighted> {
+        let slot = &self.slots[requirement.barrier];
+        let source = slot.source.predict()?;
+        source.values_of_row(self.t, &slot.now.from, u, requirement.ahead, &mut ahead.value);
+        let (n, bound) = (slot.degree(), &requirement.bound);
+        Some(bound.weighted(&ahead.value[..n], &ahead.gradient, 0, requirement.divisor))
+    }
+
     /// Writes the row of a requirement linearised at `u`. Returns its violation there in units of its terms.
     #[inline(always)]
     fn linearised(
@@ -386,17 +409,11 @@ impl PeriodProblem<'_> {
         ahead: &mut Ahead,
         row: &mut Row,
     ) -> Option<f64> {
-        let slot = &self.slots[requirement.barrier];
-        let x = &slot.now.from[..];
-        slot.source.predict()?.ahead_of_row(self.t, x, u, requirement.ahead, ahead);
-        // A row on h⁽ⁿ⁾, as the pointwise one.
-        let n = slot.degree();
-        let divisor = requirement.divisor;
-        let Weighted { mut value, mut terms, mut normal } =
-            requirement.bound.weighted(&ahead.value[..n], &ahead.gradient, u.len(), divisor);
+        let Weighted { mut value, mut terms, mut normal } = self.weighted(requirement, u, ahead)?;
         if !self.errors.is_exact() {
-            let held = (self.t, x, u, requirement.ahead);
-            let bound = (&requirement.bound, divisor);
+            let slot = &self.slots[requirement.barrier];
+            let held = (self.t, &slot.now.from[..], u, requirement.ahead);
+            let bound = (&requirement.bound, requirement.divisor);
             let Uncertainty { size, gradient } =
                 self.errors.of_row(&*slot.source, held, bound, &slot.now.slopes)?;
             value -= size;
@@ -425,12 +442,7 @@ impl PeriodProblem<'_> {
             let mut row = Row::ZERO;
             return self.linearised(requirement, u, ahead, &mut row).map(|_| row.slack(u));
         }
-        let (slot, bound) = (&self.slots[requirement.barrier], &requirement.bound);
-        let held = (self.t, &slot.now.from, requirement.ahead);
-        slot.source.predict()?.values_of_row(held.0, held.1, u, held.2, &mut ahead.value);
-        let n = slot.degree();
-        let reached = (0..n).fold(-bound.floor, |sum, k| sum + bound.weights[k] * ahead.value[k]);
-        Some(reached / requirement.divisor)
+        self.reached(requirement, u, ahead).map(|reached| reached.value)
     }
 
     /// Linearises all rows at `u`, with violations that are round-off counted as met.

@@ -109,12 +109,17 @@ where
     let (mut rate, g) = (plant.drift(x), plant.input_map(x));
     for m in 0..NU {
         for i in 0..NX {
+            // What is constantly zero or one is known to the compiler.
             let Dual { value, gradient } = &g[(i, m)];
-            rate[i].value += value * u[m];
-            for (sum, d) in rate[i].gradient.iter_mut().zip(gradient) {
-                *sum += d * u[m];
+            if *value != 0.0 {
+                rate[i].value += value * u[m];
+                rate[i].gradient[m] += value;
             }
-            rate[i].gradient[m] += value;
+            for (sum, d) in rate[i].gradient.iter_mut().zip(gradient) {
+                if *d != 0.0 {
+                    *sum += d * u[m];
+                }
+            }
         }
     }
     rate
@@ -159,7 +164,7 @@ where
     // The first stage depends on u through g(x) alone.
     let (f, g) = (plant.drift(x), plant.input_map(x));
     let k1 = SVector::<Dual<NU>, NX>::from_fn(|i, _| Dual {
-        value: (0..NU).fold(f[i], |sum, m| sum + g[(i, m)] * u[m]),
+        value: (0..NU).fold(f[i], |sum, m| if g[(i, m)] == 0.0 { sum } else { sum + g[(i, m)] * u[m] }),
         gradient: core::array::from_fn(|m| g[(i, m)]),
     });
     one_step(|x| rate(plant, x, u), &from, &k1, duration).unwrap_or_else(|| {
@@ -212,7 +217,10 @@ where
                 for i in 0..NX {
                     let mut rate = f[i].coefficients[$j - 1];
                     for m in 0..NU {
-                        rate += g[(i, m)].coefficients[$j - 1] * u[m];
+                        let g = g[(i, m)].coefficients[$j - 1];
+                        if !g.is_zero() {
+                            rate += g * u[m];
+                        }
                     }
                     series[i].coefficients[$j] = rate * (1.0 / f64::from($j));
                 }

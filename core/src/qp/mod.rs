@@ -63,6 +63,15 @@ impl Row {
     /// 0ᵀu ≥ 0.
     pub const ZERO: Self = Self { normal: [0.0; MAX_INPUTS], floor: 0.0 };
 
+    /// The linear function with the `value` and the gradient `normal` at `u`, as a row.
+    #[inline(always)]
+    pub(crate) fn linear<const M: usize>(normal: &[f64; M], value: f64, u: &[f64; M]) -> Self {
+        let mut row = Self::ZERO;
+        row.normal[..M].copy_from_slice(normal);
+        row.floor = dot(normal, u) - value;
+        row
+    }
+
     /// aᵀu − b: ≥ 0 where the row holds.
     pub fn slack(&self, u: &[f64]) -> f64 {
         dot(&self.normal, u) - self.floor
@@ -309,8 +318,8 @@ impl Workspace {
         {
             let mut solver = Solver::Unchanged;
             if let Answer::Row(row, multiplier) = answer {
-                self.active[0] = Active { constraint: Constraint::Row(row), multiplier };
-                (self.active_len, solver) = (1, Solver::ClosedForm);
+                self.note_active(row, multiplier);
+                solver = Solver::ClosedForm;
             }
             return Solution { outcome: Outcome::Optimal, solver, iterations: 0 };
         }
@@ -390,6 +399,13 @@ impl Workspace {
                 push(Constraint::Upper(i), -held);
             }
         }
+    }
+
+    /// Notes that `row` alone is active, with its `multiplier`, in an answer that was found elsewhere.
+    pub(crate) fn note_active(&mut self, row: usize, multiplier: f64) {
+        (self.relaxed, self.ill_conditioned) = (RowSet::EMPTY, RowSet::EMPTY);
+        self.active[0] = Active { constraint: Constraint::Row(row), multiplier };
+        self.active_len = 1;
     }
 
     /// The active rows and bounds of the last solve, soft rows at their largest multiplier last. Empty after

@@ -16,11 +16,11 @@ use crate::MAX_INPUTS;
 use crate::qp::{Outcome, RowSet, Solution, Workspace};
 
 /// Corrections of an answer whose rows are all but affine.
-const CORRECTIONS: usize = 12;
+pub(super) const CORRECTIONS: usize = 12;
 /// Length of a correction that is left out, as a part of what counts as met.
-const SKIPPED: f64 = 0.1;
+pub(super) const SKIPPED: f64 = 0.1;
 /// Largest ratio of each correction to the one before.
-const CONVERGING: f64 = 0.5;
+pub(super) const CONVERGING: f64 = 0.5;
 
 /// Answer and way of a correction, and the length of the way.
 type Correction<const N: usize> = ([f64; N], [f64; N], f64);
@@ -128,6 +128,15 @@ impl PeriodProblem<'_> {
         None
     }
 
+    /// Whether the rows, whose normals turn by the part `ratio` of themselves on the `distance` of `u` from u_ref, are all but
+    /// affine there and on the way to `last`, or `last` is no nearer to u_ref.
+    #[inline(always)]
+    pub(super) fn is_near(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
+        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
+        let near = || distance <= (1.0 + MET) * self.distance(last);
+        ratio <= CONTRACTION && (ratio * away <= CONTRACTION * distance || near())
+    }
+
     /// Whether there is no other answer near `u`, which corrections approached in `ratio`, or nearer to u_ref towards `last`.
     fn is_sole(
         &self,
@@ -138,12 +147,10 @@ impl PeriodProblem<'_> {
         at: &mut Linearised,
         qp: &mut Workspace,
     ) -> bool {
-        let distance = self.distance(u);
-        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-        let near = distance <= (1.0 + MET) * self.distance(last);
-        if ratio <= CONTRACTION && (near || ratio * away <= CONTRACTION * distance) {
+        if self.is_near(last, u, self.distance(u), ratio) {
             return true;
         }
+        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
         // A correction from there has to lead here.
         let mut target = [0.0; MAX_INPUTS];
         let target = &mut target[..u.len()];

@@ -1,0 +1,313 @@
+//! One active row, to its bend: the usual step.
+//!
+//! Let r(u) ≥ 0 be a row over the period, and let no other row and no bound be active. The answer then is where
+//!
+//! ```text
+//! u − u_ref = λ ∇r(u),   r(u) = 0,   λ > 0.                                                            (K)
+//! ```
+//!
+//! At an input u with r and ∇r = a there, r is taken for the quadratic r + aᵀs + ½ sᵀHs of the way s from u, and (K) of that
+//! is solved: s = (I − λH)⁻¹(λa + u_ref − u), with λ by Newton's method on the one equation that is left. The Hessian H is
+//! learned on the way. It is 0 before, and then changes as little as it must for H s to be the change of ∇r (Powell's
+//! symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps shorten faster
+//! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
+//!
+//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. It stands under the terms of [`correction`](super::correction): the rows are
+//! all but affine from u_ref to there, every other row holds, and no other answer is in sight. λH, without a unit, is how far
+//! the normal turns on the way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too.
+
+use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
+use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, norm};
+use crate::qp::{Outcome, Row, RowSet, Solution, Solver, Workspace};
+use crate::{MAX_INPUTS, elementary};
+
+/// The least square of the part of a step aside, as a part of the step's, for it to show how the row bends aside.
+const ASIDE_OF_STEP: f64 = 0.1;
+/// The shortest step, as a part of the input, that shows a bend beyond round-off.
+const TELLING: f64 = 1e-7;
+/// Steps of Newton's method for λ. It converges quadratically.
+const MULTIPLIER_STEPS: usize = 6;
+
+type Matrix<const M: usize> = [[f64; M]; M];
+
+/// Σ a_i b_i, unrolled.
+#[inline(always)]
+fn product<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..M {
+        sum += a[i] * b[i];
+    }
+    sum
+}
+
+/// The largest component.
+#[inline(always)]
+fn largest<const M: usize>(a: &[f64; M]) -> f64 {
+    let mut largest = 0.0;
+    for i in 0..M {
+        largest = if a[i].abs() > largest { a[i].abs() } else { largest };
+    }
+    largest
+}
+
+/// The row as a quadratic function of the way from an input.
+struct Bent<const M: usize> {
+    value: f64,
+    normal: [f64; M],
+    hessian: Matrix<M>,
+}
+
+impl<const M: usize> Bent<M> {
+    /// H s.
+    #[inline(always)]
+    fn turn(&self, s: &[f64; M]) -> [f64; M] {
+        core::array::from_fn(|i| product(&self.hessian[i], s))
+    }
+
+    /// Changes the Hessian by as little as makes `H s` the change `y` of the normal.
+    #[inline(always)]
+    fn learn(&mut self, s: &[f64; M], y: &[f64; M]) {
+        let known = self.turn(s);
+        let rest: [f64; M] = core::array::from_fn(|i| y[i] - known[i]);
+        let per_square = 1.0 / product(s, s);
+        let along = product(&rest, s) * per_square;
+        for i in 0..M {
+            for j in 0..M {
+                self.hessian[i][j] += (rest[i] * s[j] + s[i] * rest[j] - along * s[i] * s[j]) * per_square;
+            }
+        }
+    }
+
+    /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where λH is not small.
+    #[inline(always)]
+    fn nearest(&self, back: &[f64; M]) -> Option<([f64; M], f64)> {
+        let square = product(&self.normal, &self.normal);
+        let mut lambda = -(self.value + product(&self.normal, back)) / square;
+        let flat = self.hessian == [[0.0; M]; M];
+        let mut step = core::array::from_fn(|i| lambda * self.normal[i] + back[i]);
+        if flat {
+            return Some((step, lambda));
+        }
+        for _ in 0..MULTIPLIER_STEPS {
+            let factors = Factors::of(lambda, &self.hessian)?;
+            step = factors.solve(core::array::from_fn(|i| lambda * self.normal[i] + back[i]));
+            let turn = self.turn(&step);
+            let there: [f64; M] = core::array::from_fn(|i| self.normal[i] + turn[i]);
+            let value = self.value + product(&self.normal, &step) + 0.5 * product(&step, &turn);
+            let change = -value / product(&there, &factors.solve(there));
+            lambda += change;
+            if change.abs() <= SKIPPED * SKIPPED * MET * lambda.abs() {
+                let moved = factors.solve(there);
+                return Some((core::array::from_fn(|i| step[i] + change * moved[i]), lambda));
+            }
+        }
+        None
+    }
+}
+
+/// I − λH = L D Lᵀ.
+struct Factors<const M: usize> {
+    below: Matrix<M>,
+    per_diagonal: [f64; M],
+}
+
+impl<const M: usize> Factors<M> {
+    /// `None` where the matrix has lost half of its diagonal.
+    #[inline(always)]
+    fn of(lambda: f64, hessian: &Matrix<M>) -> Option<Self> {
+        let mut factors = Self { below: [[0.0; M]; M], per_diagonal: [0.0; M] };
+        let mut diagonal = [0.0; M];
+        for j in 0..M {
+            let mut d = 1.0 - lambda * hessian[j][j];
+            for k in 0..j {
+                d -= factors.below[j][k] * factors.below[j][k] * diagonal[k];
+            }
+            if d < CONVERGING {
+                return None;
+            }
+            (diagonal[j], factors.per_diagonal[j]) = (d, 1.0 / d);
+            for i in j + 1..M {
+                let mut sum = -lambda * hessian[i][j];
+                for k in 0..j {
+                    sum -= factors.below[i][k] * factors.below[j][k] * diagonal[k];
+                }
+                factors.below[i][j] = sum * factors.per_diagonal[j];
+            }
+        }
+        Some(factors)
+    }
+
+    #[inline(always)]
+    fn solve(&self, mut b: [f64; M]) -> [f64; M] {
+        for i in 0..M {
+            for k in 0..i {
+                b[i] -= self.below[i][k] * b[k];
+            }
+        }
+        for i in (0..M).rev() {
+            b[i] *= self.per_diagonal[i];
+            for k in i + 1..M {
+                b[i] -= self.below[k][i] * b[k];
+            }
+        }
+        b
+    }
+}
+
+impl PeriodProblem<'_> {
+    /// The answer, written to `u`, where one hard row alone is active in it and is all but affine between u_ref and
+    /// there. `None`, with `u` as it may be, where it is not known to be so.
+    pub(super) fn bent_row(
+        &self,
+        u: &mut [f64],
+        last: Option<&[f64]>,
+        at: &mut Linearised,
+        qp: &mut Workspace,
+    ) -> Option<Solution> {
+        if !self.errors.is_exact() || self.requirements.len() > self.listed {
+            return None;
+        }
+        match u.len() {
+            1 => self.bent_row_for::<1>(u, last, at, qp),
+            2 => self.bent_row_for::<2>(u, last, at, qp),
+            3 => self.bent_row_for::<3>(u, last, at, qp),
+            _ => None,
+        }
+    }
+
+    #[inline(always)]
+    fn bent_row_for<const M: usize>(
+        &self,
+        u: &mut [f64],
+        last: Option<&[f64]>,
+        at: &mut Linearised,
+        qp: &mut Workspace,
+    ) -> Option<Solution> {
+        let (out, u_ref): (&mut [f64; M], &[f64; M]) = (u.first_chunk_mut()?, self.u_ref.first_chunk()?);
+        let (chosen, mut u) = self.furthest(u_ref)?;
+        if !self.soft().is_empty() || !self.bounds.contain(u_ref) || !self.bounds.contain(&u) {
+            return None;
+        }
+        // Does u_ref violate the row over the period too?
+        let requirement = &self.requirements[chosen];
+        let from = self.weighted(requirement, u_ref, at.ahead)?;
+        let normal: [f64; M] = *from.normal.first_chunk()?;
+        let moved: f64 = (0..M).map(|i| (normal[i] * u_ref[i]).abs()).sum();
+        if from.value >= -MET * (from.terms + moved) {
+            return None;
+        }
+        // From the answer of the pointwise row to that of the row itself.
+        let mut row = Bent { value: from.value, normal, hessian: [[0.0; M]; M] };
+        let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
+        let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
+        let (mut bends_aside, mut rounds) = (false, 0);
+        let lambda = loop {
+            let here = self.weighted(requirement, &u, at.ahead)?;
+            let before = core::mem::replace(&mut row.normal, *here.normal.first_chunk()?);
+            row.value = here.value;
+            row.learn(&step, &core::array::from_fn(|i| row.normal[i] - before[i]));
+            let back: [f64; M] = core::array::from_fn(|i| u_ref[i] - u[i]);
+            // Does the step show how the row bends aside of the way from u_ref?
+            let (square, along) = (product(&step, &step), product(&step, &back));
+            let aside = square - along * along / product(&back, &back);
+            bends_aside |=
+                aside >= ASIDE_OF_STEP * square && largest(&step) >= TELLING * largest(&u).max(1.0);
+            let lambda;
+            (step, lambda) = row.nearest(&back)?;
+            let target: [f64; M] = core::array::from_fn(|i| u[i] + step[i]);
+            // Not-a-number is not within bounds.
+            if !self.bounds.contain(&target) || lambda <= 0.0 {
+                return None;
+            }
+            at.rows[chosen] = Row::linear(&row.normal, row.value, &u);
+            let (shortened, size) = (largest(&step) / length, largest(&u).max(largest(&target)).max(1.0));
+            (u, length) = (target, largest(&step));
+            if length == 0.0 || rounds > 0 && shortened * length <= SKIPPED * MET * size {
+                break lambda;
+            }
+            rounds += 1;
+            if shortened > CONVERGING || rounds == CORRECTIONS {
+                return None;
+            }
+            // The first two steps tell by how much the normal turns.
+            ratio = if rounds == 2 { shortened } else { ratio };
+        };
+        // How far the row bends between u_ref and the answer, and how far its normal turns there, as parts of themselves.
+        let square = product(&row.normal, &row.normal);
+        let missed = (from.value + lambda * square).abs() / (lambda * square);
+        let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
+        let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
+        let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
+        let ratio = ratio.max(bend).max(turn);
+        // Not-a-number is no number at most.
+        if !matches!(ratio, 0.0..=CONVERGING) {
+            return None;
+        }
+        let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
+        let known = self.u_ref.iter().chain(last.into_iter().flatten());
+        let limit = known.fold(1.0, |s: f64, v| s.max(v.abs()));
+        if distance > (FAR * limit).min(self.correction_limit) {
+            return None;
+        }
+        // The other rows at the answer.
+        if at.rows.len() > 1 {
+            self.linearise(&u, RowSet::ALL - RowSet::of(chosen), at)?;
+            at.violations[chosen] = 0.0;
+            if at.worst(RowSet::EMPTY) > 0.0 {
+                return None;
+            }
+        }
+        let is_sole = match last {
+            Some(last) => {
+                self.is_near(last, &u, distance, ratio) || self.leads_to(last.first_chunk()?, &u, chosen, at)
+            }
+            None => ratio <= CONTRACTION,
+        };
+        let seen_aside = ratio <= CONTRACTION && bends_aside;
+        if !is_sole || !seen_aside && self.is_nearer_aside(&u, chosen, at) {
+            return None;
+        }
+        *out = u;
+        qp.note_active(chosen, lambda);
+        Some(Solution { outcome: Outcome::Optimal, solver: Solver::ClosedForm, iterations: 0 })
+    }
+
+    /// The row of the sample that u_ref violates by the largest distance, and the input nearest to u_ref that meets it;
+    /// `None` where there is none.
+    #[inline(always)]
+    fn furthest<const M: usize>(&self, u_ref: &[f64; M]) -> Option<(usize, [f64; M])> {
+        let (mut furthest, mut distance) = (None, 0.0);
+        for (i, requirement) in self.requirements.iter().enumerate() {
+            let row = &self.slots[requirement.barrier].now.row;
+            let normal: &[f64; M] = row.normal.first_chunk()?;
+            let (missing, square) = (row.floor - product(normal, u_ref), product(normal, normal));
+            if missing * missing > distance * square && missing > 0.0 && !requirement.bound.is_zero() {
+                let lambda = missing / square;
+                distance = missing * lambda;
+                furthest = Some((i, core::array::from_fn(|i| u_ref[i] + lambda * normal[i])));
+            }
+        }
+        furthest
+    }
+
+    /// Whether the row `chosen`, linearised at `last`, leads to the answer `u`.
+    #[inline(always)]
+    fn leads_to<const M: usize>(
+        &self,
+        last: &[f64; M],
+        u: &[f64; M],
+        chosen: usize,
+        at: &mut Linearised,
+    ) -> bool {
+        let Some(here) = self.weighted(&self.requirements[chosen], last, at.ahead) else { return false };
+        let Some(normal) = here.normal.first_chunk() else { return false };
+        let row = Bent { value: here.value, normal: *normal, hessian: [[0.0; M]; M] };
+        let back = core::array::from_fn(|i| self.u_ref[i] - last[i]);
+        let Some((step, lambda)) = row.nearest(&back) else { return false };
+        let away: [f64; M] = core::array::from_fn(|i| u[i] - last[i]);
+        let left: [f64; M] = core::array::from_fn(|i| away[i] - step[i]);
+        lambda > 0.0 && largest(&left) <= CONVERGING * largest(&away) + SAME * largest(u).max(1.0)
+    }
+}
+
+const _: () = assert!(MAX_INPUTS >= 3, "a gradient has room for so many inputs");
