@@ -931,7 +931,7 @@ fn a_campaign_takes_fmus_of_others() {
         misbehaving::description("no-reset", &[]),
         &misbehaving::library(&[]),
     );
-    let counter = "[[system.component]]\nname = \"counter\"\nfmu = \"counter.fmu\"\n\
+    let counter = "[[system.component]]\nname = \"counter\"\nfmu = \"counter.fmu\"\nstart = { u = 0.0 }\n\
                    [[system.connection]]\nfrom = \"counter.y\"\nto = \"plant.u.u\"\n[campaign]\n";
     let way = 1.0 - (-2.0_f64).exp();
     let d = 2.170_090 * 2.0 * way + 3.0;
