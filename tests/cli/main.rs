@@ -28,6 +28,7 @@ mod pages;
 mod plugins;
 mod reproducing;
 mod running;
+mod sundry;
 mod surviving;
 mod table;
 mod trying;
