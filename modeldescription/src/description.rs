@@ -41,16 +41,16 @@ impl SimpleType {
     }
 }
 
-/// One value of an enumeration type.
+/// One value of an enumeration type, of 32 bits, or of 64 in FMI 3.0.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename = "Item")]
-pub struct EnumerationItem {
+pub struct EnumerationItem<V = i32> {
     /// The name; not empty, one line.
     #[serde(rename = "@name")]
     pub name: String,
     /// The number that stands for it in the C interface, dimensionless.
     #[serde(rename = "@value")]
-    pub value: i32,
+    pub value: V,
     /// Meaning for a human; empty: the attribute is absent.
     #[serde(rename = "@description", skip_serializing_if = "String::is_empty")]
     pub description: String,

@@ -20,7 +20,7 @@
 //! | `rules` | the rules of the standard beyond the schema, for descriptions written and read |
 //! | `validate` | further conditions on a description that is to be written |
 //! | `xml` | the file, written |
-//! | `read` | the file, read |
+//! | `read`, `notes` | the file, read, with the positions of its parts |
 //! | `names` | characters and forms of a text, a C identifier and a structured name |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
 //! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and their rules |
@@ -76,7 +76,10 @@ mod archive;
 mod calendar;
 mod description;
 mod error;
+pub mod fmi3;
 mod names;
+#[cfg(feature = "read")]
+mod notes;
 #[cfg(feature = "read")]
 mod read;
 mod rules;

@@ -4,15 +4,14 @@
 //! model. It is also noted, so that no rule takes it for the file's own. Elements and attributes that the model
 //! has no field for are passed over, since a check against the schema finds those.
 
-use crate::rules::{Check, Place, UnknownList, Unread, Violation};
-use crate::xsd::{boolean, double, int, unsigned, words};
+use crate::notes::{At, Notes, children, list};
+use crate::rules::{Check, Place, UnknownList, Violation};
+use crate::xsd::{boolean, double, int, unsigned};
 use crate::{
-    BaseUnit, Causality, CoSimulation, DefaultExperiment, DisplayUnit, EnumerationItem, Initial, Integer,
-    LogCategory, ModelDescription, ModelStructure, NamingConvention, Plain, Real, ScalarType, SimpleType,
-    Unit, Unknown, Variability, Variable, VariableKind,
+    Causality, CoSimulation, EnumerationItem, Initial, Integer, ModelDescription, ModelStructure,
+    NamingConvention, Plain, Real, ScalarType, SimpleType, Unknown, Variability, Variable, VariableKind,
 };
 use roxmltree::{Document, Node};
-use std::collections::HashMap;
 
 /// A model description, and the positions of its parts in the text.
 ///
@@ -27,8 +26,7 @@ pub struct Located {
     pub interfaces: usize,
     /// The start values of the variables as written.
     pub starts: Vec<Option<String>>,
-    positions: HashMap<Place, usize>,
-    unread: Unread,
+    notes: Notes,
 }
 
 impl Located {
@@ -42,16 +40,12 @@ impl Located {
     /// The beginning of a part, in bytes from the beginning of the text. For a part that is not there, it is the
     /// beginning of the part that should have it.
     pub fn position(&self, place: Place) -> usize {
-        let outer = match place {
-            Place::Start(v) => Place::Variable(v),
-            _ => Place::Root,
-        };
-        [place, outer].iter().find_map(|place| self.positions.get(place)).copied().unwrap_or(0)
+        self.notes.position(place)
     }
 
     /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
     pub fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
-        self.unread.contains(&(place, attribute))
+        self.notes.is_unread(place, attribute)
     }
 
     /// The co-simulation interface, if there is one.
@@ -79,15 +73,14 @@ impl Located {
         for i in 1..self.interfaces {
             report(add(Place::Interface(i), "CoSimulation is there again; must be there once"));
         }
-        let mut check = Check { description: &self.description, unread: &self.unread, report };
+        let mut check = Check { description: &self.description, unread: &self.notes.unread, report };
         check.description();
         check.structure(&self.structure);
     }
 
     fn root(&mut self, root: Node<'_, '_>) {
-        self.positions.insert(Place::Root, root.range().start);
         // The root's own attributes.
-        let mut at = At { read: self, place: Place::Root, node: Some(root) };
+        let mut at = self.notes.enter(Place::Root, root);
         let description = ModelDescription {
             model_name: at.text("modelName"),
             guid: at.required("guid", |text| Some(text.to_owned())),
@@ -108,40 +101,23 @@ impl Located {
         let interfaces: Vec<_> = children(root, "CoSimulation").collect();
         self.interfaces = interfaces.len();
         if interfaces.is_empty() {
-            self.unread.insert((Place::Interface(0), "modelIdentifier"));
+            self.notes.miss(Place::Interface(0), "modelIdentifier");
         }
         for (i, node) in interfaces.into_iter().enumerate() {
             let place = Place::Interface(i);
-            let at = node.attribute_node("modelIdentifier").map_or(node.range().start, |a| a.range().start);
-            self.positions.insert(place, at);
+            self.notes.interface(place, node);
             if i == 0 {
                 self.description.co_simulation = self.interface(place, node);
             }
         }
         // The lists that variables refer to, and the experiment.
-        self.description.units =
-            list(root, "UnitDefinitions", "Unit").enumerate().map(|(u, node)| self.unit(u, node)).collect();
+        self.description.units = self.notes.units(root);
         self.description.types = list(root, "TypeDefinitions", "SimpleType")
             .enumerate()
             .map(|(t, node)| self.simple_type(t, node))
             .collect();
-        self.description.log_categories = list(root, "LogCategories", "Category")
-            .enumerate()
-            .map(|(c, node)| {
-                self.positions.insert(Place::Category(c), node.range().start);
-                let text = |name| node.attribute(name).unwrap_or_default().to_owned();
-                LogCategory { name: text("name"), description: text("description") }
-            })
-            .collect();
-        if let Some(node) = children(root, "DefaultExperiment").next() {
-            let mut at = self.enter(Place::Experiment, node);
-            self.description.default_experiment = Some(DefaultExperiment {
-                start_time: at.value("startTime", double),
-                stop_time: at.value("stopTime", double),
-                tolerance: at.value("tolerance", double),
-                step_size: at.value("stepSize", double),
-            });
-        }
+        self.description.log_categories = self.notes.categories(root);
+        self.description.default_experiment = self.notes.experiment(root);
         // The variables, and the structure over them.
         self.description.variables = list(root, "ModelVariables", "ScalarVariable")
             .enumerate()
@@ -155,14 +131,8 @@ impl Located {
         };
     }
 
-    /// Reads the attributes of an element at a place.
-    fn enter<'r, 'n, 'i>(&'r mut self, place: Place, node: Node<'n, 'i>) -> At<'r, 'n, 'i> {
-        self.positions.insert(place, node.range().start);
-        At { read: self, place, node: Some(node) }
-    }
-
     fn interface(&mut self, place: Place, node: Node<'_, '_>) -> CoSimulation {
-        let mut at = At { read: self, place, node: Some(node) };
+        let mut at = self.notes.at(place, Some(node));
         let files = node.descendants().filter(|n| n.has_tag_name("File"));
         CoSimulation {
             model_identifier: at.required("modelIdentifier", |text| Some(text.to_owned())),
@@ -180,53 +150,19 @@ impl Located {
         }
     }
 
-    fn unit(&mut self, u: usize, node: Node<'_, '_>) -> Unit {
-        let name = self.enter(Place::Unit(u), node).text("name");
-        let base = children(node, "BaseUnit").next().map(|base| {
-            let mut at = At { read: self, place: Place::Unit(u), node: Some(base) };
-            let mut exponent = |name| at.value(name, int).unwrap_or(0);
-            let [kg, m, s, a, k, mol, cd, rad] =
-                ["kg", "m", "s", "A", "K", "mol", "cd", "rad"].map(&mut exponent);
-            let factor = at.value("factor", double).unwrap_or(1.0);
-            BaseUnit {
-                kg,
-                m,
-                s,
-                a,
-                k,
-                mol,
-                cd,
-                rad,
-                factor,
-                offset: at.value("offset", double).unwrap_or(0.0),
-            }
-        });
-        // A display unit without a name has nobody to refer to it.
-        let named = children(node, "DisplayUnit").filter(|n| n.has_attribute("name"));
-        let display = named.enumerate().map(|(d, node)| {
-            let mut at = self.enter(Place::DisplayUnit(u, d), node);
-            DisplayUnit {
-                name: at.text("name"),
-                factor: at.value("factor", double).unwrap_or(1.0),
-                offset: at.value("offset", double).unwrap_or(0.0),
-            }
-        });
-        Unit { name, base, display_units: display.collect() }
-    }
-
     fn simple_type(&mut self, t: usize, node: Node<'_, '_>) -> SimpleType {
         let place = Place::Type(t);
-        let at = self.enter(place, node);
+        let at = self.notes.enter(place, node);
         let (name, description) = (at.text("name"), at.text("description"));
         let (kind, of) = self.kind(place, node);
         if of.is_none() {
-            self.unread.insert((place, "type"));
+            self.notes.miss(place, "type");
         }
         // An item without a value stands for nothing.
         let valued = of.into_iter().flat_map(|of| children(of, "Item"));
         let valued = valued.filter_map(|n| Some((n, n.attribute("value").and_then(int)?)));
         let items = valued.enumerate().map(|(i, (node, value))| {
-            let at = self.enter(Place::Item(t, i), node);
+            let at = self.notes.enter(Place::Item(t, i), node);
             EnumerationItem { name: at.text("name"), value, description: at.text("description") }
         });
         let items = items.collect();
@@ -241,9 +177,9 @@ impl Located {
         });
         let (of, node) = found.map_or((ScalarType::Real, None), |(of, n)| (of, Some(n)));
         if let (Place::Variable(v), Some(attribute)) = (place, node.and_then(|n| n.attribute_node("start"))) {
-            self.positions.insert(Place::Start(v), attribute.range().start);
+            self.notes.mark(Place::Start(v), attribute.range().start);
         }
-        let mut at = At { read: self, place, node };
+        let mut at = self.notes.at(place, node);
         let kind = match of {
             ScalarType::Real => VariableKind::Real(Real {
                 declared_type: at.optional("declaredType"),
@@ -268,12 +204,12 @@ impl Located {
         let place = Place::Variable(v);
         let (kind, of) = self.kind(place, node);
         self.starts.push(of.and_then(|n| n.attribute("start")).map(str::to_owned));
-        let mut at = self.enter(place, node);
+        let mut at = self.notes.enter(place, node);
         Variable {
             name: at.required("name", |text| Some(text.to_owned())),
             value_reference: at.required("valueReference", unsigned),
             description: at.text("description"),
-            causality: at.value("causality", Causality::parse).unwrap_or(Causality::Local),
+            causality: at.value("causality", causality).unwrap_or(Causality::Local),
             variability: at.value("variability", Variability::parse).unwrap_or(Variability::Continuous),
             initial: at.value("initial", Initial::parse),
             kind,
@@ -289,86 +225,26 @@ impl Located {
         list: UnknownList,
     ) -> Vec<Unknown> {
         let found = structure.and_then(|n| children(n, list.as_str()).next());
-        self.positions.insert(Place::Unknowns(list), found.or(structure).unwrap_or(root).range().start);
-        let unknown = |(u, node): (usize, Node<'_, '_>)| {
-            let place = Place::Unknown(list, u);
-            let index = self.enter(place, node).required("index", unsigned);
-            // Each word counts, even one that is no index.
-            let dependencies = node.attribute("dependencies").map(|text| {
-                let index = |word| {
-                    unsigned(word).unwrap_or_else(|| {
-                        self.unread.insert((place, "dependencies"));
-                        0
-                    })
-                };
-                words(text).map(index).collect()
-            });
-            let kinds = node.attribute("dependenciesKind");
-            let dependency_kinds = kinds.map(|text| words(text).map(str::to_owned).collect());
+        self.notes.list_at(list, found, structure, root);
+        let unknown = |(u, node)| {
+            let (index, dependencies, dependency_kinds) =
+                self.notes.unknown(Place::Unknown(list, u), node, "index");
             Unknown { index, dependencies, dependency_kinds }
         };
         found.into_iter().flat_map(|n| children(n, "Unknown")).enumerate().map(unknown).collect()
     }
 }
 
-fn children<'n, 'i>(node: Node<'n, 'i>, name: &'static str) -> impl Iterator<Item = Node<'n, 'i>> {
-    node.children().filter(move |n| n.has_tag_name(name))
+/// A causality of FMI 2.0.
+fn causality(word: &str) -> Option<Causality> {
+    Causality::parse(word).filter(|_| Causality::WORDS_OF_FMI2.contains(&word))
 }
 
-fn list<'n, 'i>(
-    root: Node<'n, 'i>,
-    outer: &'static str,
-    inner: &'static str,
-) -> impl Iterator<Item = Node<'n, 'i>> {
-    children(root, outer).flat_map(move |n| children(n, inner))
-}
-
-/// The attributes of an element, if it is there.
-struct At<'r, 'n, 'i> {
-    read: &'r mut Located,
-    place: Place,
-    node: Option<Node<'n, 'i>>,
-}
-
-impl<'n> At<'_, 'n, '_> {
-    fn attribute(&self, name: &str) -> Option<&'n str> {
-        self.node?.attribute(name)
-    }
-
-    /// Reads a value; one that cannot be read is noted.
-    fn value<T>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
-        let text = self.attribute(name)?;
-        let value = parse(text);
-        if value.is_none() {
-            self.read.unread.insert((self.place, name));
-        }
-        value
-    }
-
-    /// Reads a value that must be there; one that is missing is noted too.
-    fn required<T: Default>(&mut self, name: &'static str, parse: impl FnOnce(&str) -> Option<T>) -> T {
-        if self.attribute(name).is_none() {
-            self.read.unread.insert((self.place, name));
-        }
-        self.value(name, parse).unwrap_or_default()
-    }
-
-    fn flag(&mut self, name: &'static str) -> bool {
-        self.value(name, boolean).unwrap_or(false)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.optional(name).unwrap_or_default()
-    }
-
-    fn optional(&self, name: &str) -> Option<String> {
-        self.attribute(name).map(str::to_owned)
-    }
-
+impl At<'_, '_, '_> {
     /// Reads the start value of a variable; one that cannot be read is noted as the variable's.
     fn start<T>(&mut self, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let Place::Variable(v) = self.place else { return None };
-        At { read: &mut *self.read, place: Place::Start(v), node: self.node }.value("start", parse)
+        self.notes.at(Place::Start(v), self.node).value("start", parse)
     }
 
     fn integer(&mut self) -> Integer {

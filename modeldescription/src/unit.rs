@@ -19,7 +19,7 @@ pub struct Unit {
     pub display_units: Vec<DisplayUnit>,
 }
 
-/// A unit to show values in: `x` of the unit is shown as `factor * x + offset`.
+/// A unit to show values in: `x` of the unit is shown as `factor * x + offset`, or as `factor / x` if `inverse`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// The name, for example `deg`; unique among the display units of the unit, not empty, one line.
@@ -31,6 +31,10 @@ pub struct DisplayUnit {
     /// Value in display units at 0 of the unit; finite, default 0.
     #[serde(rename = "@offset", skip_serializing_if = "xsd::is_default", serialize_with = "xsd::number")]
     pub offset: f64,
+    /// The unit is the inverse, such as litres per kilometre of kilometres per litre; without offset, default false.
+    /// FMI 2.0 has no such units.
+    #[serde(rename = "@inverse", skip_serializing_if = "xsd::is_default")]
+    pub inverse: bool,
 }
 
 /// A product of powers of the SI base units (and of the radian), with scale and offset.

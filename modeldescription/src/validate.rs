@@ -7,8 +7,12 @@
 use crate::calendar::is_utc_instant;
 use crate::names::{forbidden_character, is_one_line};
 use crate::rules::{Check, Place, Unread, Violation};
+use crate::xml::Header;
 use crate::xsd::Number;
-use crate::{BaseType, Error, ModelDescription, Real, ScalarType, SimpleType, Variable, VariableKind};
+use crate::{
+    BaseType, EnumerationItem, Error, LogCategory, ModelDescription, Real, ScalarType, Unit, Variable,
+    VariableKind,
+};
 use std::collections::HashMap;
 
 impl ModelDescription {
@@ -36,13 +40,15 @@ impl ModelDescription {
         if let Some(Violation { rule, place, message }) = broken {
             return Err(Error::rule(rule, path(self, place), message));
         }
-        header(self)?;
-        units(self)?;
-        types(self)?;
-        for (c, category) in self.log_categories.iter().enumerate() {
-            name(format!("log_categories[{c}].name"), &category.name)?;
-            text(format!("log_categories[{:?}].description", category.name), &category.description)?;
+        header("guid", &self.header())?;
+        source_files(self)?;
+        units(&self.units)?;
+        if let Some(unit) = self.units.iter().find(|unit| unit.display_units.iter().any(|of| of.inverse)) {
+            let path = format!("units[{:?}].display_units.inverse", unit.name);
+            return Err(Error::invalid(path, true, "false, as FMI 2.0 has no inverse units"));
         }
+        types(self)?;
+        categories(&self.log_categories)?;
         variables(self)?;
         self.structure().map(drop)
     }
@@ -67,25 +73,22 @@ fn path(description: &ModelDescription, place: Place) -> String {
         Place::Item(t, i) => format!("{}.items[{i}]", of_type(t)),
         Place::Variable(v) => format!("variables[{:?}]", description.variables[v].name),
         Place::Start(v) => variable_path(&description.variables[v], "start"),
-        Place::Root | Place::Unknowns(_) | Place::Unknown(..) => "description".to_owned(),
+        Place::Root | Place::Unknowns(_) | Place::Unknown(..) | Place::Alias(..) => "description".to_owned(),
     }
 }
 
-fn header(description: &ModelDescription) -> Result<(), Error> {
-    required("model_name", &description.model_name)?;
-    line("guid", &description.guid)?;
-    text("model_name", &description.model_name)?;
-    text("description", &description.description)?;
-    text("author", &description.author)?;
-    line("version", &description.version)?;
-    text("copyright", &description.copyright)?;
-    text("license", &description.license)?;
-    line("generation_tool", &description.generation_tool)?;
-    for name in &description.co_simulation.source_files {
-        required("co_simulation.source_files", name)?;
-        line("co_simulation.source_files", name)?;
-    }
-    match &description.generation_date_and_time {
+/// Checks the texts of the root; `token` is the path of the one that ties description and library together.
+pub(crate) fn header(token: &str, header: &Header<'_>) -> Result<(), Error> {
+    required("model_name", header.model_name)?;
+    line(token, header.token.1)?;
+    text("model_name", header.model_name)?;
+    text("description", header.description)?;
+    text("author", header.author)?;
+    line("version", header.model_version)?;
+    text("copyright", header.copyright)?;
+    text("license", header.license)?;
+    line("generation_tool", header.generation_tool)?;
+    match header.generation_date_and_time {
         Some(instant) if !is_utc_instant(instant) => {
             let allowed = "an instant in UTC as YYYY-MM-DDThh:mm:ssZ";
             Err(Error::invalid("generation_date_and_time", format!("{instant:?}"), allowed))
@@ -94,8 +97,17 @@ fn header(description: &ModelDescription) -> Result<(), Error> {
     }
 }
 
-fn units(description: &ModelDescription) -> Result<(), Error> {
-    for (u, unit) in description.units.iter().enumerate() {
+fn source_files(description: &ModelDescription) -> Result<(), Error> {
+    for name in &description.co_simulation.source_files {
+        required("co_simulation.source_files", name)?;
+        line("co_simulation.source_files", name)?;
+    }
+    Ok(())
+}
+
+/// Checks names and scales of units.
+pub(crate) fn units(units: &[Unit]) -> Result<(), Error> {
+    for (u, unit) in units.iter().enumerate() {
         name(format!("units[{u}].name"), &unit.name)?;
         let path = |field: &str| format!("units[{:?}].{field}", unit.name);
         if let Some(base) = unit.base {
@@ -106,6 +118,15 @@ fn units(description: &ModelDescription) -> Result<(), Error> {
             name(path("display_units.name"), &display.name)?;
             finite(path("display_units.offset"), display.offset)?;
         }
+    }
+    Ok(())
+}
+
+/// Checks the texts of log categories.
+pub(crate) fn categories(categories: &[LogCategory]) -> Result<(), Error> {
+    for (c, category) in categories.iter().enumerate() {
+        name(format!("log_categories[{c}].name"), &category.name)?;
+        text(format!("log_categories[{:?}].description", category.name), &category.description)?;
     }
     Ok(())
 }
@@ -123,21 +144,25 @@ fn types(description: &ModelDescription) -> Result<(), Error> {
                 "no declared type, no start value",
             ));
         }
-        items(&path, declared)?;
+        items(&path, declared.kind.scalar_type() == ScalarType::Enumeration, &declared.items)?;
     }
     Ok(())
 }
 
-fn items(path: &impl Fn(&str) -> String, declared: &SimpleType) -> Result<(), Error> {
-    let enumeration = declared.kind.scalar_type() == ScalarType::Enumeration;
-    match (enumeration, declared.items.is_empty()) {
+/// Checks the items of a declared type, which only an enumeration has.
+pub(crate) fn items<V>(
+    path: &impl Fn(&str) -> String,
+    is_enumeration: bool,
+    items: &[EnumerationItem<V>],
+) -> Result<(), Error> {
+    match (is_enumeration, items.is_empty()) {
         (true, true) => return Err(Error::invalid(path("items"), "empty", "at least one item")),
         (false, false) => {
             return Err(Error::invalid(path("items"), "given", "nothing, as this is no enumeration"));
         }
         _ => {}
     }
-    for (i, item) in declared.items.iter().enumerate() {
+    for (i, item) in items.iter().enumerate() {
         name(path(&format!("items[{i}].name")), &item.name)?;
         text(path(&format!("items[{:?}].description", item.name)), &item.description)?;
     }
@@ -171,15 +196,7 @@ fn variables(description: &ModelDescription) -> Result<(), Error> {
 fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error> {
     match kind {
         VariableKind::Real(Real { quantity, min, max, nominal, start, .. }) => {
-            bound(path("min"), *min, f64::NEG_INFINITY)?;
-            bound(path("max"), *max, f64::INFINITY)?;
-            if let Some(start) = start
-                && !(start.is_finite() || (start.is_infinite() && [*min, *max].contains(&Some(*start))))
-            {
-                let allowed = "finite, or infinite where the bound on that side is";
-                return Err(Error::invalid(path("start"), Number(*start), allowed));
-            }
-            nominal.map_or(Ok(()), |nominal| positive(path("nominal"), nominal))?;
+            numbers(path, *min, *max, *nominal, start.as_slice())?;
             quantity.as_deref().map_or(Ok(()), |quantity| line(path("quantity"), quantity))
         }
         VariableKind::Integer(of) | VariableKind::Enumeration(of) => {
@@ -188,6 +205,25 @@ fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error
         VariableKind::Boolean(_) => Ok(()),
         VariableKind::String(of) => of.start.as_deref().map_or(Ok(()), |start| text(path("start"), start)),
     }
+}
+
+/// Checks bounds, nominal value and start values of a floating-point number.
+pub(crate) fn numbers(
+    path: &impl Fn(&str) -> String,
+    min: Option<f64>,
+    max: Option<f64>,
+    nominal: Option<f64>,
+    starts: &[f64],
+) -> Result<(), Error> {
+    bound(path("min"), min, f64::NEG_INFINITY)?;
+    bound(path("max"), max, f64::INFINITY)?;
+    for start in starts {
+        if !(start.is_finite() || (start.is_infinite() && [min, max].contains(&Some(*start)))) {
+            let allowed = "finite, or infinite where the bound on that side is";
+            return Err(Error::invalid(path("start"), Number(*start), allowed));
+        }
+    }
+    nominal.map_or(Ok(()), |nominal| positive(path("nominal"), nominal))
 }
 
 fn bound(path: String, value: Option<f64>, infinity: f64) -> Result<(), Error> {
@@ -199,7 +235,7 @@ fn bound(path: String, value: Option<f64>, infinity: f64) -> Result<(), Error> {
     }
 }
 
-fn positive(path: impl Into<String>, value: f64) -> Result<(), Error> {
+pub(crate) fn positive(path: impl Into<String>, value: f64) -> Result<(), Error> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
@@ -211,16 +247,16 @@ fn finite(path: impl Into<String>, value: f64) -> Result<(), Error> {
 }
 
 /// Checks a name: not empty, one line.
-fn name(path: String, name: &str) -> Result<(), Error> {
+pub(crate) fn name(path: String, name: &str) -> Result<(), Error> {
     required(path.as_str(), name)?;
     line(path, name)
 }
 
-fn required(path: impl Into<String>, value: &str) -> Result<(), Error> {
+pub(crate) fn required(path: impl Into<String>, value: &str) -> Result<(), Error> {
     if value.is_empty() { Err(Error::invalid(path, "\"\"", "a non-empty text")) } else { Ok(()) }
 }
 
-fn text(path: impl Into<String>, value: &str) -> Result<(), Error> {
+pub(crate) fn text(path: impl Into<String>, value: &str) -> Result<(), Error> {
     match forbidden_character(value) {
         Some(c) => {
             let value = format!("{value:?}");
@@ -230,7 +266,7 @@ fn text(path: impl Into<String>, value: &str) -> Result<(), Error> {
     }
 }
 
-fn line(path: impl Into<String>, value: &str) -> Result<(), Error> {
+pub(crate) fn line(path: impl Into<String>, value: &str) -> Result<(), Error> {
     let path = path.into();
     if !is_one_line(value) {
         return Err(Error::invalid(path, format!("{value:?}"), "one line without tabs"));

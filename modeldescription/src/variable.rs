@@ -19,10 +19,17 @@ pub enum Causality {
     Local,
     /// The independent variable, usually time. At most one, Real and without start value.
     Independent,
+    /// Set by the importer before initialization; can be the size of arrays. In FMI 3.0 only.
+    StructuralParameter,
 }
 
 words!(Causality: Parameter "parameter", CalculatedParameter "calculatedParameter", Input "input", Output "output",
-    Local "local", Independent "independent");
+    Local "local", Independent "independent", StructuralParameter "structuralParameter");
+
+impl Causality {
+    /// The spellings that FMI 2.0 has.
+    pub const WORDS_OF_FMI2: &'static [&'static str] = Self::WORDS.split_at(6).0;
+}
 
 /// The instants at which a variable may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -95,6 +102,16 @@ impl InitialRule {
             (V::Discrete | V::Continuous, C::Input) => Some(D_E),
             (V::Continuous, C::Independent) => Some(D_E),
             _ => None,
+        }
+    }
+
+    /// The same for FMI 3.0. There structural parameters are as parameters, and inputs are exact.
+    pub fn of_fmi3(causality: Causality, variability: Variability) -> Option<Self> {
+        let exact = Self { default: Some(Initial::Exact), allowed: &[Initial::Exact] };
+        match causality {
+            Causality::StructuralParameter => Self::of(Causality::Parameter, variability),
+            Causality::Input => Self::of(causality, variability).map(|_| exact),
+            _ => Self::of(causality, variability),
         }
     }
 }

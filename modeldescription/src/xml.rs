@@ -5,8 +5,8 @@
 //! the file should not have to know the table of defaults.
 
 use crate::{
-    CoSimulation, DefaultExperiment, EnumerationItem, Error, LogCategory, ModelDescription, ModelStructure,
-    SimpleType, Unit, Unknown, Variable, VariableKind,
+    DefaultExperiment, EnumerationItem, Error, LogCategory, ModelDescription, ModelStructure,
+    NamingConvention, SimpleType, Unit, Unknown, Variable, VariableKind,
 };
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -21,7 +21,23 @@ impl ModelDescription {
     /// Those of [`validate`](Self::validate).
     pub fn to_xml(&self) -> Result<String, Error> {
         self.validate()?;
-        text(&Root::new(self, &self.structure()?))
+        text(&Root { description: self, structure: &self.structure()? })
+    }
+
+    pub(crate) fn header(&self) -> Header<'_> {
+        Header {
+            version: "2.0",
+            model_name: &self.model_name,
+            token: ("@guid", &self.guid),
+            description: &self.description,
+            author: &self.author,
+            model_version: &self.version,
+            copyright: &self.copyright,
+            license: &self.license,
+            generation_tool: &self.generation_tool,
+            generation_date_and_time: self.generation_date_and_time.as_deref(),
+            variable_naming_convention: self.variable_naming_convention,
+        }
     }
 }
 
@@ -40,45 +56,106 @@ pub(crate) fn container<T, L: AsRef<[T]>, C>(children: L, container: impl FnOnce
     (!children.as_ref().is_empty()).then(|| container(children))
 }
 
-#[derive(Serialize)]
-#[serde(rename = "fmiModelDescription")]
+/// The attributes of the root that both versions of the standard have.
+pub(crate) struct Header<'a> {
+    /// The value of `fmiVersion`.
+    pub(crate) version: &'static str,
+    pub(crate) model_name: &'a str,
+    /// Name and value of the attribute that ties description and library together.
+    pub(crate) token: (&'static str, &'a str),
+    pub(crate) description: &'a str,
+    pub(crate) author: &'a str,
+    pub(crate) model_version: &'a str,
+    pub(crate) copyright: &'a str,
+    pub(crate) license: &'a str,
+    pub(crate) generation_tool: &'a str,
+    pub(crate) generation_date_and_time: Option<&'a str>,
+    pub(crate) variable_naming_convention: NamingConvention,
+}
+
+impl Header<'_> {
+    /// Writes the attributes.
+    pub(crate) fn write<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
+        element.serialize_field("@fmiVersion", self.version)?;
+        element.serialize_field("@modelName", self.model_name)?;
+        element.serialize_field(self.token.0, self.token.1)?;
+        for (name, value) in [
+            ("@description", self.description),
+            ("@author", self.author),
+            ("@version", self.model_version),
+            ("@copyright", self.copyright),
+            ("@license", self.license),
+            ("@generationTool", self.generation_tool),
+        ] {
+            unless_empty(element, name, value)?;
+        }
+        optional(element, "@generationDateAndTime", self.generation_date_and_time.as_ref())?;
+        element.serialize_field("@variableNamingConvention", self.variable_naming_convention.as_str())
+    }
+}
+
+/// Writes a field that is there.
+pub(crate) fn optional<E: SerializeStruct, T: Serialize>(
+    element: &mut E,
+    name: &'static str,
+    value: Option<T>,
+) -> Result<(), E::Error> {
+    value.map_or(Ok(()), |value| element.serialize_field(name, &value))
+}
+
+/// Writes a text that is not empty.
+pub(crate) fn unless_empty<E: SerializeStruct>(
+    element: &mut E,
+    name: &'static str,
+    value: &str,
+) -> Result<(), E::Error> {
+    optional(element, name, (!value.is_empty()).then_some(value))
+}
+
+/// Writes a flag or number that is not at its default.
+pub(crate) fn unless_default<E: SerializeStruct, T: Serialize + Default + PartialEq>(
+    element: &mut E,
+    name: &'static str,
+    value: T,
+) -> Result<(), E::Error> {
+    optional(element, name, (value != T::default()).then_some(value))
+}
+
+/// Writes the list of units, if there are any.
+pub(crate) fn units<E: SerializeStruct>(element: &mut E, units: &[Unit]) -> Result<(), E::Error> {
+    optional(element, "UnitDefinitions", container(units, |units| UnitDefinitions { units }))
+}
+
+/// Writes the list of log categories, if there are any, and the experiment.
+pub(crate) fn categories_and_experiment<E: SerializeStruct>(
+    element: &mut E,
+    categories: &[LogCategory],
+    experiment: Option<DefaultExperiment>,
+) -> Result<(), E::Error> {
+    let categories = container(categories, |categories| LogCategories { categories });
+    optional(element, "LogCategories", categories)?;
+    optional(element, "DefaultExperiment", experiment)
+}
+
 struct Root<'a> {
-    #[serde(rename = "@fmiVersion")]
-    fmi_version: &'static str,
-    #[serde(rename = "@modelName")]
-    model_name: &'a str,
-    #[serde(rename = "@guid")]
-    guid: &'a str,
-    #[serde(rename = "@description", skip_serializing_if = "str::is_empty")]
-    description: &'a str,
-    #[serde(rename = "@author", skip_serializing_if = "str::is_empty")]
-    author: &'a str,
-    #[serde(rename = "@version", skip_serializing_if = "str::is_empty")]
-    version: &'a str,
-    #[serde(rename = "@copyright", skip_serializing_if = "str::is_empty")]
-    copyright: &'a str,
-    #[serde(rename = "@license", skip_serializing_if = "str::is_empty")]
-    license: &'a str,
-    #[serde(rename = "@generationTool", skip_serializing_if = "str::is_empty")]
-    generation_tool: &'a str,
-    #[serde(rename = "@generationDateAndTime", skip_serializing_if = "Option::is_none")]
-    generation_date_and_time: Option<&'a str>,
-    #[serde(rename = "@variableNamingConvention")]
-    variable_naming_convention: &'static str,
-    #[serde(rename = "CoSimulation")]
-    co_simulation: &'a CoSimulation,
-    #[serde(rename = "UnitDefinitions", skip_serializing_if = "Option::is_none")]
-    units: Option<UnitDefinitions<'a>>,
-    #[serde(rename = "TypeDefinitions", skip_serializing_if = "Option::is_none")]
-    types: Option<TypeDefinitions<'a>>,
-    #[serde(rename = "LogCategories", skip_serializing_if = "Option::is_none")]
-    log_categories: Option<LogCategories<'a>>,
-    #[serde(rename = "DefaultExperiment", skip_serializing_if = "Option::is_none")]
-    default_experiment: Option<DefaultExperiment>,
-    #[serde(rename = "ModelVariables")]
-    variables: ModelVariables<'a>,
-    #[serde(rename = "ModelStructure")]
-    structure: Structure<'a>,
+    description: &'a ModelDescription,
+    structure: &'a ModelStructure,
+}
+
+impl Serialize for Root<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let d = self.description;
+        let mut element = serializer.serialize_struct("fmiModelDescription", 18)?;
+        d.header().write(&mut element)?;
+        element.serialize_field("CoSimulation", &d.co_simulation)?;
+        units(&mut element, &d.units)?;
+        let types = container(d.types.as_slice(), |types| TypeDefinitions { types });
+        optional(&mut element, "TypeDefinitions", types)?;
+        categories_and_experiment(&mut element, &d.log_categories, d.default_experiment)?;
+        element.serialize_field("ModelVariables", &ModelVariables { variables: &d.variables })?;
+        element.serialize_field("ModelStructure", &Structure::new(self.structure))?;
+        element.end()
+    }
 }
 
 #[derive(Serialize)]
@@ -121,32 +198,13 @@ struct Unknowns<'a> {
     unknowns: &'a [Unknown],
 }
 
-impl<'a> Root<'a> {
-    fn new(d: &'a ModelDescription, structure: &'a ModelStructure) -> Self {
+impl<'a> Structure<'a> {
+    fn new(structure: &'a ModelStructure) -> Self {
         let unknowns = |list: &'a Vec<Unknown>| container(list.as_slice(), |unknowns| Unknowns { unknowns });
         Self {
-            fmi_version: "2.0",
-            model_name: &d.model_name,
-            guid: &d.guid,
-            description: &d.description,
-            author: &d.author,
-            version: &d.version,
-            copyright: &d.copyright,
-            license: &d.license,
-            generation_tool: &d.generation_tool,
-            generation_date_and_time: d.generation_date_and_time.as_deref(),
-            variable_naming_convention: d.variable_naming_convention.as_str(),
-            co_simulation: &d.co_simulation,
-            units: container(d.units.as_slice(), |units| UnitDefinitions { units }),
-            types: container(d.types.as_slice(), |types| TypeDefinitions { types }),
-            log_categories: container(d.log_categories.as_slice(), |categories| LogCategories { categories }),
-            default_experiment: d.default_experiment,
-            variables: ModelVariables { variables: &d.variables },
-            structure: Structure {
-                outputs: unknowns(&structure.outputs),
-                derivatives: unknowns(&structure.derivatives),
-                initial_unknowns: unknowns(&structure.initial_unknowns),
-            },
+            outputs: unknowns(&structure.outputs),
+            derivatives: unknowns(&structure.derivatives),
+            initial_unknowns: unknowns(&structure.initial_unknowns),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The simple types of XML Schema that the FMI 2.0 schema uses, written and read.
+//! The simple types of XML Schema that the schemas of FMI use, written and read.
 //!
 //! Doubles are written so that they read back as exactly the same bits (NaN payloads aside).
 
@@ -70,19 +70,34 @@ pub fn boolean(text: &str) -> Option<bool> {
     }
 }
 
+/// An integer of this type: `xs:int`, `xs:unsignedLong` and the like.
+pub fn integer<T: TryFrom<i128>>(text: &str) -> Option<T> {
+    T::try_from(trimmed(text).parse::<i128>().ok()?).ok()
+}
+
 /// An `xs:int`.
 pub fn int(text: &str) -> Option<i32> {
-    trimmed(text).parse().ok()
+    integer(text)
 }
 
 /// An `xs:unsignedInt`.
 pub fn unsigned(text: &str) -> Option<u32> {
-    let text = trimmed(text);
-    // "-0" is an unsigned integer too.
-    if text.strip_prefix('-').is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b == b'0')) {
-        return Some(0);
-    }
-    text.parse().ok()
+    integer(text)
+}
+
+/// An `xs:float`, as a double.
+pub fn float(text: &str) -> Option<f64> {
+    // The digits are rounded once, to 32 bits.
+    double(text)?;
+    trimmed(text).parse::<f32>().ok().map(f64::from)
+}
+
+/// An `xs:hexBinary`.
+pub fn hexadecimal(text: &str) -> Option<Vec<u8>> {
+    let digits: Vec<u8> =
+        trimmed(text).chars().map(|c| u8::try_from(c.to_digit(16)?).ok()).collect::<Option<_>>()?;
+    let (pairs, rest) = digits.as_chunks::<2>();
+    rest.is_empty().then(|| pairs.iter().map(|[high, low]| high << 4 | low).collect())
 }
 
 /// An `xs:double`. Rust reads more words than the schema: `inf`, `infinity`, `nan`.

@@ -75,7 +75,7 @@ defects! {
     same_unit_twice: r#"units["m"]: the unit "m" is defined twice"#,
         |d| d.units.push(unit("m", Default::default()));
     display_unit_without_scale: r#"units["m"].display_units[0]: the unit "km" has the factor 0; must be finite and not 0"#,
-        |d| d.units[0].display_units.push(DisplayUnit { name: "km".into(), factor: 0.0, offset: 0.0 });
+        |d| d.units[0].display_units.push(DisplayUnit { name: "km".into(), factor: 0.0, offset: 0.0, inverse: false });
     unit_without_scale: r#"units["m"]: the unit "m" has the factor 0; must be finite and not 0"#,
         |d| d.units[0].base.as_mut().unwrap().factor = 0.0;
     unit_turned_around: r#"units["m"].base.factor is -2.0; allowed: finite and greater than 0"#,

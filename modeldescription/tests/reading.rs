@@ -23,7 +23,12 @@ fn full() -> ModelDescription {
     let mut description = small();
     description.co_simulation.source_files = vec!["all.c".into(), "more.c".into()];
     description.co_simulation.max_output_derivative_order = 2;
-    description.units[0].display_units.push(DisplayUnit { name: "mm".into(), factor: 1000.0, offset: -0.5 });
+    description.units[0].display_units.push(DisplayUnit {
+        name: "mm".into(),
+        factor: 1000.0,
+        offset: -0.5,
+        inverse: false,
+    });
     description.units[2].base = None;
     let VariableKind::Real(length) = description.variables[0].kind.clone() else { panic!("a Real") };
     let kind = punctual_modeldescription::Real { start: None, display_unit: Some("mm".into()), ..length };

@@ -73,25 +73,56 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
 ];
 
-/// A list of [`ModelStructure`](crate::ModelStructure).
+/// A list of [`ModelStructure`](crate::ModelStructure), by its name in FMI 2.0 or its element in FMI 3.0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum UnknownList {
-    /// `Outputs`.
+    /// `Outputs` or `Output`.
     Outputs,
-    /// `Derivatives`.
+    /// `Derivatives` or `ContinuousStateDerivative`.
     Derivatives,
-    /// `InitialUnknowns`.
+    /// `ClockedState`; in FMI 3.0 only.
+    ClockedStates,
+    /// `InitialUnknowns` or `InitialUnknown`.
     InitialUnknowns,
+    /// `EventIndicator`; in FMI 3.0 only.
+    EventIndicators,
 }
 
-crate::words::words!(UnknownList: Outputs "Outputs", Derivatives "Derivatives", InitialUnknowns "InitialUnknowns");
+impl UnknownList {
+    /// All of them, in the order of FMI 3.0.
+    pub const ALL: [Self; 5] =
+        [Self::Outputs, Self::Derivatives, Self::ClockedStates, Self::InitialUnknowns, Self::EventIndicators];
+
+    /// The name of the list, in FMI 2.0 that of its element.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Outputs => "Outputs",
+            Self::Derivatives => "Derivatives",
+            Self::ClockedStates => "ClockedStates",
+            Self::InitialUnknowns => "InitialUnknowns",
+            Self::EventIndicators => "EventIndicators",
+        }
+    }
+
+    /// The element of each of its variables in FMI 3.0.
+    pub const fn element(self) -> &'static str {
+        match self {
+            Self::Outputs => "Output",
+            Self::Derivatives => "ContinuousStateDerivative",
+            Self::ClockedStates => "ClockedState",
+            Self::InitialUnknowns => "InitialUnknown",
+            Self::EventIndicators => "EventIndicator",
+        }
+    }
+}
 
 /// A place in a description; numbers are positions in its lists, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Place {
     /// The whole.
     Root,
-    /// A co-simulation interface: the model's is the first.
+    /// An interface. In FMI 2.0 one for co-simulation: the model's is the first. In FMI 3.0 the one for model exchange,
+    /// co-simulation or scheduled execution, in this order.
     Interface(usize),
     /// The default experiment.
     Experiment,
@@ -109,6 +140,8 @@ pub enum Place {
     Variable(usize),
     /// The start value of a variable.
     Start(usize),
+    /// A variable, and one of its aliases.
+    Alias(usize, usize),
     /// A list of the structure.
     Unknowns(UnknownList),
     /// One of a list of the structure.

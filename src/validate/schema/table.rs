@@ -91,7 +91,7 @@ const fn row(kind: &'static str, attributes: &'static [Attribute], children: &'s
     Element { kind, attributes, children, content: Content::Elements }
 }
 
-const CAUSALITY: Value = OneOf(Causality::WORDS);
+const CAUSALITY: Value = OneOf(Causality::WORDS_OF_FMI2);
 const VARIABILITY: Value = OneOf(Variability::WORDS);
 const INITIAL: Value = OneOf(Initial::WORDS);
 const NAMING: Value = OneOf(NamingConvention::WORDS);
