@@ -4,6 +4,7 @@
 //! running instance are both read from it.
 
 mod arrays;
+mod description;
 mod outputs;
 
 pub(crate) use arrays::Access;
