@@ -75,7 +75,7 @@ pub enum FmuProblem {
         /// The greatest value allowed.
         allowed: u64,
     },
-    /// The model description is missing, not FMI 2.0, or malformed; with the reason.
+    /// The model description is missing, of another version, or malformed; with the reason.
     Description(String),
     /// It offers no co-simulation interface.
     NoCoSimulation,
@@ -90,14 +90,18 @@ pub enum FmuProblem {
     },
     /// The shared library cannot be loaded; with the loader's words.
     Load(String),
+    /// It needs what this program does not offer; with the reason.
+    CannotRun(String),
     /// The shared library lacks a function that co-simulation needs.
     MissingSymbol(&'static str),
-    /// `fmi2GetVersion` or `fmi2GetTypesPlatform` gave something else than FMI 2.0.
+    /// A function that tells the version gave something else than the description.
     Version {
         /// The function asked.
         call: &'static str,
         /// Its answer.
         answer: String,
+        /// The version that the description says.
+        wanted: &'static str,
     },
 }
 
@@ -143,7 +147,8 @@ impl fmt::Display for FmuProblem {
                 }
             }
             Self::MissingSymbol(name) => write!(f, "its library does not export {name}"),
-            Self::Version { call, answer } => write!(f, "{call} answered {answer:?}, not FMI 2.0"),
+            Self::Version { call, answer, wanted } => write!(f, "{call} answered {answer:?}, not {wanted}"),
+            Self::CannotRun(reason) => write!(f, "cannot be run here: {reason}"),
         }
     }
 }
@@ -173,11 +178,11 @@ impl fmt::Display for CallFailure {
         }
         match self.status {
             None => f.write_str(" returned no instance")?,
-            Some(Status::DISCARD) => {
-                f.write_str(" returned fmi2Discard: it refuses this step, and steps are not retried")?;
+            Some(status) if status.is_discard() => {
+                write!(f, " returned {status}: it refuses this step, and steps are not retried")?;
             }
-            Some(Status::PENDING) => {
-                f.write_str(" returned fmi2Pending: asynchronous steps are not supported")?;
+            Some(status) if status.is_pending() => {
+                write!(f, " returned {status}: asynchronous steps are not supported")?;
             }
             Some(status) => write!(f, " returned {status}")?,
         }

@@ -109,7 +109,7 @@ impl Part<'_> {
     /// The start value of a Real variable.
     pub fn number(&self, variable: &str) -> Option<f64> {
         let description = self.model.description();
-        let start = description.variables[description.index_of(variable)?].kind.start_number();
+        let start = description.variables[description.index_of(variable)?].start;
         self.component.start.get(variable).map_or(start, StartValue::number)
     }
 
@@ -117,7 +117,7 @@ impl Part<'_> {
     pub fn filter(&self) -> Option<FilterConfiguration> {
         let mut filter = match self.model {
             Model::Own(own, _) => Some(own.configuration.clone()),
-            Model::Fmu(fmu) => fmu.resource(RESOURCE).and_then(|text| Configuration::parse(&text).ok()),
+            Model::Fmu(fmu, _) => fmu.resource(RESOURCE).and_then(|text| Configuration::parse(&text).ok()),
         }
         .and_then(|configuration| match configuration {
             Configuration::Filter(filter) => Some(filter),
@@ -136,7 +136,7 @@ impl Part<'_> {
         let mut groups: Vec<Group> = Vec::new();
         for variable in &self.model.description().variables {
             let Some(barrier) = variable.name.strip_suffix(".profile") else { continue };
-            let unit = variable.kind.unit().unwrap_or("1");
+            let unit = variable.unit.as_deref().unwrap_or("1");
             match groups.iter_mut().find(|group| group.unit == unit) {
                 Some(group) => group.barriers.push(barrier.to_owned()),
                 None => {
@@ -170,7 +170,7 @@ impl Part<'_> {
         let variables = &self.model.description().variables;
         let outputs = variables.iter().filter(|v| v.causality == Causality::Output);
         let states: Vec<_> =
-            outputs.filter_map(|v| Some((v.name.strip_prefix("x.")?, v.kind.unit()))).collect();
+            outputs.filter_map(|v| Some((v.name.strip_prefix("x.")?, v.unit.as_deref()))).collect();
         let planes = planes(&states);
         let component = &self.component.name;
         let label = |x: &str| if planes.len() == 1 { component.clone() } else { format!("{component} {x}") };

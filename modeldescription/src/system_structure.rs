@@ -87,6 +87,8 @@ pub enum ParameterValue {
     Integer(i32),
     /// A truth value.
     Boolean(bool),
+    /// A text.
+    String(String),
     /// The name of an item of an enumeration.
     Enumeration(String),
 }
@@ -165,6 +167,7 @@ impl ParameterSet {
             match value {
                 ParameterValue::Real(value) => finite(&path, *value)?,
                 ParameterValue::Enumeration(item) => named(&path, item)?,
+                ParameterValue::String(text) => carried(&path, text)?,
                 ParameterValue::Integer(_) | ParameterValue::Boolean(_) => {}
             }
         }
@@ -181,8 +184,15 @@ impl ParameterSet {
 }
 
 fn named(path: &str, name: &str) -> Result<(), Error> {
-    if name.is_empty() || forbidden_character(name).is_some() {
-        return Err(Error::invalid(path, format!("{name:?}"), "a non-empty text that XML can carry"));
+    if name.is_empty() {
+        return Err(Error::invalid(path, "\"\"", "a text that is not empty"));
+    }
+    carried(path, name)
+}
+
+fn carried(path: &str, text: &str) -> Result<(), Error> {
+    if forbidden_character(text).is_some() {
+        return Err(Error::invalid(path, format!("{text:?}"), "a text that XML can carry"));
     }
     Ok(())
 }
@@ -408,6 +418,8 @@ enum ValueElement<'a> {
     Integer(Valued<i32>),
     #[serde(rename = "ssv:Boolean")]
     Boolean(Valued<bool>),
+    #[serde(rename = "ssv:String")]
+    String(Valued<&'a str>),
     #[serde(rename = "ssv:Enumeration")]
     Enumeration(Valued<&'a str>),
 }
@@ -424,6 +436,7 @@ impl<'a> Parameter<'a> {
             ParameterValue::Real(x) => ValueElement::Real(Valued { value: Number(*x) }),
             ParameterValue::Integer(i) => ValueElement::Integer(Valued { value: *i }),
             ParameterValue::Boolean(b) => ValueElement::Boolean(Valued { value: *b }),
+            ParameterValue::String(text) => ValueElement::String(Valued { value: text }),
             ParameterValue::Enumeration(item) => ValueElement::Enumeration(Valued { value: item }),
         };
         Self { name, value }

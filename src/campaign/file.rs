@@ -19,7 +19,7 @@ use crate::coupling::{
     self, Course, Grid, InProcess, Own, Simulation, StartValue, System, check_fed, links, port,
 };
 use crate::error::Error;
-use crate::host::{Causality, Fmu, ScalarType, Variability};
+use crate::host::{Causality, DataType, Fmu, Variability};
 use crate::package;
 use crate::text;
 
@@ -296,9 +296,8 @@ impl Campaign {
             let port = port(&system, &refer, &field, name).map_err(|e| e.in_file(path))?;
             let variable = &refer[port.component].variables[port.variable];
             let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
-            let of = variable.kind.scalar_type();
-            if !settable || of != ScalarType::Real {
-                let (causality, kind) = (variable.causality.as_str(), of.as_str());
+            if !settable || variable.of != DataType::Float64 {
+                let (causality, kind) = (variable.causality.as_str(), variable.type_name);
                 let message =
                     format!("is a {kind} {causality}; only Real parameters and inputs can be varied");
                 return Err(in_file(ConfigurationError::new(field, message)));
@@ -307,12 +306,12 @@ impl Campaign {
                 let message = "is a connected input, whose values come from there";
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
-            let (min, max) = variable.kind.range();
+            let (min, max) = variable.range;
             let range = Range { min, max };
             given.push(port);
             varied.push(Varied {
                 name: name.clone(),
-                unit: variable.kind.unit().map(str::to_owned),
+                unit: variable.unit.clone(),
                 description: variable.description.clone(),
                 component: port.component,
                 reference: variable.value_reference,
@@ -537,11 +536,11 @@ fn configuration(path: &Path, field: &str) -> Result<Configuration, Error> {
     };
     let configuration = parsed(&text).map_err(|e| Error::from(e).in_file(path))?;
     let product = Product::new(configuration)?;
-    if product.guid != fmu.description().guid {
+    if product.guid != fmu.description().token {
         let message = format!(
             "{} is the work of another version of Punctual (its GUID is {}, must be {}); build it anew",
             path.display(),
-            fmu.description().guid,
+            fmu.description().token,
             product.guid
         );
         return Err(Error::configuration(field, message));

@@ -51,7 +51,7 @@ impl Measures {
             let component = &campaign.system().components()[c];
             let unit = |variable: &str| {
                 let found = description.index_of(variable).map(|i| &description.variables[i]);
-                found.and_then(|v| v.kind.unit()).unwrap_or_default().to_owned()
+                found.and_then(|v| v.unit.clone()).unwrap_or_default()
             };
             filters.push(FilterPlan {
                 component: component.name.clone(),

@@ -41,9 +41,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     output::result(&format!(
         "{}: {} with {} variables, guid {}",
         arguments.output.display(),
-        if description.description.is_empty() { &description.model_name } else { &description.description },
+        if description.text.is_empty() { &description.model_name } else { &description.text },
         description.variables.len(),
-        description.guid,
+        description.token,
     ));
     Ok(ExitCode::SUCCESS)
 }

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use punctual_modeldescription::CoSimulation;
+use punctual_modeldescription::{CoSimulation, Variable};
 use serde::Serialize;
 
-use crate::error::Error;
-use crate::host::{DefaultExperiment, Description, Fmu, Output, Variable};
+use crate::error::{Error, FmuProblem};
+use crate::host::{DefaultExperiment, Fmi2Description as Description, Fmu, Output, Written};
 use crate::output;
 
 /// Arguments of `punctual inspect`.
@@ -89,10 +89,14 @@ struct DependencyReport<'a> {
 /// The file is not a readable FMI 2.0 co-simulation FMU.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let fmu = Fmu::open(&arguments.file)?;
+    let Written::Fmi2(description) = &fmu.description().written else {
+        let problem = FmuProblem::Description("is of FMI 3.0; this command shows FMI 2.0".to_owned());
+        return Err(Error::fmu(fmu.path(), problem));
+    };
     if arguments.json {
-        output::json(&report(&fmu));
+        output::json(&report(&fmu, description));
     } else {
-        output::result(&text(&fmu));
+        output::result(&text(&fmu, description));
     }
     for problem in &fmu.description().problems {
         output::note(&format!("note: modelDescription.xml: {problem}"));
@@ -100,8 +104,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn report(fmu: &Fmu) -> Report<'_> {
-    let d = fmu.description();
+fn report<'a>(fmu: &'a Fmu, d: &'a Description) -> Report<'a> {
     let can = &d.co_simulation;
     Report {
         file: fmu.path().display().to_string(),
@@ -166,8 +169,7 @@ fn dependency_names<'a>(d: &'a Description, output: &Output) -> Vec<&'a str> {
     d.direct_inputs(output).into_iter().map(|i| d.variables[i].name.as_str()).collect()
 }
 
-fn text(fmu: &Fmu) -> String {
-    let d = fmu.description();
+fn text(fmu: &Fmu, d: &Description) -> String {
     let mut facts = vec![
         ("model", d.model_name.clone()),
         ("description", d.description.clone()),

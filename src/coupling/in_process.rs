@@ -6,6 +6,7 @@ use punctual_fmu::instance::Instance;
 
 use super::Participant;
 use crate::error::Error;
+use crate::host::DataType;
 
 /// An instance in this process.
 pub struct InProcess {
@@ -13,6 +14,8 @@ pub struct InProcess {
     instance: Instance,
     /// What the user should know of the run.
     notice: Option<String>,
+    /// Whole numbers and truth values on their way.
+    whole: Vec<i32>,
 }
 
 impl InProcess {
@@ -23,7 +26,7 @@ impl InProcess {
     /// A GUID that is not the configuration's.
     pub fn new(name: &str, configuration: Configuration, guid: &str) -> Result<Self, Error> {
         let instance = Instance::new(configuration, guid).map_err(|e| Error::broken(name, e))?;
-        Ok(Self { name: name.to_owned(), instance, notice: None })
+        Ok(Self { name: name.to_owned(), instance, notice: None, whole: Vec::new() })
     }
 
     /// The error of a refused call: the instance, the call and the time.
@@ -64,12 +67,43 @@ impl Participant for InProcess {
         enter_initialization_mode() as "fmi2EnterInitializationMode";
         exit_initialization_mode() as "fmi2ExitInitializationMode";
         terminate() as "fmi2Terminate";
-        get_real(references: &[u32], values: &mut [f64]) as "fmi2GetReal";
-        get_integer(references: &[u32], values: &mut [i32]) as "fmi2GetInteger";
-        get_boolean(references: &[u32], values: &mut [i32]) as "fmi2GetBoolean";
-        set_real(references: &[u32], values: &[f64]) as "fmi2SetReal";
-        set_integer(references: &[u32], values: &[i32]) as "fmi2SetInteger";
-        set_boolean(references: &[u32], values: &[i32]) as "fmi2SetBoolean";
+    }
+
+    fn get(&mut self, of: DataType, references: &[u32], values: &mut [f64]) -> Result<(), Error> {
+        if of == DataType::Float64 {
+            let done = self.instance.get_real(references, values);
+            return done.map_err(|reason| self.refused("fmi2GetReal", &reason));
+        }
+        self.whole.clear();
+        self.whole.resize(values.len(), 0);
+        let (call, done) = match of {
+            DataType::Boolean => ("fmi2GetBoolean", self.instance.get_boolean(references, &mut self.whole)),
+            _ => ("fmi2GetInteger", self.instance.get_integer(references, &mut self.whole)),
+        };
+        done.map_err(|reason| self.refused(call, &reason))?;
+        for (value, number) in values.iter_mut().zip(&self.whole) {
+            *value = f64::from(*number);
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, of: DataType, references: &[u32], values: &[f64]) -> Result<(), Error> {
+        if of == DataType::Float64 {
+            let done = self.instance.set_real(references, values);
+            return done.map_err(|reason| self.refused("fmi2SetReal", &reason));
+        }
+        self.whole.clear();
+        // A number beyond 32 bits becomes one that the variable refuses.
+        self.whole.extend(values.iter().map(|value| *value as i32));
+        let (call, done) = match of {
+            DataType::Boolean => ("fmi2SetBoolean", self.instance.set_boolean(references, &self.whole)),
+            _ => ("fmi2SetInteger", self.instance.set_integer(references, &self.whole)),
+        };
+        done.map_err(|reason| self.refused(call, &reason))
+    }
+
+    fn set_text(&mut self, _reference: u32, _texts: &[String]) -> Result<(), Error> {
+        Err(self.refused("fmi2SetString", "there is no text among the variables"))
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error> {

@@ -2,8 +2,9 @@
 
 use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
+use super::starts::{Start, Values};
 use super::system::System;
-use crate::host::{Causality, Description, ScalarType};
+use crate::host::{Causality, Description, Variable};
 use crate::recording::{Column, Recording};
 
 /// Rows reserved before a run; longer recordings grow while running.
@@ -21,8 +22,9 @@ impl Layout {
         self.ports.iter().position(|other| *other == port)
     }
 
-    /// Gives slots to the outputs of a component that are connected or `read`, and to its connected inputs. The
-    /// groups are outputs without feedthrough, outputs with feedthrough, inputs.
+    /// Gives slots to the outputs of a component that are connected or `read`, and to its connected inputs; of an
+    /// array to all elements as soon as one needs it. The groups are outputs without feedthrough, outputs with
+    /// feedthrough, inputs.
     pub(super) fn add(
         &mut self,
         system: &System,
@@ -31,22 +33,23 @@ impl Layout {
         links: &[Link],
         read: &[Port],
     ) -> [Group; 3] {
-        let mut parts: [Vec<(usize, u32, ScalarType)>; 3] = Default::default();
-        for (position, variable) in description.variables.iter().enumerate() {
-            let port = Port { component, variable: position };
-            let entry = (position, variable.value_reference, variable.kind.scalar_type());
-            if variable.causality == Causality::Output {
-                if read.contains(&port) || links.iter().any(|link| link.from == port) {
-                    parts[usize::from(network::has_feedthrough(
-                        &system.components()[component],
-                        description,
-                        position,
-                    ))]
-                    .push(entry);
+        let mut wanted = vec![false; description.variables.len()];
+        let ends = links.iter().flat_map(|link| [link.from, link.to]);
+        for port in ends.chain(read.iter().copied()).filter(|port| port.component == component) {
+            let variable = &description.variables[port.variable];
+            let first = port.variable - variable.element;
+            wanted[first..first + variable.count].fill(true);
+        }
+        let mut parts: [Vec<(usize, &Variable)>; 3] = Default::default();
+        for (position, variable) in description.variables.iter().enumerate().filter(|(v, _)| wanted[*v]) {
+            let part = match variable.causality {
+                Causality::Output => {
+                    let owner = &system.components()[component];
+                    usize::from(network::has_feedthrough(owner, description, position))
                 }
-            } else if links.iter().any(|link| link.to == port) {
-                parts[2].push(entry);
-            }
+                _ => 2,
+            };
+            parts[part].push((position, variable));
         }
         parts.map(|part| {
             let (group, positions) = Group::new(self.ports.len(), &part);
@@ -57,6 +60,32 @@ impl Layout {
             }
             group
         })
+    }
+
+    /// The slots of inputs of a component that no link feeds, each with its start value. There are such slots where
+    /// other elements of the same array are fed.
+    pub(super) fn constants(
+        &self,
+        component: usize,
+        description: &Description,
+        links: &[Link],
+        starts: &[Start],
+    ) -> Vec<(usize, f64)> {
+        let value = |variable: &Variable| {
+            let given = starts.iter().find(|start| variable.is(start.of, start.reference));
+            match given.map(|start| &start.values) {
+                Some(Values::Numbers(values)) => values.get(variable.element).copied(),
+                _ => variable.start,
+            }
+        };
+        let slots = self.ports.iter().enumerate().filter(|(_, port)| port.component == component);
+        let inputs = slots.map(|(slot, port)| (slot, port, &description.variables[port.variable]));
+        inputs
+            .filter(|(_, port, variable)| {
+                variable.causality != Causality::Output && links.iter().all(|link| link.to != **port)
+            })
+            .map(|(slot, _, variable)| (slot, value(variable).unwrap_or(0.0)))
+            .collect()
     }
 
     /// The sources of the inputs of a component.
@@ -107,6 +136,11 @@ impl<'a> Recorder<'a> {
             keep,
             observer,
         }
+    }
+
+    /// Has point `k` be the last of the run.
+    pub(super) fn end_at(&mut self, k: u64) {
+        self.last = k;
     }
 
     /// Records the row of point `k` at `time` (s), if one is due.

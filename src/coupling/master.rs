@@ -21,13 +21,13 @@ use std::time::{Duration, Instant};
 use super::grid::Grid;
 use super::layout::{Layout, Recorder};
 use super::model::{Model, Reader};
-use super::network::{self, Network, Start};
-use super::participant::Participant;
+use super::network::{self, Network};
 use super::ports::{Group, Source};
 use super::promises::{self, Promise, Watched};
+use super::starts::{Start, Values};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
-use crate::host::Description;
+use crate::host::{DataType, Description, Participant};
 use crate::recording::{Column, Recording};
 
 /// A component while it runs.
@@ -40,6 +40,27 @@ struct Member<P> {
     direct: Group,
     inputs: Group,
     sources: Vec<Source>,
+    /// Slots of elements of connected arrays that are not connected themselves, and their values.
+    constants: Vec<(usize, f64)>,
+}
+
+impl<P: Participant> Member<P> {
+    /// Sets its start values: those of structural parameters, or the others.
+    fn set_starts(&mut self, structural: bool) -> Result<(), Error> {
+        let participant = &mut self.participant;
+        let mut starts = self.starts.iter().filter(|start| start.structural == structural).peekable();
+        let configures = structural && starts.peek().is_some();
+        if configures {
+            participant.enter_configuration_mode()?;
+        }
+        for start in starts {
+            match &start.values {
+                Values::Numbers(values) => participant.set(start.of, &[start.reference], values)?,
+                Values::Texts(texts) => participant.set_text(start.reference, texts)?,
+            }
+        }
+        if configures { participant.exit_configuration_mode() } else { Ok(()) }
+    }
 }
 
 /// A coupled system of FMUs or of other participants, ready to run.
@@ -138,7 +159,8 @@ impl Simulation<Box<dyn Participant>> {
                 );
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            models.push(Model::open(&path, &models, read).map_err(|e| e.in_component(&component.name))?);
+            let model = Model::open(&path, &models, read).and_then(|model| model.sized(component));
+            models.push(model.map_err(|e| e.in_component(&component.name))?);
         }
         Ok((Self::of(system, &models)?, models))
     }
@@ -192,18 +214,17 @@ impl<P: Participant> Simulation<P> {
             .map(|port| {
                 let variable = &descriptions[port.component].variables[port.variable];
                 let component = &system.components()[port.component].name;
-                Column {
-                    name: format!("{component}.{}", variable.name),
-                    unit: variable.kind.unit().map(str::to_owned),
-                }
+                Column { name: format!("{component}.{}", variable.name), unit: variable.unit.clone() }
             })
             .collect();
         // Make the participants.
         let mut members = Vec::new();
         for (component, [states, direct, inputs]) in groups.into_iter().enumerate() {
+            let starts = std::mem::take(&mut starts[component]);
             members.push(Member {
                 participant: participant(component)?,
-                starts: std::mem::take(&mut starts[component]),
+                constants: layout.constants(component, descriptions[component], &links, &starts),
+                starts,
                 states,
                 direct,
                 inputs,
@@ -234,6 +255,7 @@ impl<P: Participant> Simulation<P> {
             stop: None,
         };
         simulation.note_shortened_step(descriptions);
+        simulation.note_what_is_not_recorded(descriptions);
         simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
@@ -242,10 +264,10 @@ impl<P: Participant> Simulation<P> {
     /// Gives a Real parameter or input another start value, from the next run on.
     pub fn set_start(&mut self, component: usize, reference: u32, value: f64) {
         let starts = &mut self.members[component].starts;
-        let given = starts.iter_mut().find(|s| matches!(s, Start::Real(other, _) if *other == reference));
-        match given {
-            Some(start) => *start = Start::Real(reference, value),
-            None => starts.push(Start::Real(reference, value)),
+        let start = Start::real(reference, value);
+        match starts.iter_mut().find(|start| start.number(reference).is_some()) {
+            Some(given) => *given = start,
+            None => starts.push(start),
         }
     }
 
@@ -264,7 +286,8 @@ impl<P: Participant> Simulation<P> {
         for Course { component, reference, steps, values } in &self.courses {
             let next = usize::try_from(k / steps).ok().filter(|_| k.is_multiple_of(*steps));
             if let Some(value) = next.and_then(|next| values.get(next)) {
-                self.members[*component].participant.set_real(&[*reference], &[*value])?;
+                let participant = &mut self.members[*component].participant;
+                participant.set(DataType::Float64, &[*reference], &[*value])?;
             }
         }
         Ok(())
@@ -338,6 +361,7 @@ impl<P: Participant> Simulation<P> {
     }
 
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
+        let mut end = self.grid.steps();
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
             self.check_stop(time)?;
@@ -358,9 +382,14 @@ impl<P: Participant> Simulation<P> {
             for c in 0..self.members.len() {
                 self.read_states(c, self.grid.time(k + 1))?;
             }
+            if self.is_ended(k + 1) {
+                end = k + 1;
+                break;
+            }
         }
         // Feedthrough outputs at the stop time, for FMUs that compute them on reading.
-        let (k, time) = (self.grid.steps(), self.stop_time);
+        let (k, time) = (end, self.grid.time(end));
+        recorder.end_at(k);
         for i in 0..self.direct.len() {
             let c = self.direct[i];
             self.set_inputs(c)?;
@@ -377,6 +406,7 @@ impl<P: Participant> Simulation<P> {
         for c in 0..self.members.len() {
             self.read_direct(c, self.start_time)?;
         }
+        let mut end = self.grid.steps();
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
             self.check_stop(time)?;
@@ -392,12 +422,27 @@ impl<P: Participant> Simulation<P> {
                 self.read_states(c, self.grid.time(k + 1))?;
                 self.read_direct(c, self.grid.time(k + 1))?;
             }
+            if self.is_ended(k + 1) {
+                end = k + 1;
+                break;
+            }
         }
         for c in 0..self.members.len() {
             self.set_inputs(c)?;
         }
-        self.take(recorder, self.grid.steps(), self.stop_time);
+        recorder.end_at(end);
+        self.take(recorder, end, self.grid.time(end));
         Ok(())
+    }
+
+    /// Whether an FMU asked for the end of the run in the step to point `k`; told in a note.
+    fn is_ended(&mut self, k: u64) -> bool {
+        let Some(member) = self.members.iter().find(|member| member.participant.asks_to_end()) else {
+            return false;
+        };
+        let (name, time) = (member.participant.name(), brief_time(self.grid.time(k)));
+        self.notes.push(format!("{name} asked to end the run at t = {time} s (terminateSimulation)"));
+        true
     }
 
     /// Sets start values and initialises. In initialization mode, outputs and inputs are passed on until nothing
@@ -409,11 +454,7 @@ impl<P: Participant> Simulation<P> {
         for watched in &mut self.promises {
             let starts = &self.members[watched.component].starts;
             let deadline = watched.deadline.map(|(reference, own)| {
-                let given = starts.iter().find_map(|start| match *start {
-                    Start::Real(other, value) if other == reference => Some(value),
-                    _ => None,
-                });
-                given.unwrap_or(own)
+                starts.iter().find_map(|start| start.number(reference)).unwrap_or(own)
             });
             self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
@@ -423,17 +464,11 @@ impl<P: Participant> Simulation<P> {
             if used {
                 member.participant.reset()?;
             }
+            member.set_starts(true)?;
             member.participant.setup_experiment(self.start_time, self.stop_time)?;
-            for start in &member.starts {
-                match *start {
-                    Start::Real(reference, value) => member.participant.set_real(&[reference], &[value])?,
-                    Start::Integer(reference, value) => {
-                        member.participant.set_integer(&[reference], &[value])?;
-                    }
-                    Start::Boolean(reference, value) => {
-                        member.participant.set_boolean(&[reference], &[value])?;
-                    }
-                }
+            member.set_starts(false)?;
+            for (slot, value) in &member.constants {
+                self.values[*slot] = *value;
             }
             member.participant.enter_initialization_mode()?;
         }
@@ -517,10 +552,24 @@ impl<P: Participant> Simulation<P> {
         }
     }
 
+    /// Names outputs that are no numbers.
+    fn note_what_is_not_recorded(&mut self, descriptions: &[&Description]) {
+        for (member, description) in self.members.iter().zip(descriptions) {
+            let outputs = description.outputs.iter().map(|output| &description.variables[output.variable]);
+            let names: Vec<_> = outputs
+                .filter(|v| !v.is_number())
+                .map(|v| format!("{}.{} ({})", member.participant.name(), v.name, v.type_name))
+                .collect();
+            if !names.is_empty() {
+                self.notes.push(format!("not recorded, since a row holds numbers: {}", names.join(", ")));
+            }
+        }
+    }
+
     fn note_shortened_step(&mut self, descriptions: &[&Description]) {
         let Some(last) = self.grid.shortened() else { return };
         for (member, description) in self.members.iter().zip(descriptions) {
-            if !description.co_simulation.can_handle_variable_step {
+            if !description.any_step {
                 let name = member.participant.name();
                 self.notes.push(format!(
                     "the last step is {last} s long, but the FMU of {name} does not say that it can handle steps \

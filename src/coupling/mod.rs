@@ -9,18 +9,18 @@ mod layout;
 mod master;
 mod model;
 mod network;
-mod participant;
 mod ports;
 mod promises;
+mod starts;
 mod system;
 
+pub use crate::host::Participant;
 pub use alone::alone;
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use master::{Course, Outcome, Simulation, Statistics};
 pub use model::{Model, Own, Reader};
 pub use network::{Link, Port, links, port};
-pub use participant::Participant;
 pub use promises::{Kept, Promise, check_fed};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,

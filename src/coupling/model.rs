@@ -7,9 +7,10 @@ use std::rc::Rc;
 use punctual_fmu::configuration::{Configuration, RESOURCE};
 use punctual_fmu::product::Product;
 
-use super::{InProcess, Participant};
+use super::starts;
+use super::{Component, InProcess};
 use crate::error::Error;
-use crate::host::{Description, Fmu, Slave};
+use crate::host::{Description, Fmu, Participant};
 use crate::text;
 
 /// A configuration with what an FMU of it would say.
@@ -52,8 +53,8 @@ pub type Reader = fn(&Path) -> Result<Configuration, Error>;
 
 /// An FMU, or a configuration that runs in process.
 pub enum Model {
-    /// An FMU.
-    Fmu(Rc<Fmu>),
+    /// An FMU, with the sizes of its arrays as this component has them.
+    Fmu(Rc<Fmu>, Rc<Description>),
     /// A configuration, from this file.
     Own(Box<Own>, PathBuf),
 }
@@ -69,21 +70,33 @@ impl Model {
             let own = Own::new(read(path)?)?;
             return Ok(Self::Own(Box::new(own), path.to_owned()));
         }
-        let once = |fmu: &Fmu| fmu.description().co_simulation.can_be_instantiated_only_once_per_process;
+        let once = |fmu: &Fmu| fmu.description().only_once;
         let opened = shared.iter().find_map(|model| match model {
-            Self::Fmu(fmu) if fmu.path() == path && !once(fmu) => Some(Rc::clone(fmu)),
+            Self::Fmu(fmu, _) if fmu.path() == path && !once(fmu) => Some(Rc::clone(fmu)),
             _ => None,
         });
-        if let Some(fmu) = opened {
-            return Ok(Self::Fmu(fmu));
-        }
-        Ok(Self::Fmu(Rc::new(Fmu::open(path)?)))
+        Ok(match opened {
+            Some(fmu) => fmu.into(),
+            None => Rc::new(Fmu::open(path)?).into(),
+        })
+    }
+
+    /// The same, with the sizes that the start values of `component` give to arrays.
+    ///
+    /// # Errors
+    ///
+    /// Arrays that become too large.
+    pub fn sized(self, component: &Component) -> Result<Self, Error> {
+        let Self::Fmu(fmu, description) = self else { return Ok(self) };
+        let structural = starts::structural(component, &description);
+        let sized = description.sized(&structural).map_err(|problem| Error::fmu(fmu.path(), problem))?;
+        Ok(Self::Fmu(fmu, Rc::new(sized)))
     }
 
     /// The file that it is from.
     pub fn path(&self) -> &Path {
         match self {
-            Self::Fmu(fmu) => fmu.path(),
+            Self::Fmu(fmu, _) => fmu.path(),
             Self::Own(_, path) => path,
         }
     }
@@ -91,14 +104,14 @@ impl Model {
     /// Its model description.
     pub fn description(&self) -> &Description {
         match self {
-            Self::Fmu(fmu) => fmu.description(),
+            Self::Fmu(_, description) => description,
             Self::Own(own, _) => &own.description,
         }
     }
 
     /// What to tell of an FMU of this program that is not what the configuration beside it would become.
     pub fn stale(&self) -> Option<String> {
-        let Self::Fmu(fmu) = self else { return None };
+        let Self::Fmu(fmu, _) = self else { return None };
         let inside = fmu.resource(RESOURCE)?;
         // A file that cannot be used is not what the FMU was made of, or is of something else.
         let beside = fmu.path().with_extension("toml");
@@ -115,8 +128,15 @@ impl Model {
     /// An instance called `name`.
     pub(super) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
         Ok(match self {
-            Self::Fmu(fmu) => Box::new(Slave::instantiate(Rc::clone(fmu), name)?),
+            Self::Fmu(fmu, description) => fmu.instantiate(description, name)?,
             Self::Own(own, _) => Box::new(own.instance(name)?),
         })
+    }
+}
+
+impl From<Rc<Fmu>> for Model {
+    fn from(fmu: Rc<Fmu>) -> Self {
+        let description = Rc::clone(fmu.description());
+        Self::Fmu(fmu, description)
     }
 }

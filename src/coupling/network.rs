@@ -2,9 +2,10 @@
 //! which field of the file it comes from. Runs nothing.
 
 use super::graph::{self, Edge};
-use super::system::{Component, Picture, StartValue, System};
+use super::starts::{self, Start};
+use super::system::{Component, Picture, System};
 use crate::error::Error;
-use crate::host::{Causality, Description, Output, ScalarType, Variable};
+use crate::host::{Array, Causality, DataType, Description, Family, Output, Variable};
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,14 +29,6 @@ pub struct Link {
     pub offset: f64,
 }
 
-/// A resolved start value: Reals as they are, others as integers (Booleans 0 or 1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Start {
-    Real(u32, f64),
-    Integer(u32, i32),
-    Boolean(u32, i32),
-}
-
 /// The resolved system.
 #[derive(Debug)]
 pub(super) struct Network {
@@ -56,7 +49,12 @@ pub(super) struct Network {
 pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<Network, Error> {
     let resolver = Resolver { system, descriptions };
     let links = resolver.links()?;
-    let starts = resolver.starts()?;
+    let of_component = |c: usize| {
+        let component = &system.components()[c];
+        let unknown = |name: &str| resolver.missing(c, name);
+        starts::resolve(c, component, descriptions[c], unknown)
+    };
+    let starts = (0..descriptions.len()).map(of_component).collect::<Result<_, _>>()?;
     let recorded = resolver.recorded(&links)?;
     resolver.check_pictures(&recorded)?;
     let (direct, delayed, notes) = resolver.order(&links);
@@ -109,8 +107,8 @@ impl<'a> Resolver<'a> {
         &self.descriptions[port.component].variables[port.variable]
     }
 
-    fn scalar_type(&self, port: Port) -> ScalarType {
-        self.variable(port).kind.scalar_type()
+    fn family(&self, port: Port) -> Family {
+        self.variable(port).of.family()
     }
 
     fn component_name(&self, component: usize) -> &'a str {
@@ -137,18 +135,45 @@ impl<'a> Resolver<'a> {
             ));
         };
         let component = self.component(field, component)?;
-        let variable = self.descriptions[component].index_of(variable).ok_or_else(|| {
-            Error::configuration(
-                field,
-                format!("{}{}", self.unknown(component, variable), self.similar(component, variable)),
-            )
-        })?;
+        let missing = || Error::configuration(field, self.missing(component, variable));
+        let variable = self.descriptions[component].index_of(variable).ok_or_else(missing)?;
         Ok(Port { component, variable })
     }
 
-    fn unknown(&self, component: usize, variable: &str) -> String {
-        let fmu = &self.system.components()[component].fmu;
-        format!("{} ({fmu}) has no variable {variable:?}", self.component_name(component))
+    /// The array that `text` names as a whole, if it does.
+    fn array(&self, text: &str) -> Option<(usize, &'a Array)> {
+        let (component, name) = text.split_once('.')?;
+        let component = self.system.components().iter().position(|c| c.name == component)?;
+        let description = self.descriptions[component];
+        // A scalar of the same name is meant before it.
+        let array = description.array(name).filter(|_| description.index_of(name).is_none())?;
+        Some((component, array))
+    }
+
+    /// What `text` names: a scalar, or the elements of an array and its sizes.
+    fn ports(&self, field: &str, text: &str) -> Result<(Vec<Port>, Option<&'a [usize]>), Error> {
+        let Some((component, array)) = self.array(text) else {
+            return Ok((vec![self.port(field, text)?], None));
+        };
+        let elements = array.first..array.first + array.count;
+        Ok((elements.map(|variable| Port { component, variable }).collect(), Some(&array.sizes)))
+    }
+
+    /// Why there is no scalar of this name.
+    fn missing(&self, component: usize, name: &str) -> String {
+        let (owner, description) = (&self.system.components()[component], self.descriptions[component]);
+        if let Some(array) = description.array(name) {
+            let example = description.variables.get(array.first).map(|v| format!(", such as {:?}", v.name));
+            return format!(
+                "{name:?} of {} ({}) is an array of {}; name an element{}",
+                owner.name,
+                owner.fmu,
+                sizes(&array.sizes),
+                example.unwrap_or_default()
+            );
+        }
+        let unknown = format!("{} ({}) has no variable {name:?}", owner.name, owner.fmu);
+        format!("{unknown}{}", self.similar(component, name))
     }
 
     /// A hint at variables whose name ends alike or contains the name given.
@@ -175,31 +200,54 @@ impl<'a> Resolver<'a> {
 
     fn links(&self) -> Result<Vec<Link>, Error> {
         let mut links: Vec<Link> = Vec::new();
+        // The connection that each link is from.
+        let mut owners = Vec::new();
         for (i, connection) in self.system.connections().iter().enumerate() {
             let field = format!("connection[{i}]");
-            let from = self.port(&format!("{field}.from"), &connection.from)?;
-            let to = self.port(&format!("{field}.to"), &connection.to)?;
-            self.expect_causality(&format!("{field}.from"), from, Causality::Output)?;
-            self.expect_causality(&format!("{field}.to"), to, Causality::Input)?;
-            let (factor, offset) = (connection.factor, connection.offset);
-            self.check_types(&field, from, to)?;
-            let of = self.scalar_type(to);
-            if of != ScalarType::Real && (factor != 1.0 || offset != 0.0) {
-                let kind = of.as_str();
-                let message = format!("factor and offset are for Real signals; {} is {kind}", self.name(to));
+            let (from, of) = self.ports(&format!("{field}.from"), &connection.from)?;
+            let (to, wanted) = self.ports(&format!("{field}.to"), &connection.to)?;
+            if of != wanted {
+                let shape = |sizes_of: Option<&[usize]>| {
+                    sizes_of.map_or_else(|| "a scalar".to_owned(), |of| format!("an array of {}", sizes(of)))
+                };
+                let message = format!(
+                    "{} is {}, but {} is {}; sizes must be equal",
+                    connection.from,
+                    shape(of),
+                    connection.to,
+                    shape(wanted)
+                );
                 return Err(Error::configuration(field, message));
             }
-            if let Some(other) = links.iter().position(|link| link.to == to) {
-                let message = format!("input {} is already connected by connection[{other}]", self.name(to));
-                return Err(Error::configuration(format!("{field}.to"), message));
+            for (from, to) in from.into_iter().zip(to) {
+                let (factor, offset) = (connection.factor, connection.offset);
+                if let Some(other) = links.iter().position(|link| link.to == to) {
+                    let by = owners[other];
+                    let message = format!("input {} is already connected by connection[{by}]", self.name(to));
+                    return Err(Error::configuration(format!("{field}.to"), message));
+                }
+                links.push(self.link(&field, Link { from, to, factor, offset })?);
+                owners.push(i);
             }
-            links.push(Link { from, to, factor, offset });
         }
         let explicit = links.len();
         for (i, pair) in self.system.by_name().iter().enumerate() {
             self.connect_by_name(&format!("connect_by_name[{i}]"), &pair.components, explicit, &mut links)?;
         }
         Ok(links)
+    }
+
+    /// Checks a link of scalars.
+    fn link(&self, field: &str, link: Link) -> Result<Link, Error> {
+        self.expect_causality(&format!("{field}.from"), link.from, Causality::Output)?;
+        self.expect_causality(&format!("{field}.to"), link.to, Causality::Input)?;
+        self.check_types(field, link.from, link.to)?;
+        if self.family(link.to) != Family::Real && (link.factor != 1.0 || link.offset != 0.0) {
+            let (to, kind) = (self.name(link.to), self.variable(link.to).type_name);
+            let message = format!("factor and offset are for Real signals; {to} is {kind}");
+            return Err(Error::configuration(field, message));
+        }
+        Ok(link)
     }
 
     fn connect_by_name(
@@ -217,6 +265,7 @@ impl<'a> Resolver<'a> {
         }
         let mut matches = 0;
         for (giver, reader) in [(a, b), (b, a)] {
+            self.check_sizes(field, giver, reader)?;
             for output in &self.descriptions[giver].outputs {
                 let from = Port { component: giver, variable: output.variable };
                 let Some(variable) = self.descriptions[reader].index_of(&self.variable(from).name) else {
@@ -249,68 +298,44 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
-        let (given, taken) = (self.scalar_type(from), self.scalar_type(to));
-        if given != taken {
-            let (from, to, given, taken) = (self.name(from), self.name(to), given.as_str(), taken.as_str());
-            let message = format!("{from} is {given}, but {to} is {taken}; types must be equal");
-            return Err(Error::configuration(field, message));
-        }
-        if given == ScalarType::String {
-            let message = format!("{} is String; text cannot be connected", self.name(from));
+    /// Arrays of equal name, an output and an input, must have equal sizes.
+    fn check_sizes(&self, field: &str, giver: usize, reader: usize) -> Result<(), Error> {
+        let (given, taken) = (self.descriptions[giver], self.descriptions[reader]);
+        for array in &given.arrays {
+            let is = |of: &Description, array: &Array, causality| {
+                of.variables.get(array.first).is_some_and(|v| v.causality == causality)
+            };
+            let other = taken
+                .array(&array.name)
+                .filter(|other| is(given, array, Causality::Output) && is(taken, other, Causality::Input));
+            let Some(other) = other.filter(|other| other.sizes != array.sizes) else { continue };
+            let message = format!(
+                "{}.{} is an array of {}, but {}.{} is one of {}; sizes must be equal",
+                self.component_name(giver),
+                array.name,
+                sizes(&array.sizes),
+                self.component_name(reader),
+                other.name,
+                sizes(&other.sizes)
+            );
             return Err(Error::configuration(field, message));
         }
         Ok(())
     }
 
-    fn starts(&self) -> Result<Vec<Vec<Start>>, Error> {
-        let of_component = |c: usize| {
-            let starts = &self.system.components()[c].start;
-            starts.iter().map(|(name, value)| self.start(c, name, *value)).collect::<Result<Vec<_>, _>>()
-        };
-        (0..self.descriptions.len()).map(of_component).collect()
-    }
-
-    fn start(&self, component: usize, name: &str, value: StartValue) -> Result<Start, Error> {
-        let field = format!("component[{component}].start.{name:?}");
-        let wrong = |message: String| Error::configuration(field.clone(), message);
-        let position = self.descriptions[component].index_of(name).ok_or_else(|| {
-            wrong(format!("{}{}", self.unknown(component, name), self.similar(component, name)))
-        })?;
-        let variable = &self.descriptions[component].variables[position];
-        if !matches!(variable.causality, Causality::Parameter | Causality::Input) {
-            let causality = variable.causality.as_str();
-            return Err(wrong(format!(
-                "has causality {causality}; only parameters and inputs can be given a start value"
-            )));
+    fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
+        let (given, taken) = (self.variable(from), self.variable(to));
+        let types = (given.type_name, taken.type_name);
+        if given.of.family() != taken.of.family() || given.is_number() != taken.is_number() {
+            let (from, to, (given, taken)) = (self.name(from), self.name(to), types);
+            let message = format!("{from} is {given}, but {to} is {taken}; types must be equal");
+            return Err(Error::configuration(field, message));
         }
-        let reference = variable.value_reference;
-        let (start, number) = match (variable.kind.scalar_type(), value) {
-            (ScalarType::Real, StartValue::Real(x)) => (Start::Real(reference, x), x),
-            // Beyond 2⁵³ the nearest double is taken, as for any decimal number.
-            (ScalarType::Real, StartValue::Integer(i)) => (Start::Real(reference, i as f64), i as f64),
-            (ScalarType::Integer | ScalarType::Enumeration, StartValue::Integer(i)) => {
-                let i = i32::try_from(i)
-                    .map_err(|_| wrong(format!("is {i}; must be from {} to {}", i32::MIN, i32::MAX)))?;
-                (Start::Integer(reference, i), f64::from(i))
-            }
-            (ScalarType::Boolean, StartValue::Boolean(b)) => {
-                (Start::Boolean(reference, i32::from(b)), f64::from(u8::from(b)))
-            }
-            (of, _) => return Err(wrong(format!("is of type {}; the value given is not", of.as_str()))),
-        };
-        let (min, max) = variable.kind.range();
-        let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
-        if number < min || number > max {
-            let unit = variable.kind.unit().map(|unit| format!(" {unit}")).unwrap_or_default();
-            return Err(wrong(format!("is {number}{unit}; must be {}", range(min, max, &unit))));
+        if !given.is_number() {
+            let message = format!("{} is {}; {} cannot be connected", self.name(from), types.0, unfit(given));
+            return Err(Error::configuration(field, message));
         }
-        let items = self.descriptions[component].items(variable);
-        if !items.is_empty() && !items.iter().any(|item| f64::from(item.value) == number) {
-            let items: Vec<_> = items.iter().map(|i| format!("{} ({})", i.value, i.name)).collect();
-            return Err(wrong(format!("is {number}; must be one of {}", items.join(", "))));
-        }
-        Ok(start)
+        Ok(())
     }
 
     fn recorded(&self, links: &[Link]) -> Result<Vec<Port>, Error> {
@@ -320,19 +345,22 @@ impl<'a> Resolver<'a> {
         let mut ports = Vec::with_capacity(signals.len());
         for (i, signal) in signals.iter().enumerate() {
             let field = format!("record.signals[{i}]");
-            let port = self.port(&field, signal)?;
-            let variable = self.variable(port);
-            if self.scalar_type(port) == ScalarType::String {
-                return Err(Error::configuration(field, format!("{signal} is String; text is not recorded")));
+            for port in self.ports(&field, signal)?.0 {
+                let (variable, name) = (self.variable(port), self.name(port));
+                if !variable.is_number() {
+                    let message =
+                        format!("{name} is {}; {} is not recorded", variable.type_name, unfit(variable));
+                    return Err(Error::configuration(field, message));
+                }
+                if variable.causality != Causality::Output && !links.iter().any(|link| link.to == port) {
+                    let message = format!("{name} is neither an output nor a connected input");
+                    return Err(Error::configuration(field, message));
+                }
+                if ports.contains(&port) {
+                    return Err(Error::configuration(field, format!("{name} is named twice")));
+                }
+                ports.push(port);
             }
-            if variable.causality != Causality::Output && !links.iter().any(|link| link.to == port) {
-                let message = format!("{signal} is neither an output nor a connected input");
-                return Err(Error::configuration(field, message));
-            }
-            if ports.contains(&port) {
-                return Err(Error::configuration(field, format!("{signal} is named twice")));
-            }
-            ports.push(port);
         }
         Ok(ports)
     }
@@ -345,7 +373,7 @@ impl<'a> Resolver<'a> {
         };
         let outputs = ports().filter(|&p| {
             self.variable(p).causality == Causality::Output
-                && self.scalar_type(p) != ScalarType::String
+                && self.variable(p).is_number()
                 && !self.descriptions[component].is_twin(p.variable)
         });
         let inputs = ports().filter(|p| links.iter().any(|link| link.to == *p));
@@ -426,18 +454,17 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// "≥ a", "≤ b" or "from a to b".
-fn range(min: f64, max: f64, unit: &str) -> String {
-    let number = |value: f64| {
-        let size = value.abs();
-        if size == 0.0 || (1e-4..1e7).contains(&size) { value.to_string() } else { format!("{value:e}") }
-    };
-    let (low, high) = (min.is_finite(), max.is_finite());
-    let (min, max) = (number(min), number(max));
-    match (low, high) {
-        (true, true) => format!("from {min} to {max}{unit}"),
-        (true, false) => format!("≥ {min}{unit}"),
-        _ => format!("≤ {max}{unit}"),
+/// The sizes of an array, as in `[2, 3]`.
+pub(super) fn sizes(of: &[usize]) -> String {
+    format!("{of:?}")
+}
+
+/// What a variable holds that is no number.
+fn unfit(variable: &Variable) -> &'static str {
+    match variable.of {
+        DataType::Binary => "a value of bytes",
+        DataType::Clock => "a clock",
+        _ => "text",
     }
 }
 

@@ -1,89 +1,92 @@
 //! The values of a run: one vector of doubles, in which every output and every connected input has a slot. They
 //! come from and go to instances without allocation.
 
-use super::participant::Participant;
 use crate::error::Error;
-use crate::host::ScalarType;
+use crate::host::{DataType, Family, Participant, Variable};
 
-/// Variables of one component that are read or written together, real ones first, then integers
-/// and enumerations, then Booleans; their slots follow one another in this order.
+/// Variables of one component that are read or written together, one type after another; their slots follow one
+/// another in this order. Real ones come first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Group {
     first: usize,
-    real: Vec<u32>,
-    integer: Vec<u32>,
-    boolean: Vec<u32>,
-    scratch: Vec<i32>,
+    reals: usize,
+    parts: Vec<Part>,
+}
+
+/// The variables of one type.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Part {
+    of: DataType,
+    /// Of an array one for all elements.
+    references: Vec<u32>,
+    slots: usize,
 }
 
 /// A position in a component's variable list.
 pub(super) type Position = usize;
 
+/// The types that are numbers, in the order of slots.
+const NUMBERS: [DataType; 12] = [
+    DataType::Float64,
+    DataType::Float32,
+    DataType::Int8,
+    DataType::UInt8,
+    DataType::Int16,
+    DataType::UInt16,
+    DataType::Int32,
+    DataType::UInt32,
+    DataType::Int64,
+    DataType::UInt64,
+    DataType::Enumeration,
+    DataType::Boolean,
+];
+
 impl Group {
-    /// Lays out `variables` (position, value reference, type) from slot `first` on. Returns the group and the
-    /// positions in slot order. Strings are left out.
-    pub(super) fn new(first: usize, variables: &[(Position, u32, ScalarType)]) -> (Self, Vec<Position>) {
-        let of = |wanted: &[ScalarType]| {
-            variables.iter().copied().filter(|v| wanted.contains(&v.2)).collect::<Vec<_>>()
-        };
-        let parts = [
-            of(&[ScalarType::Real]),
-            of(&[ScalarType::Integer, ScalarType::Enumeration]),
-            of(&[ScalarType::Boolean]),
-        ];
-        let positions = parts.iter().flatten().map(|v| v.0).collect();
-        let [real, integer, boolean] = parts.map(|part| part.into_iter().map(|v| v.1).collect::<Vec<_>>());
-        let scratch = vec![0; integer.len().max(boolean.len())];
-        (Self { first, real, integer, boolean, scratch }, positions)
+    /// Lays out `variables` from slot `first` on. Of an array all elements must be there, in order. Returns the group
+    /// and the positions in slot order. What is no number is left out.
+    pub(super) fn new(first: usize, variables: &[(Position, &Variable)]) -> (Self, Vec<Position>) {
+        let mut group = Self { first, ..Self::default() };
+        let mut positions = Vec::new();
+        for of in NUMBERS {
+            let mut part = Part { of, references: Vec::new(), slots: 0 };
+            for (position, variable) in variables.iter().filter(|(_, v)| v.of == of) {
+                if variable.element == 0 {
+                    part.references.push(variable.value_reference);
+                }
+                part.slots += 1;
+                positions.push(*position);
+            }
+            if part.slots > 0 {
+                group.reals += if of.family() == Family::Real { part.slots } else { 0 };
+                group.parts.push(part);
+            }
+        }
+        (group, positions)
     }
 
     /// The slots of the real variables.
     pub(super) fn real_slots(&self) -> std::ops::Range<usize> {
-        self.first..self.first + self.real.len()
+        self.first..self.first + self.reals
     }
 
     /// Reads all variables of the group from the instance into their slots.
-    pub(super) fn read<P: Participant>(&mut self, instance: &mut P, values: &mut [f64]) -> Result<(), Error> {
-        instance.get_real(&self.real, &mut values[self.first..self.first + self.real.len()])?;
-        let mut slot = self.first + self.real.len();
-        if !self.integer.is_empty() {
-            let numbers = &mut self.scratch[..self.integer.len()];
-            instance.get_integer(&self.integer, numbers)?;
-            for number in numbers {
-                values[slot] = f64::from(*number);
-                slot += 1;
-            }
-        }
-        if !self.boolean.is_empty() {
-            let numbers = &mut self.scratch[..self.boolean.len()];
-            instance.get_boolean(&self.boolean, numbers)?;
-            for number in numbers {
-                values[slot] = f64::from(u8::from(*number != 0));
-                slot += 1;
-            }
+    pub(super) fn read<P: Participant>(&self, instance: &mut P, values: &mut [f64]) -> Result<(), Error> {
+        let mut slot = self.first;
+        for part in &self.parts {
+            let next = slot + part.slots;
+            instance.get(part.of, &part.references, &mut values[slot..next])?;
+            slot = next;
         }
         Ok(())
     }
 
     /// Writes all variables of the group from their slots to the instance.
-    pub(super) fn write<P: Participant>(&mut self, instance: &mut P, values: &[f64]) -> Result<(), Error> {
-        instance.set_real(&self.real, &values[self.first..self.first + self.real.len()])?;
-        let mut slot = self.first + self.real.len();
-        // Slots of integers and Booleans only ever hold values read from integers and Booleans.
-        for (references, boolean) in [(&self.integer, false), (&self.boolean, true)] {
-            if references.is_empty() {
-                continue;
-            }
-            let numbers = &mut self.scratch[..references.len()];
-            for number in &mut *numbers {
-                *number = values[slot] as i32;
-                slot += 1;
-            }
-            if boolean {
-                instance.set_boolean(references, numbers)?;
-            } else {
-                instance.set_integer(references, numbers)?;
-            }
+    pub(super) fn write<P: Participant>(&self, instance: &mut P, values: &[f64]) -> Result<(), Error> {
+        let mut slot = self.first;
+        for part in &self.parts {
+            let next = slot + part.slots;
+            instance.set(part.of, &part.references, &values[slot..next])?;
+            slot = next;
         }
         Ok(())
     }
@@ -120,17 +123,29 @@ mod tests {
 
     #[test]
     fn slots_are_laid_out_by_type() {
+        use DataType::{Boolean, Enumeration, Float64, String};
+        let variable = |value_reference, of, element, count| Variable {
+            value_reference,
+            of,
+            element,
+            count,
+            ..Variable::example()
+        };
         let variables = [
-            (0, 10, ScalarType::Boolean),
-            (1, 11, ScalarType::Real),
-            (2, 12, ScalarType::String),
-            (3, 13, ScalarType::Enumeration),
-            (4, 14, ScalarType::Real),
+            variable(10, Boolean, 0, 1),
+            variable(11, Float64, 0, 1),
+            variable(12, String, 0, 1),
+            variable(13, Enumeration, 0, 1),
+            variable(14, Float64, 0, 2),
+            variable(14, Float64, 1, 2),
         ];
+        let variables: Vec<_> = variables.iter().enumerate().collect();
         let (group, positions) = Group::new(5, &variables);
-        assert_eq!(positions, [1, 4, 3, 0]);
-        assert_eq!(group.real_slots(), 5..7);
-        assert_eq!((group.real, group.integer, group.boolean), (vec![11, 14], vec![13], vec![10]));
+        assert_eq!(positions, [1, 4, 5, 3, 0]);
+        assert_eq!(group.real_slots(), 5..8);
+        let part = |of, references: &[u32], slots| Part { of, references: references.to_vec(), slots };
+        let parts = [part(Float64, &[11, 14], 3), part(Enumeration, &[13], 1), part(Boolean, &[10], 1)];
+        assert_eq!(group.parts, parts);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::layout::Layout;
 use super::network::{self, Link, Port};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
-use crate::host::{Causality, Description, ScalarType};
+use crate::host::{Causality, Description, Family};
 
 /// The outputs of a barrier that are read.
 const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
@@ -251,7 +251,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
             let Some(barrier) = variable.name.strip_suffix(".unmet_steps") else { continue };
             let ports = FIELDS.map(|field| output(&format!("{barrier}.{field}")));
             let [Some(unmet), Some(slack), Some(h), Some(late), Some(phase)] = ports else { continue };
-            let unit = |port: Port| description.variables[port.variable].kind.unit().unwrap_or("1");
+            let unit = |port: Port| description.variables[port.variable].unit.as_deref().unwrap_or("1");
             let straight = over_seconds(unit(h), 1) == unit(slack);
             let parameter = description.index_of(&format!("{barrier}.deadline"));
             let parameter = parameter.map(|i| &description.variables[i]);
@@ -261,7 +261,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
                 status,
                 fields: [unmet, slack, h, late, phase],
                 rearm: description.index_of("rearm").map(|variable| Port { component, variable }),
-                deadline: parameter.and_then(|v| Some((v.value_reference, v.kind.start_number()?))),
+                deadline: parameter.and_then(|v| Some((v.value_reference, v.start?))),
                 course: if straight { Course::Straight } else { Course::Smooth },
                 prompt: system.experiment().order == Order::GaussSeidel
                     && network::has_feedthrough(owner, description, h.variable),
@@ -291,12 +291,19 @@ fn loose<'a>(
     description: &'a Description,
     links: &[Link],
 ) -> Vec<(Port, &'a str)> {
+    // A start value may be that of a whole array.
     let starts = &system.components()[component].start;
+    let given = |variable: usize, name: &str| {
+        let arrays = starts.keys().filter_map(|key| description.array(key));
+        starts.contains_key(name)
+            || arrays.into_iter().any(|array| (array.first..array.first + array.count).contains(&variable))
+            || starts.keys().any(|key| description.index_of(key) == Some(variable))
+    };
     let all = description.variables.iter().enumerate();
-    let all =
-        all.filter(|(_, v)| v.causality == Causality::Input && v.kind.scalar_type() == ScalarType::Real);
+    let all = all.filter(|(_, v)| v.causality == Causality::Input && v.of.family() == Family::Real);
     let ports = all.map(|(variable, v)| (Port { component, variable }, v.name.as_str()));
-    ports.filter(|(port, name)| !starts.contains_key(*name) && links.iter().all(|l| l.to != *port)).collect()
+    let loose = |port: &Port| links.iter().all(|link| link.to != *port);
+    ports.filter(|(port, name)| loose(port) && !given(port.variable, name)).collect()
 }
 
 /// Refuses Real inputs that nothing feeds: they would stay at the FMU's start value without a word. The wanted

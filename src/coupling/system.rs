@@ -7,7 +7,7 @@ use std::path::Path;
 
 use punctual_fmu::configuration::{ConfigurationError, FileKind, read_toml};
 use serde::Deserialize;
-use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, Visitor};
+use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use crate::error::Error;
 use crate::outlines::Outline;
@@ -80,7 +80,7 @@ fn yes() -> bool {
 }
 
 /// A start value.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum StartValue {
     /// For a Real variable.
     Real(f64),
@@ -88,15 +88,36 @@ pub enum StartValue {
     Integer(i64),
     /// For a Boolean variable.
     Boolean(bool),
+    /// For a String variable.
+    Text(String),
+    /// For an array, whose elements may be lists again.
+    List(Vec<StartValue>),
 }
 
 impl StartValue {
-    /// The value as a number; of a Boolean none.
+    /// The value as a number; of other values none.
     pub fn number(&self) -> Option<f64> {
         match *self {
             Self::Real(value) => Some(value),
             Self::Integer(value) => Some(value as f64),
-            Self::Boolean(_) => None,
+            Self::Boolean(_) | Self::Text(_) | Self::List(_) => None,
+        }
+    }
+
+    /// The sizes of the list, the outermost first; of a plain value none. `None` where it is ragged.
+    pub fn sizes(&self) -> Option<Vec<usize>> {
+        let Self::List(values) = self else { return Some(Vec::new()) };
+        let mut inner = values.iter().map(Self::sizes);
+        let first = inner.next().unwrap_or(Some(Vec::new()))?;
+        let is_even = inner.all(|sizes| sizes.as_ref() == Some(&first));
+        is_even.then(|| [vec![values.len()], first].concat())
+    }
+
+    /// The plain values in it, in order.
+    pub fn flat(&self) -> Vec<&Self> {
+        match self {
+            Self::List(values) => values.iter().flat_map(Self::flat).collect(),
+            plain => vec![plain],
         }
     }
 }
@@ -107,7 +128,7 @@ impl<'de> Deserialize<'de> for StartValue {
         impl<'de> Visitor<'de> for Expected {
             type Value = StartValue;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or true or false")
+                f.write_str("a number, true or false, a text, or a list of these")
             }
             fn visit_f64<E>(self, value: f64) -> Result<StartValue, E> {
                 Ok(StartValue::Real(value))
@@ -118,9 +139,19 @@ impl<'de> Deserialize<'de> for StartValue {
             fn visit_bool<E>(self, value: bool) -> Result<StartValue, E> {
                 Ok(StartValue::Boolean(value))
             }
+            fn visit_str<E>(self, value: &str) -> Result<StartValue, E> {
+                Ok(StartValue::Text(value.to_owned()))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<StartValue, A::Error> {
+                let mut list = Vec::new();
+                while let Some(value) = values.next_element()? {
+                    list.push(value);
+                }
+                Ok(StartValue::List(list))
+            }
             fn visit_map<A: MapAccess<'de>>(self, _: A) -> Result<StartValue, A::Error> {
                 Err(serde::de::Error::custom(
-                    "is a table, must be a number or true or false; a name with dots needs quotes: \"x0.x_p\" = 1.0",
+                    "is a table, must be a number, true or false, a text, or a list of these; a name with dots needs quotes: \"x0.x_p\" = 1.0",
                 ))
             }
         }
@@ -498,8 +529,10 @@ impl System {
                 "is empty; must be a file".to_owned()
             })?;
             for (variable, value) in start {
-                if let StartValue::Real(value) = value {
-                    finite(&format!("component[{i}].start.{variable:?}"), *value)?;
+                for value in value.flat() {
+                    if let StartValue::Real(value) = value {
+                        finite(&format!("component[{i}].start.{variable:?}"), *value)?;
+                    }
                 }
             }
         }
@@ -624,11 +657,7 @@ signals = ["a.y"]
             ("fmu = \"b.fmu\"", "fmu = \"\"", "component[1].fmu: is empty"),
             ("5.0", "inf", "component[0].start.\"goal.deadline\": is inf; must be finite"),
             ("\"goal.deadline\" = 5.0", "goal.deadline = 5.0", "a name with dots needs quotes"),
-            (
-                "on = true",
-                "on = \"true\"",
-                "component[0].start.on: is \"true\", must be a number or true or false",
-            ),
+            ("on = true", "on = [nan]", "component[0].start.\"on\": is NaN; must be finite"),
             ("to = \"b.u\"", "to = \"b.u\"\nfactor = nan", "connection[0].factor: is NaN; must be finite"),
             ("every = 2", "every = 0", "record.every: is 0; must be ≥ 1"),
             ("radius = 2", "radius = 0", "plot[0].discs[0].radius: is 0; must be > 0"),

@@ -5,12 +5,13 @@
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 use percent_encoding::{AsciiSet, CONTROLS, utf8_percent_encode};
 use tempfile::TempDir;
 use zip::{CompressionMethod, ZipArchive};
 
+use super::Version;
 use crate::error::{Error, FmuProblem};
 use crate::text;
 
@@ -152,17 +153,26 @@ impl Archive {
     }
 
     /// The expected path of this platform's shared library.
-    pub(super) fn library(&self, model_identifier: &str) -> PathBuf {
+    pub(super) fn library(&self, version: Version, model_identifier: &str) -> PathBuf {
         let file = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
-        self.directory.path().join("binaries").join(super::PLATFORM).join(file)
+        self.directory.path().join("binaries").join(version.platform()).join(file)
     }
 
     /// The `fmuResourceLocation` for `fmi2Instantiate`: `file:///…/resources`, percent-encoded.
     /// The folder need not exist.
     pub(super) fn resource_location(&self) -> String {
+        file_uri(&self.resources().to_string_lossy())
+    }
+
+    /// The `resourcePath` for FMI 3.0: the folder, with a separator at its end; `None` without such a folder.
+    pub(super) fn resource_path(&self) -> Option<String> {
+        let path = self.resources();
+        path.is_dir().then(|| format!("{}{MAIN_SEPARATOR}", path.to_string_lossy()))
+    }
+
+    fn resources(&self) -> PathBuf {
         let path = self.directory.path().join("resources");
-        let path = std::path::absolute(&path).unwrap_or(path);
-        file_uri(&path.to_string_lossy())
+        std::path::absolute(&path).unwrap_or(path)
     }
 }
 

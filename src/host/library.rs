@@ -1,59 +1,80 @@
-//! A loaded shared library and the FMI 2.0 functions the host uses, all resolved when loading.
+//! A loaded shared library and the functions of its version of FMI that the host uses, all resolved when loading.
 //! This file trusts libraries to follow the signatures of the standard.
 
+use std::ffi::c_char;
 use std::path::Path;
-
-use punctual_fmu::fmi2;
 
 use super::archive::chain;
 use super::logging::owned;
+use super::{Version, fmi2, fmi3};
 use crate::error::FmuProblem;
 
+/// Makes `Functions`: those that a run needs, each with the name and type of the standard, and those that it can do
+/// without.
 macro_rules! functions {
-    ($($(#[$doc:meta])* $field:ident: $name:literal, $type:ty;)*) => {
-        /// The functions used, by their standard names.
-        pub(super) struct Functions { $($(#[$doc])* pub(super) $field: $type,)* }
+    (
+        needed { $($field:ident: $name:literal, $type:ty;)* }
+        other { $($other:ident: $other_name:literal, $other_type:ty;)* }
+    ) => {
+        /// The functions used, valid while the library is loaded.
+        #[derive(Clone, Copy)]
+        pub(super) struct Functions {
+            $(#[doc = concat!("`", $name, "`.")] pub(super) $field: $type,)*
+            $(#[doc = concat!("`", $other_name, "`, if there is one.")] pub(super) $other: Option<$other_type>,)*
+        }
 
         impl Functions {
-            fn resolve(library: &libloading::Library) -> Result<Self, FmuProblem> {
-                Ok(Self { $($field: {
-                    // SAFETY: the type is the one the standard gives the function of this name.
-                    let symbol = unsafe { library.get::<$type>($name) };
-                    *symbol.map_err(|_| FmuProblem::MissingSymbol($name))?
-                },)* })
+            /// Looks for all of them in a library.
+            ///
+            /// # Errors
+            ///
+            /// One that a run needs is not there.
+            pub(super) fn resolve(library: &libloading::Library) -> Result<Self, FmuProblem> {
+                Ok(Self {
+                    $($field: {
+                        // SAFETY: the type is the one the standard gives the function of this name.
+                        let symbol = unsafe { library.get::<$type>($name) };
+                        *symbol.map_err(|_| FmuProblem::MissingSymbol($name))?
+                    },)*
+                    $($other: {
+                        // SAFETY: the type is the one the standard gives the function of this name.
+                        let symbol = unsafe { library.get::<$other_type>($other_name) };
+                        symbol.ok().map(|symbol| *symbol)
+                    },)*
+                })
             }
         }
     };
 }
+pub(super) use functions;
 
-functions! {
-    get_types_platform: "fmi2GetTypesPlatform", fmi2::GetTypesPlatform;
-    get_version: "fmi2GetVersion", fmi2::GetVersion;
-    instantiate: "fmi2Instantiate", fmi2::Instantiate;
-    free_instance: "fmi2FreeInstance", fmi2::FreeInstance;
-    setup_experiment: "fmi2SetupExperiment", fmi2::SetupExperiment;
-    enter_initialization_mode: "fmi2EnterInitializationMode", fmi2::EnterInitializationMode;
-    exit_initialization_mode: "fmi2ExitInitializationMode", fmi2::ExitInitializationMode;
-    terminate: "fmi2Terminate", fmi2::Terminate;
-    reset: "fmi2Reset", fmi2::Reset;
-    get_real: "fmi2GetReal", fmi2::GetReal;
-    get_integer: "fmi2GetInteger", fmi2::GetInteger;
-    get_boolean: "fmi2GetBoolean", fmi2::GetBoolean;
-    set_real: "fmi2SetReal", fmi2::SetReal;
-    set_integer: "fmi2SetInteger", fmi2::SetInteger;
-    set_boolean: "fmi2SetBoolean", fmi2::SetBoolean;
-    do_step: "fmi2DoStep", fmi2::DoStep;
+/// The functions of one version.
+#[derive(Clone, Copy)]
+pub(super) enum Functions {
+    Fmi2(fmi2::Functions),
+    Fmi3(fmi3::Functions),
+}
+
+/// A question about versions: the function, and how its answer must begin.
+type Question = (&'static str, unsafe extern "C" fn() -> *const c_char, &'static str);
+
+impl Functions {
+    fn questions(&self) -> Vec<Question> {
+        match self {
+            Self::Fmi2(functions) => vec![
+                ("fmi2GetVersion", functions.get_version, "2."),
+                ("fmi2GetTypesPlatform", functions.get_types_platform, "default"),
+            ],
+            Self::Fmi3(functions) => vec![("fmi3GetVersion", functions.get_version, "3.")],
+        }
+    }
 }
 
 /// A loaded library. The functions are valid while it lives.
 pub(super) struct Library {
     pub(super) functions: Functions,
-    /// `fmi2GetString`, which couplings do without.
-    pub(super) get_string: Option<fmi2::GetString>,
-    /// The answer of `fmi2GetVersion`.
-    pub(super) version: String,
-    /// The answer of `fmi2GetTypesPlatform`.
-    pub(super) types_platform: String,
+    /// Its answers on its version, by the function asked.
+    pub(super) answers: Vec<(&'static str, String)>,
     _library: libloading::Library,
 }
 
@@ -64,31 +85,26 @@ impl std::fmt::Debug for Library {
 }
 
 impl Library {
-    /// Loads the library, resolves every function used and asks for its version. Its undefined symbols are
-    /// resolved now, so that none is missed in mid-run. Its own symbols stay its own.
-    pub(super) fn load(path: &Path) -> Result<Self, FmuProblem> {
+    /// Loads the library of an FMU of this `version`, resolves every function used and asks for its version. Its
+    /// undefined symbols are resolved now, so that none is missed in mid-run. Its own symbols stay its own.
+    pub(super) fn load(path: &Path, version: Version) -> Result<Self, FmuProblem> {
         let library = open(path).map_err(|e| FmuProblem::Load(refused(path, &chain(&e))))?;
-        let functions = Functions::resolve(&library)?;
-        let asked = [
-            ("fmi2GetVersion", functions.get_version, "2."),
-            ("fmi2GetTypesPlatform", functions.get_types_platform, "default"),
-        ];
+        let functions = match version {
+            Version::Fmi2 => Functions::Fmi2(fmi2::Functions::resolve(&library)?),
+            Version::Fmi3 => Functions::Fmi3(fmi3::Functions::resolve(&library)?),
+        };
         let mut answers = Vec::new();
-        for (call, function, expected) in asked {
+        for (call, function, expected) in functions.questions() {
             // SAFETY: the function takes nothing and may be called at any time.
             let answer = unsafe { function() };
             // SAFETY: the standard has it return a zero-terminated text; NULL is allowed for.
             let answer = unsafe { owned(answer) };
             if !answer.starts_with(expected) {
-                return Err(FmuProblem::Version { call, answer });
+                return Err(FmuProblem::Version { call, answer, wanted: version.as_str() });
             }
-            answers.push(answer);
+            answers.push((call, answer));
         }
-        let [version, types_platform] = <[String; 2]>::try_from(answers).unwrap_or_default();
-        // SAFETY: the type is the one the standard gives the function of this name.
-        let get_string = unsafe { library.get::<fmi2::GetString>("fmi2GetString") };
-        let get_string = get_string.ok().map(|symbol| *symbol);
-        Ok(Self { functions, get_string, version, types_platform, _library: library })
+        Ok(Self { functions, answers, _library: library })
     }
 }
 

@@ -1,42 +1,49 @@
-//! A host for FMI 2.0 co-simulation FMUs: unpack, describe, load, instantiate, call. The only module of this
+//! A host for co-simulation FMUs of FMI 2.0 and 3.0: unpack, describe, load, instantiate, call. The only module of this
 //! crate with unsafe code. All it offers is safe, as far as the FMU itself keeps to the standard. Knows nothing
 //! of coupling.
 
 mod archive;
 mod bounds;
 mod description;
+mod fmi2;
+mod fmi3;
+mod handle;
 pub mod journal;
 mod library;
 mod logging;
-mod slave;
+mod number;
+mod participant;
+mod status;
 
 use std::cell::{Cell, OnceCell};
 use std::path::Path;
+use std::rc::Rc;
 
 pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
     MAX_UNPACKED_BYTES, SMALL_BYTES, declared_encoding, is_latin,
 };
-pub use description::{Description, Output};
-pub use logging::LogMessage;
-pub use punctual_fmu::fmi2::Status;
-pub use punctual_modeldescription::{
-    Causality, DefaultExperiment, PLATFORM, ScalarType, Variability, Variable, VariableKind,
+pub use description::{
+    Array, Description, Fmi2Description, Fmi3Description, Output, Variable, Version, Written,
 };
-pub use slave::Slave;
+pub use logging::LogMessage;
+pub use number::{DataType, Family};
+pub use participant::{Participant, Slave};
+pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
+pub use status::Status;
 
-use library::Library;
 pub(crate) use library::crash_at_once;
+use library::{Functions, Library};
 
 use crate::error::{Error, FmuProblem};
 
 /// An FMU: its archive unpacked, its description read, its library loaded when first needed.
 #[derive(Debug)]
 pub struct Fmu {
-    description: Description,
+    description: Rc<Description>,
     // Dropped before the archive: the library is unloaded before its file is removed.
     library: OnceCell<Library>,
-    /// Set once an instance was left in a state in which it may still run: see [`Slave`].
+    /// Set once an instance was left in a state in which it may still run.
     abandoned: Cell<bool>,
     archive: Archive,
 }
@@ -47,13 +54,14 @@ impl Fmu {
     /// # Errors
     ///
     /// The file cannot be read, is not a sound archive, or its description is missing, malformed,
-    /// not of FMI 2.0, or without a co-simulation interface.
+    /// not of FMI 2.0 or 3.0, or without a co-simulation interface that can be run.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let archive = Archive::open(path)?;
         let description = archive
             .model_description()
             .and_then(|text| Description::parse(&text))
             .map_err(|problem| Error::fmu(path, problem))?;
+        let description = Rc::new(description);
         Ok(Self { description, library: OnceCell::new(), abandoned: Cell::new(false), archive })
     }
 
@@ -63,7 +71,7 @@ impl Fmu {
     }
 
     /// Its model description.
-    pub fn description(&self) -> &Description {
+    pub fn description(&self) -> &Rc<Description> {
         &self.description
     }
 
@@ -77,33 +85,52 @@ impl Fmu {
         if let Some(library) = self.library.get() {
             return Ok(library);
         }
-        let path = self.archive.library(&self.description.co_simulation.model_identifier);
+        let version = self.description.version();
+        let path = self.archive.library(version, &self.description.model_identifier);
         if !path.is_file() {
             let present = self.archive.platforms().to_vec();
-            return Err(Error::fmu(self.path(), FmuProblem::NoBinary { wanted: PLATFORM, present }));
+            return Err(Error::fmu(
+                self.path(),
+                FmuProblem::NoBinary { wanted: version.platform(), present },
+            ));
         }
         journal::entering("loading its library", "", self.path(), None);
-        let library = Library::load(&path).map_err(|problem| Error::fmu(self.path(), problem))?;
+        let library = Library::load(&path, version).map_err(|problem| Error::fmu(self.path(), problem))?;
         Ok(self.library.get_or_init(|| library))
     }
 
-    /// The answers of `fmi2GetVersion` and `fmi2GetTypesPlatform`; loads the library.
+    /// What its library answers on its version, by the function asked: `fmi2GetVersion` and `fmi2GetTypesPlatform`, or
+    /// `fmi3GetVersion`. Loads the library.
     ///
     /// # Errors
     ///
-    /// The library cannot be loaded, lacks a function, or is not of FMI 2.
-    pub fn answers(&self) -> Result<[(&'static str, &str); 2], Error> {
-        let library = self.library()?;
-        Ok([("fmi2GetVersion", &library.version), ("fmi2GetTypesPlatform", &library.types_platform)])
+    /// The library cannot be loaded, lacks a function, or is of another version.
+    pub fn answers(&self) -> Result<&[(&'static str, String)], Error> {
+        Ok(&self.library()?.answers)
+    }
+
+    /// Makes an instance called `name`; the first one loads the library. `description` is that of the FMU, with the
+    /// sizes of its arrays as they will be set.
+    ///
+    /// # Errors
+    ///
+    /// The library cannot be loaded or lacks a function, `name` holds a zero byte, or the FMU
+    /// refuses (its log says why).
+    pub fn instantiate(
+        self: &Rc<Self>,
+        description: &Rc<Description>,
+        name: &str,
+    ) -> Result<Box<dyn Slave>, Error> {
+        let of = (Rc::clone(self), Rc::clone(description));
+        Ok(match self.library()?.functions {
+            Functions::Fmi2(functions) => Box::new(fmi2::Instance::new(of, functions, name)?),
+            Functions::Fmi3(functions) => Box::new(fmi3::Instance::new(of, functions, name)?),
+        })
     }
 
     /// The text of a file in its `resources/`; `None` where there is no such text.
     pub fn resource(&self, name: &str) -> Option<String> {
         std::fs::read_to_string(self.archive.path(&format!("resources/{name}"))).ok()
-    }
-
-    fn resource_location(&self) -> String {
-        self.archive.resource_location()
     }
 }
 

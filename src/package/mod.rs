@@ -17,7 +17,7 @@ use punctual_fmu::product::Product;
 use punctual_modeldescription::{Archive, Timestamp};
 
 use crate::error::Error;
-use crate::host::{Fmu, PLATFORM, Slave};
+use crate::host::{Fmu, PLATFORM};
 use crate::whole;
 use library::Library;
 
@@ -112,7 +112,7 @@ pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -
 /// Opens the FMU of `product` at `file` and initialises an instance.
 fn tried(product: &Product, file: &Path) -> Result<Rc<Fmu>, Error> {
     let fmu = Rc::new(Fmu::open(file)?);
-    let mut slave = Slave::instantiate(Rc::clone(&fmu), product.configuration.name())?;
+    let mut slave = fmu.instantiate(fmu.description(), product.configuration.name())?;
     let experiment = product.configuration.experiment();
     slave.setup_experiment(experiment.start_time, experiment.stop_time)?;
     slave.enter_initialization_mode()?;

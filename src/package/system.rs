@@ -6,13 +6,13 @@ use std::path::Path;
 use std::rc::Rc;
 
 use punctual_modeldescription::{
-    Archive, Causality, Connector, DefaultExperiment, EnumerationItem, ParameterSet, ParameterValue,
-    SimpleType, SystemComponent, SystemConnection, SystemStructure,
+    Archive, Causality, Connector, DefaultExperiment, EnumerationItem, Integer, ParameterSet, ParameterValue,
+    Plain, Real, SimpleType, SystemComponent, SystemConnection, SystemStructure, VariableKind,
 };
 
 use crate::coupling::{self, Link, Port, StartValue, System};
 use crate::error::Error;
-use crate::host::{Description, Fmu, Variable, VariableKind};
+use crate::host::{DataType, Description, Family, Fmu, Variable};
 use crate::text;
 use crate::whole;
 
@@ -119,10 +119,12 @@ impl Store {
 fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed), Error> {
     // Read the FMUs, and resolve the connections.
     let store = Store::open(system, base)?;
-    let descriptions: Vec<&Description> =
-        (0..system.components().len()).map(|c| store.of(c).0.description()).collect();
+    let sized = |(c, component)| coupling::Model::from(Rc::clone(&store.of(c).0)).sized(component);
+    let models = system.components().iter().enumerate().map(sized).collect::<Result<Vec<_>, _>>()?;
+    let descriptions: Vec<&Description> = models.iter().map(coupling::Model::description).collect();
     let links = coupling::links(system, &descriptions)?;
-    let parameters = start_values(system, &descriptions);
+    let parameters = start_values(system, &descriptions)?;
+    let starts = &parameters;
     let experiment = system.experiment();
     let mut enumerations = Enumerations::default();
     let components = system.components().iter().zip(&descriptions).enumerate();
@@ -134,7 +136,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
                 // An input that is neither connected nor set keeps the start value of its FMU, so it is no
                 // connector. Some masters write zero to every input that is one.
                 variable.causality != Causality::Input
-                    || component.start.contains_key(&variable.name)
+                    || starts.iter().any(|(name, _)| *name == format!("{}.{}", component.name, variable.name))
                     || links.iter().any(|link| link.to == port)
             };
             let connectors = (0..description.variables.len()).filter(shown);
@@ -199,11 +201,8 @@ struct Enumerations(Vec<SimpleType>);
 
 impl Enumerations {
     /// Declares the type of a variable, which has these items.
-    fn declare(&mut self, component: &str, variable: &Variable, items: &[EnumerationItem]) -> String {
-        // The format has no place for the meaning of items.
-        let plain = |item: &EnumerationItem| EnumerationItem { description: String::new(), ..item.clone() };
-        let items: Vec<_> = items.iter().map(plain).collect();
-        let mut name = variable.kind.declared_type().unwrap_or(&variable.name).to_owned();
+    fn declare(&mut self, component: &str, variable: &Variable, items: Vec<EnumerationItem>) -> String {
+        let mut name = variable.declared_type.as_deref().unwrap_or(&variable.name).to_owned();
         while let Some(other) = self.0.iter().find(|e| e.name == name) {
             if other.items == items {
                 return name;
@@ -227,39 +226,70 @@ fn connector(
     if !matches!(variable.causality, Input | Output | Parameter | CalculatedParameter) {
         return None;
     }
-    let kind = match &variable.kind {
-        VariableKind::Enumeration(of) => match description.items(variable) {
-            [] => VariableKind::Integer(of.clone()),
-            items => VariableKind::enumeration(enumerations.declare(component, variable, items)),
+    let kind = match variable.of.family() {
+        Family::Real => VariableKind::Real(Real::default()),
+        Family::Integer => VariableKind::Integer(Integer::default()),
+        Family::Boolean => VariableKind::Boolean(Plain::default()),
+        Family::Enumeration => match items(variable) {
+            Some(items) => VariableKind::enumeration(enumerations.declare(component, variable, items)),
+            None => VariableKind::Integer(Integer::default()),
         },
-        kind => kind.clone(),
+        Family::Other if variable.of == DataType::String => VariableKind::String(Plain::default()),
+        Family::Other => return None,
     };
     Some(Connector { name: variable.name.clone(), causality: variable.causality, kind })
 }
 
+/// The items of an enumeration, if the format can hold all of them. It has no place for their meaning.
+fn items(variable: &Variable) -> Option<Vec<EnumerationItem>> {
+    let item = |(name, value): &(String, i64)| {
+        let value = i32::try_from(*value).ok()?;
+        Some(EnumerationItem { name: name.clone(), value, description: String::new() })
+    };
+    let items: Option<Vec<_>> = variable.items.iter().map(item).collect();
+    items.filter(|items| !items.is_empty())
+}
+
 /// The start values by `component.variable`; `coupling` has checked names, types and ranges.
-fn start_values(system: &System, descriptions: &[&Description]) -> Vec<(String, ParameterValue)> {
+///
+/// # Errors
+///
+/// A whole number that the format cannot hold.
+fn start_values(
+    system: &System,
+    descriptions: &[&Description],
+) -> Result<Vec<(String, ParameterValue)>, Error> {
     let mut values = Vec::new();
-    for (component, description) in system.components().iter().zip(descriptions) {
+    for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
         for (name, value) in &component.start {
-            let Some(variable) = description.index_of(name).map(|i| &description.variables[i]) else {
-                continue;
+            let first = match (description.index_of(name), description.array(name)) {
+                (Some(variable), _) => variable,
+                (None, Some(array)) => array.first,
+                (None, None) => continue,
             };
-            let items = description.items(variable);
-            let item = |number: i64| items.iter().find(|item| i64::from(item.value) == number);
-            let value = match *value {
-                StartValue::Real(x) => ParameterValue::Real(x),
-                StartValue::Boolean(b) => ParameterValue::Boolean(b),
-                StartValue::Integer(i) if matches!(variable.kind, VariableKind::Real(_)) => {
-                    ParameterValue::Real(i as f64)
-                }
-                StartValue::Integer(i) => match item(i) {
-                    Some(item) => ParameterValue::Enumeration(item.name.clone()),
-                    None => ParameterValue::Integer(i32::try_from(i).unwrap_or_default()),
-                },
-            };
-            values.push((format!("{}.{name}", component.name), value));
+            for (variable, value) in description.variables[first..].iter().zip(value.flat()) {
+                let value = parameter(variable, value).ok_or_else(|| {
+                    let message = "is a whole number beyond 32 bits, for which SSP 1.0 has no place";
+                    Error::configuration(format!("component[{c}].start.{name:?}"), message)
+                })?;
+                values.push((format!("{}.{}", component.name, variable.name), value));
+            }
         }
     }
-    values
+    Ok(values)
+}
+
+/// The value of a variable in the format; `None` where it has no place for it.
+fn parameter(variable: &Variable, value: &StartValue) -> Option<ParameterValue> {
+    Some(match value {
+        StartValue::Real(x) => ParameterValue::Real(*x),
+        StartValue::Boolean(b) => ParameterValue::Boolean(*b),
+        StartValue::Text(text) => ParameterValue::String(text.clone()),
+        StartValue::Integer(i) if variable.of.family() == Family::Real => ParameterValue::Real(*i as f64),
+        StartValue::Integer(i) => match variable.items.iter().find(|(_, item)| item == i) {
+            Some((name, _)) if items(variable).is_some() => ParameterValue::Enumeration(name.clone()),
+            _ => ParameterValue::Integer(i32::try_from(*i).ok()?),
+        },
+        StartValue::List(_) => return None,
+    })
 }

@@ -370,7 +370,7 @@ fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
     let find = |(component, model): (&crate::coupling::Component, &crate::coupling::Own)| {
         let variable = format!("{}.deadline", barrier.strip_prefix(&format!("{}.", component.name))?);
         let own = &model.description.variables[model.description.index_of(&variable)?];
-        component.start.get(&variable).map_or(own.kind.start_number(), StartValue::number)
+        component.start.get(&variable).map_or(own.start, StartValue::number)
     };
     components.filter_map(find).next().filter(|deadline| deadline.is_finite())
 }

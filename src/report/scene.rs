@@ -144,12 +144,12 @@ impl Strip {
     /// The strip of `part`, called `label`, where its status was recorded.
     pub(super) fn new(part: &Part<'_>, label: &str, recording: &Recording) -> Option<Self> {
         let description = part.model.description();
-        let items = description.items(&description.variables[description.index_of("status")?]);
+        let items = &description.variables[description.index_of("status")?].items;
         let seen = recording.series(&part.signal("status"))?;
         let mut strip = Self { label: label.to_owned(), parts: Vec::new(), words: Vec::new() };
         for (time, status) in changes(recording.times(), &seen) {
-            let item = items.iter().find(|item| item.value == status);
-            let word = item.map_or_else(|| status.to_string(), |item| item.name.clone());
+            let item = items.iter().find(|(_, value)| *value == i64::from(status));
+            let word = item.map_or_else(|| status.to_string(), |(name, _)| name.clone());
             let known = strip.words.iter().position(|(other, _)| *other == word);
             let index = known.unwrap_or_else(|| {
                 strip.words.push((word, colour(status)));

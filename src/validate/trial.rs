@@ -13,7 +13,8 @@ use punctual_modeldescription::Located;
 use super::finding::{Finding, Findings, Place, severity};
 use crate::error::Error;
 use crate::host::{
-    Archive, Causality, Fmu, PLATFORM, ScalarType, Slave, Status, Variability, Variable, journal,
+    Archive, Causality, DataType, Description, Fmu, PLATFORM, Slave, Status, Variability, Variable, Version,
+    journal,
 };
 use crate::isolation::{self, Child, End, Voice};
 
@@ -108,7 +109,7 @@ pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
     let mut trial = Trial { file, told: HashSet::new() };
     if let Err(error) = trial.all(path) {
         let rule = match error.as_call() {
-            Some(call) if call.status == Some(Status::DISCARD) => "trial.discard",
+            Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
             Some(_) => "trial.call",
             None => "trial.load",
         };
@@ -138,21 +139,28 @@ impl Trial {
 
     fn all(&mut self, path: &Path) -> Result<(), Error> {
         let fmu = Rc::new(Fmu::open(path)?);
-        for ((call, answer), wanted) in fmu.answers()?.into_iter().zip(["2.0", "default"]) {
+        let description = Rc::clone(fmu.description());
+        let wanted: &[&str] = match description.version() {
+            Version::Fmi2 => &["2.0", "default"],
+            Version::Fmi3 => &["3.0"],
+        };
+        for ((call, answer), wanted) in fmu.answers()?.iter().zip(wanted) {
             if answer != wanted {
                 self.tell("trial.version", None, &format!("{call} answered {answer:?}; must be {wanted:?}"));
             }
         }
-        let plan = Plan::of(&fmu);
-        let mut slave = Slave::instantiate(Rc::clone(&fmu), INSTANCE)?;
-        let first = self.pass(&mut slave, &fmu, plan, false)?;
+        let plan = Plan::of(&description);
+        let mut slave = fmu.instantiate(&description, INSTANCE)?;
+        let slave = &mut *slave;
+        let first = self.pass(slave, &description, plan, false)?;
         slave.reset()?;
-        let second = self.pass(&mut slave, &fmu, plan, true)?;
+        let second = self.pass(slave, &description, plan, true)?;
+        let fmi = description.version().prefix();
         let as_started = !self.told.iter().any(|(rule, _)| *rule == "trial.start");
         for (name, a, b) in first.iter().zip(&second).map(|((name, a), (_, b))| (name, a, b)) {
             if as_started && a.to_bits() != b.to_bits() {
                 let text = format!(
-                    "is {b} at the end of a second run after fmi2Reset, but was {a} at the end of the first"
+                    "is {b} at the end of a second run after {fmi}Reset, but was {a} at the end of the first"
                 );
                 self.tell("trial.reset", Some(name), &text);
             }
@@ -162,11 +170,11 @@ impl Trial {
             self.tell(
                 "trial.warning",
                 None,
-                &format!("{} calls returned fmi2Warning{last}", slave.warnings()),
+                &format!("{} calls returned {fmi}Warning{last}", slave.warnings()),
             );
         }
-        if !fmu.description().co_simulation.can_be_instantiated_only_once_per_process {
-            self.two_instances(&fmu, &slave, plan)?;
+        if !description.only_once {
+            self.two_instances(&fmu, slave, plan);
         }
         Ok(())
     }
@@ -174,20 +182,20 @@ impl Trial {
     /// From initialisation to termination; returns the Real outputs at the end.
     fn pass(
         &mut self,
-        slave: &mut Slave,
-        fmu: &Fmu,
+        slave: &mut dyn Slave,
+        description: &Description,
         plan: Plan,
         set: bool,
     ) -> Result<Vec<(String, f64)>, Error> {
-        let variables = &fmu.description().variables;
+        let variables = &description.variables;
         if set {
-            variables.iter().try_for_each(|variable| set_start(slave, variable))?;
+            variables.chunk_by(same).try_for_each(|array| set_start(slave, array))?;
         }
         slave.setup_experiment(plan.start, plan.stop)?;
         slave.enter_initialization_mode()?;
         slave.exit_initialization_mode()?;
         if !set {
-            variables.iter().try_for_each(|variable| self.compare_start(slave, variable))?;
+            variables.chunk_by(same).try_for_each(|array| self.compare_start(slave, array))?;
         }
         for k in 0..plan.steps {
             slave.do_step(plan.start + f64::from(k) * plan.step, plan.step)?;
@@ -198,68 +206,76 @@ impl Trial {
         Ok(last)
     }
 
-    /// Reads every output, and checks the Real ones.
-    fn outputs(&mut self, slave: &mut Slave, variables: &[Variable]) -> Result<Vec<(String, f64)>, Error> {
-        let mut values = Vec::new();
-        for v in variables.iter().filter(|v| v.causality == Causality::Output) {
-            let Some(value) = self.get(slave, v)? else { continue };
-            if !value.is_finite() {
-                self.tell("trial.output", Some(&v.name), &format!("the output is {value}; should be finite"));
-            }
-            let (min, max) = v.kind.range();
-            let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
-            if value < min || value > max {
-                let text =
-                    format!("the output is {value}; should be in [{min}, {max}], as the description says");
-                self.tell("trial.output", Some(&v.name), &text);
-            }
-            values.push((v.name.clone(), value));
-        }
-        Ok(values)
-    }
-
-    /// The value as a number; `None` for texts.
-    fn get(&mut self, slave: &mut Slave, v: &Variable) -> Result<Option<f64>, Error> {
-        let reference = [v.value_reference];
-        let (mut real, mut integer) = ([f64::NAN], [0]);
-        Ok(match v.kind.scalar_type() {
-            ScalarType::Real => {
-                slave.get_real(&reference, &mut real)?;
-                Some(real[0])
-            }
-            ScalarType::Integer | ScalarType::Enumeration => {
-                slave.get_integer(&reference, &mut integer)?;
-                Some(f64::from(integer[0]))
-            }
-            ScalarType::Boolean => {
-                slave.get_boolean(&reference, &mut integer)?;
-                Some(f64::from(u8::from(integer[0] != 0)))
-            }
-            ScalarType::String => {
-                if slave.get_string(v.value_reference)?.is_none() {
-                    self.tell("trial.text", Some(&v.name), "fmi2GetString gave NULL; must give a text");
+    /// Reads every output, and checks those that are numbers.
+    fn outputs(
+        &mut self,
+        slave: &mut dyn Slave,
+        variables: &[Variable],
+    ) -> Result<Vec<(String, f64)>, Error> {
+        let mut outputs = Vec::new();
+        for array in variables.chunk_by(same).filter(|array| array[0].causality == Causality::Output) {
+            let Some(values) = self.get(slave, array)? else { continue };
+            for (v, value) in array.iter().zip(values) {
+                if !value.is_finite() {
+                    self.tell(
+                        "trial.output",
+                        Some(&v.name),
+                        &format!("the output is {value}; should be finite"),
+                    );
                 }
-                None
+                let (min, max) = v.range;
+                let (min, max) = (min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY));
+                if value < min || value > max {
+                    let text = format!(
+                        "the output is {value}; should be in [{min}, {max}], as the description says"
+                    );
+                    self.tell("trial.output", Some(&v.name), &text);
+                }
+                outputs.push((v.name.clone(), value));
             }
-        })
+        }
+        Ok(outputs)
     }
 
-    /// Compares a parameter or input that was not set with its start value.
-    fn compare_start(&mut self, slave: &mut Slave, v: &Variable) -> Result<(), Error> {
-        if !is_set_by_importers(v) {
+    /// The values as numbers; `None` for what is none.
+    fn get(&mut self, slave: &mut dyn Slave, array: &[Variable]) -> Result<Option<Vec<f64>>, Error> {
+        let first = &array[0];
+        if first.of == DataType::String {
+            let texts = slave.get_text(first.value_reference, array.len())?;
+            if texts.is_none_or(|texts| texts.contains(&None)) {
+                let call = format!("{}GetString", slave.version().prefix());
+                self.tell("trial.text", Some(&first.name), &format!("{call} gave NULL; must give a text"));
+            }
+            return Ok(None);
+        }
+        if !first.is_number() {
+            return Ok(None);
+        }
+        let mut values = vec![f64::NAN; array.len()];
+        slave.get(first.of, &[first.value_reference], &mut values)?;
+        Ok(Some(values))
+    }
+
+    /// Compares parameters or inputs that were not set with their start values.
+    fn compare_start(&mut self, slave: &mut dyn Slave, array: &[Variable]) -> Result<(), Error> {
+        if !is_set_by_importers(&array[0]) || array.iter().all(|v| v.start.is_none()) {
             return Ok(());
         }
-        let Some(start) = v.kind.start_number() else { return Ok(()) };
-        let Some(value) = self.get(slave, v)? else { return Ok(()) };
-        if (value - start).abs() > CLOSE * start.abs() || value.is_nan() != start.is_nan() {
-            let text = format!("is {value} after initialisation; the description says start = {start}");
-            self.tell("trial.start", Some(&v.name), &text);
+        let Some(values) = self.get(slave, array)? else { return Ok(()) };
+        for (v, value) in array.iter().zip(values) {
+            let Some(start) = v.start else { continue };
+            // A float of 32 bits is not the decimal number of the description.
+            let close = if v.of == DataType::Float32 { f64::from(f32::EPSILON) } else { CLOSE };
+            if (value - start).abs() > close * start.abs() || value.is_nan() != start.is_nan() {
+                let text = format!("is {value} after initialisation; the description says start = {start}");
+                self.tell("trial.start", Some(&v.name), &text);
+            }
         }
         Ok(())
     }
 
-    fn two_instances(&mut self, fmu: &Rc<Fmu>, other: &Slave, plan: Plan) -> Result<(), Error> {
-        let made = Slave::instantiate(Rc::clone(fmu), "trial2").and_then(|mut slave| {
+    fn two_instances(&mut self, fmu: &Rc<Fmu>, other: &dyn Slave, plan: Plan) {
+        let made = fmu.instantiate(fmu.description(), "trial2").and_then(|mut slave| {
             slave.setup_experiment(plan.start, plan.stop)?;
             slave.enter_initialization_mode()?;
             slave.exit_initialization_mode()?;
@@ -272,7 +288,6 @@ impl Trial {
             );
             self.tell("trial.instances", None, &text);
         }
-        Ok(())
     }
 }
 
@@ -287,8 +302,8 @@ struct Plan {
 
 impl Plan {
     /// The suggested experiment, cut short.
-    fn of(fmu: &Fmu) -> Self {
-        let suggested = fmu.description().default_experiment.unwrap_or_default();
+    fn of(description: &Description) -> Self {
+        let suggested = description.default_experiment.unwrap_or_default();
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
         let start = finite(suggested.start_time).unwrap_or(0.0);
         let stop = finite(suggested.stop_time).filter(|stop| *stop > start);
@@ -300,17 +315,21 @@ impl Plan {
     }
 }
 
-fn is_set_by_importers(v: &Variable) -> bool {
-    matches!(v.causality, Causality::Parameter | Causality::Input) && v.variability != Variability::Constant
+/// Whether two scalars that stand together are elements of one array.
+fn same(a: &Variable, b: &Variable) -> bool {
+    b.element == a.element + 1
 }
 
-fn set_start(slave: &mut Slave, v: &Variable) -> Result<(), Error> {
-    let Some(value) = v.kind.start_number().filter(|_| is_set_by_importers(v)) else { return Ok(()) };
-    let reference = [v.value_reference];
-    match v.kind.scalar_type() {
-        ScalarType::Real => slave.set_real(&reference, &[value]),
-        ScalarType::Integer | ScalarType::Enumeration => slave.set_integer(&reference, &[value as i32]),
-        ScalarType::Boolean => slave.set_boolean(&reference, &[value as i32]),
-        ScalarType::String => Ok(()),
+fn is_set_by_importers(v: &Variable) -> bool {
+    let settable = matches!(v.causality, Causality::Parameter | Causality::Input);
+    settable && !v.structural && v.variability != Variability::Constant
+}
+
+fn set_start(slave: &mut dyn Slave, array: &[Variable]) -> Result<(), Error> {
+    let first = &array[0];
+    let values: Option<Vec<f64>> = array.iter().map(|v| v.start).collect();
+    match values.filter(|_| is_set_by_importers(first)) {
+        Some(values) => slave.set(first.of, &[first.value_reference], &values),
+        None => Ok(()),
     }
 }

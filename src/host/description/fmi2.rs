@@ -1,5 +1,5 @@
-//! A model description as an importer holds it: attributes from declared types are filled in, outputs and their
-//! dependencies are positions of variables.
+//! A model description of FMI 2.0 as an importer holds it: attributes from declared types are filled in, outputs and
+//! their dependencies are positions of variables.
 //!
 //! The file is parsed once. `fmi-rs` reads the tree as an importer by someone else: a text that it refuses is no
 //! description, and its findings against the standard are told as problems. The model itself is read by
@@ -14,30 +14,21 @@ use std::collections::HashMap;
 use std::ops::Deref;
 
 use fmi_rs::model_description::fmi2 as importer;
-use punctual_fmu::product::CODE;
 use punctual_modeldescription::{
     Causality, DefaultExperiment, Located, ModelDescription, ModelStructure, SimpleType, VariableKind,
     is_c_identifier,
 };
 use roxmltree::{Document, Node};
 
+use super::Output;
 use crate::error::FmuProblem;
 
-/// An output, and its dependencies at the same communication point.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Output {
-    /// Position in [`ModelDescription::variables`].
-    pub variable: usize,
-    /// Positions of the variables it depends on; `None`: not said, so every input.
-    pub dependencies: Option<Vec<usize>>,
-}
-
-/// The description of a co-simulation FMU: a [`ModelDescription`], and what follows from it.
+/// The description of a co-simulation FMU of FMI 2.0: a [`ModelDescription`], and what follows from it.
 ///
 /// Variables have the unit and range of their declared type where they have none of their own; a bound or
 /// time that is not a number is absent.
 #[derive(Clone, Debug)]
-pub struct Description {
+pub struct Fmi2Description {
     /// The model description, as read.
     pub model: ModelDescription,
     /// The start values of the variables, as written.
@@ -48,7 +39,7 @@ pub struct Description {
     pub problems: Vec<String>,
 }
 
-impl Deref for Description {
+impl Deref for Fmi2Description {
     type Target = ModelDescription;
 
     fn deref(&self) -> &ModelDescription {
@@ -56,16 +47,15 @@ impl Deref for Description {
     }
 }
 
-impl Description {
-    /// Reads a model description from its text.
+impl Fmi2Description {
+    /// Reads a model description from its tree.
     ///
     /// # Errors
     ///
     /// Text that is no model description of FMI 2.0, or of one without a co-simulation interface.
-    pub fn parse(text: &str) -> Result<Self, FmuProblem> {
-        let document = Document::parse(text).map_err(|e| FmuProblem::Description(e.to_string()))?;
+    pub(super) fn read(document: &Document<'_>) -> Result<Self, FmuProblem> {
         let problems = judged(document.root_element())?;
-        let Located { description: mut model, structure, interfaces, starts, .. } = Located::read(&document);
+        let Located { description: mut model, structure, interfaces, starts, .. } = Located::read(document);
         if interfaces == 0 {
             return Err(FmuProblem::NoCoSimulation);
         }
@@ -75,23 +65,6 @@ impl Description {
         let outputs = outputs(&model, &structure)?;
         fill_in(&mut model);
         Ok(Self { model, starts, outputs, problems })
-    }
-
-    /// The position of the variable of this name.
-    pub fn index_of(&self, name: &str) -> Option<usize> {
-        self.variables.iter().position(|variable| variable.name == name)
-    }
-
-    /// Whether the variable at `index` says what an enumeration of the same FMU says, for importers that drop enumerations:
-    /// the Integer `status_code` beside `status`.
-    pub fn is_twin(&self, index: usize) -> bool {
-        let variable = &self.variables[index];
-        let of =
-            variable.name.strip_suffix(CODE).filter(|_| matches!(variable.kind, VariableKind::Integer(_)));
-        let is_enumeration = |of: &str| {
-            self.variables.iter().any(|v| v.name == of && matches!(v.kind, VariableKind::Enumeration(_)))
-        };
-        of.is_some_and(is_enumeration)
     }
 
     /// The inputs an output depends on directly, as positions in the variables.
@@ -170,9 +143,9 @@ fn outputs(model: &ModelDescription, structure: &ModelStructure) -> Result<Vec<O
     for unknown in &structure.outputs {
         let variable = position(&unknown.index)?;
         let Some(list) = &unknown.dependencies else { continue };
-        let list = list.iter().map(position).collect::<Result<_, _>>()?;
+        let list = list.iter().map(position).collect::<Result<Vec<_>, _>>()?;
         if let Some(output) = outputs.iter_mut().find(|output| output.variable == variable) {
-            output.dependencies = Some(list);
+            output.dependencies = Some(list.into());
         }
     }
     Ok(outputs)
@@ -203,7 +176,7 @@ mod tests {
             r#"<CoSimulation modelIdentifier="m" canGetAndSetFMUstate="true"/>"#,
             r#"<Unknown index="2"/><Unknown index="3" dependencies=""/>"#,
         );
-        let d = Description::parse(&text).unwrap();
+        let d = Fmi2Description::read(&Document::parse(&text).unwrap()).unwrap();
         assert_eq!(d.variables[0].kind.unit(), Some("N"));
         assert_eq!(d.variables[0].kind.range(), (Some(-1.0), Some(f64::INFINITY)));
         assert_eq!((d.starts[0].as_deref(), d.variables[0].kind.start_number()), (Some("0"), Some(0.0)));
@@ -216,17 +189,18 @@ mod tests {
         assert!(d.co_simulation.can_get_and_set_state);
         assert_eq!(d.outputs[0], Output { variable: 1, dependencies: None });
         assert_eq!(d.direct_inputs(&d.outputs[0]), [0]);
-        assert_eq!(d.outputs[1].dependencies, Some(vec![]));
+        assert_eq!(d.outputs[1].dependencies.as_deref(), Some(&[][..]));
     }
 
     #[test]
     fn what_cannot_be_run_is_refused() {
         let cs = r#"<CoSimulation modelIdentifier="m"/>"#;
-        let error = |text: &str| Description::parse(text).unwrap_err().to_string();
+        let error = |text: &str| {
+            let document = Document::parse(text).unwrap();
+            Fmi2Description::read(&document).unwrap_err().to_string()
+        };
         assert!(error(&xml("", "")).contains("no co-simulation interface"));
         assert!(error(&xml(r#"<CoSimulation modelIdentifier="../m"/>"#, "")).contains("not a C identifier"));
         assert!(error(&xml(cs, r#"<Unknown index="5"/>"#)).contains("names variable 5 of 4"));
-        assert!(error(&xml(cs, "").replace("\"2.0\"", "\"3.0\"")).contains("Expected FMI version 2.0"));
-        assert!(error("nonsense").starts_with("modelDescription.xml: "));
     }
 }

@@ -1,0 +1,310 @@
+//! A model description as couplings see it, whatever its version: scalars with names, types and value references;
+//! arrays of them; outputs and what they depend on. The descriptions as written stand behind it.
+
+mod fmi2;
+mod fmi3;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use punctual_fmu::product::CODE;
+use punctual_modeldescription::{Causality, DefaultExperiment, ScalarType, Variability, VariableKind};
+use roxmltree::Document;
+
+use super::number::{DataType, Family};
+use crate::error::FmuProblem;
+pub use fmi2::Fmi2Description;
+pub use fmi3::Fmi3Description;
+
+/// A version of FMI that can be run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Version {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0.
+    Fmi3,
+}
+
+impl Version {
+    /// Its name.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Fmi2 => "FMI 2.0",
+            Self::Fmi3 => "FMI 3.0",
+        }
+    }
+
+    /// The beginning of the names of its functions.
+    pub fn prefix(self) -> &'static str {
+        match self {
+            Self::Fmi2 => "fmi2",
+            Self::Fmi3 => "fmi3",
+        }
+    }
+
+    /// The folder below `binaries/` for the platform of this program.
+    pub fn platform(self) -> &'static str {
+        match self {
+            Self::Fmi2 => punctual_modeldescription::PLATFORM,
+            Self::Fmi3 => "x86_64-linux",
+        }
+    }
+}
+
+/// A scalar: a variable of FMI 2.0, or a variable of FMI 3.0, or one element of an array of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Its name; of an element with its place, from 1, as in `u[2]` and `m[1,3]`.
+    pub name: String,
+    /// The handle in the C interface; elements of an array share it.
+    pub value_reference: u32,
+    /// Its place in its array, row-major, from 0; of a scalar 0.
+    pub element: usize,
+    /// The number of elements of its array; of a scalar 1.
+    pub count: usize,
+    /// The functions that read and write it.
+    pub of: DataType,
+    /// The name of its type in its version, such as `Real` or `Float64`.
+    pub type_name: &'static str,
+    /// Its role; that of a structural parameter is parameter.
+    pub causality: Causality,
+    /// Whether it decides about the sizes of arrays, or the like, and is set before the initialisation.
+    pub structural: bool,
+    /// The instants at which it may change.
+    pub variability: Variability,
+    /// Its unit.
+    pub unit: Option<String>,
+    /// The least and the greatest value allowed.
+    pub range: (Option<f64>, Option<f64>),
+    /// Its start value; of a Boolean 0 or 1, of what is no number none.
+    pub start: Option<f64>,
+    /// The start value of a text.
+    pub text: Option<String>,
+    /// The name of its declared type.
+    pub declared_type: Option<String>,
+    /// Of an enumeration the names and numbers of its items.
+    pub items: Vec<(String, i64)>,
+    /// Meaning for a human.
+    pub description: String,
+}
+
+impl Variable {
+    /// Whether it is read and written as this type by this value reference.
+    pub fn is(&self, of: DataType, reference: u32) -> bool {
+        self.value_reference == reference && self.of == of
+    }
+
+    /// Whether it is a number.
+    pub fn is_number(&self) -> bool {
+        self.of.family() != Family::Other
+    }
+}
+
+/// An array of FMI 3.0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// Its name.
+    pub name: String,
+    /// Its sizes, the outermost first.
+    pub sizes: Vec<usize>,
+    /// The position of its first element in [`Description::variables`]; the others follow.
+    pub first: usize,
+    /// The number of its elements.
+    pub count: usize,
+}
+
+/// An output, and its dependencies at the same communication point.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// Position in the variables.
+    pub variable: usize,
+    /// Positions of the variables it depends on; `None`: not said, so every input.
+    pub dependencies: Option<Arc<[usize]>>,
+}
+
+/// The description as its file has it.
+#[derive(Clone, Debug)]
+pub enum Written {
+    /// Of FMI 2.0.
+    Fmi2(Arc<Fmi2Description>),
+    /// Of FMI 3.0.
+    Fmi3(Arc<Fmi3Description>),
+}
+
+/// The description of a co-simulation FMU.
+///
+/// Variables have the unit and range of their declared type where they have none of their own; a bound or
+/// time that is not a number is absent.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// The description as its file has it.
+    pub written: Written,
+    /// The name of the model.
+    pub model_name: String,
+    /// The meaning of the model for a human; empty: none.
+    pub text: String,
+    /// The text that an instance is made with: `guid`, or `instantiationToken` in FMI 3.0.
+    pub token: String,
+    /// The name of the shared library without its ending.
+    pub model_identifier: String,
+    /// Whether only one instance can exist in one process.
+    pub only_once: bool,
+    /// Whether steps can differ in length.
+    pub any_step: bool,
+    /// The suggested experiment.
+    pub default_experiment: Option<DefaultExperiment>,
+    /// All scalars.
+    pub variables: Vec<Variable>,
+    /// All arrays, in the order of their elements.
+    pub arrays: Vec<Array>,
+    /// Other names: of a scalar, or of an array, and the position of what they name in the variables.
+    aliases: BTreeMap<String, usize>,
+    /// All outputs, in the order of the variables.
+    pub outputs: Vec<Output>,
+    /// Violations of the standard; empty for a valid description.
+    pub problems: Vec<String>,
+}
+
+impl Description {
+    /// Reads a model description from its text.
+    ///
+    /// # Errors
+    ///
+    /// Text that is no model description of FMI 2.0 or 3.0, or of one without a co-simulation interface that this
+    /// program can run.
+    pub fn parse(text: &str) -> Result<Self, FmuProblem> {
+        let document = Document::parse(text).map_err(|e| FmuProblem::Description(e.to_string()))?;
+        let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
+        if version.starts_with("3.") {
+            return Self::of_fmi3(Arc::new(Fmi3Description::read(&document)?), &BTreeMap::new());
+        }
+        Fmi2Description::read(&document).map(|written| Self::of_fmi2(Arc::new(written)))
+    }
+
+    /// The version of FMI.
+    pub fn version(&self) -> Version {
+        match self.written {
+            Written::Fmi2(_) => Version::Fmi2,
+            Written::Fmi3(_) => Version::Fmi3,
+        }
+    }
+
+    /// The same FMU with structural parameters set to these values, by value reference.
+    ///
+    /// # Errors
+    ///
+    /// Arrays that become too large.
+    pub fn sized(&self, structural: &BTreeMap<u32, f64>) -> Result<Self, FmuProblem> {
+        match &self.written {
+            Written::Fmi3(written) if !structural.is_empty() => {
+                Self::of_fmi3(Arc::clone(written), structural)
+            }
+            _ => Ok(self.clone()),
+        }
+    }
+
+    /// The position of the scalar of this name.
+    pub fn index_of(&self, name: &str) -> Option<usize> {
+        // A scalar that is called like an element of an array is meant before the element.
+        let named = |scalar: bool| {
+            self.variables.iter().position(|v| v.name == name && (!scalar || self.array_at(v).is_none()))
+        };
+        named(true).or_else(|| named(false)).or_else(|| self.aliased(name))
+    }
+
+    /// The position of the scalar that has this other name.
+    fn aliased(&self, name: &str) -> Option<usize> {
+        if let Some(first) = self.aliases.get(name) {
+            return self.array_from(*first).is_none().then_some(*first);
+        }
+        let (base, place) = name.split_at(name.rfind('[')?);
+        let array = self.array_from(*self.aliases.get(base)?)?;
+        let elements = array.first..array.first + array.count;
+        let own = format!("{}{place}", array.name);
+        elements.into_iter().find(|&element| self.variables[element].name == own)
+    }
+
+    /// The array of this name.
+    pub fn array(&self, name: &str) -> Option<&Array> {
+        let own = self.arrays.iter().find(|array| array.name == name);
+        own.or_else(|| self.array_from(*self.aliases.get(name)?))
+    }
+
+    /// The array whose first element is at this position.
+    fn array_from(&self, first: usize) -> Option<&Array> {
+        self.arrays.iter().find(|array| array.first == first)
+    }
+
+    /// The array that a scalar is an element of.
+    fn array_at(&self, variable: &Variable) -> Option<&Array> {
+        self.arrays.iter().find(|array| {
+            array.count > 0
+                && self.variables[array.first].value_reference == variable.value_reference
+                && variable.name.strip_prefix(&array.name).is_some_and(|place| place.starts_with('['))
+        })
+    }
+
+    /// Whether the variable at `index` says what an enumeration of the same FMU says, for importers that drop enumerations:
+    /// the Integer `status_code` beside `status`.
+    pub fn is_twin(&self, index: usize) -> bool {
+        let variable = &self.variables[index];
+        let is_whole = variable.of.family() == Family::Integer;
+        let of = variable.name.strip_suffix(CODE).filter(|_| is_whole);
+        of.is_some_and(|of| self.variables.iter().any(|v| v.name == of && v.of == DataType::Enumeration))
+    }
+
+    /// The inputs an output depends on directly, as positions in the variables.
+    pub fn direct_inputs(&self, output: &Output) -> Vec<usize> {
+        let is_input = |&i: &usize| self.variables[i].causality == Causality::Input;
+        match &output.dependencies {
+            None => (0..self.variables.len()).filter(is_input).collect(),
+            Some(list) => list.iter().copied().filter(is_input).collect(),
+        }
+    }
+
+    fn of_fmi2(written: Arc<Fmi2Description>) -> Self {
+        let (interface, model) = (&written.co_simulation, &written.model);
+        let variable = |v: &punctual_modeldescription::Variable| Variable {
+            name: v.name.clone(),
+            value_reference: v.value_reference,
+            element: 0,
+            count: 1,
+            of: match v.kind.scalar_type() {
+                ScalarType::Real => DataType::Float64,
+                ScalarType::Integer => DataType::Int32,
+                ScalarType::Boolean => DataType::Boolean,
+                ScalarType::String => DataType::String,
+                ScalarType::Enumeration => DataType::Enumeration,
+            },
+            type_name: v.kind.scalar_type().as_str(),
+            causality: v.causality,
+            structural: false,
+            variability: v.variability,
+            unit: v.kind.unit().map(str::to_owned),
+            range: v.kind.range(),
+            start: v.kind.start_number(),
+            text: match &v.kind {
+                VariableKind::String(text) => text.start.clone(),
+                _ => None,
+            },
+            declared_type: v.kind.declared_type().map(str::to_owned),
+            items: model.items(v).iter().map(|item| (item.name.clone(), i64::from(item.value))).collect(),
+            description: v.description.clone(),
+        };
+        Self {
+            model_name: model.model_name.clone(),
+            text: model.description.clone(),
+            token: model.guid.clone(),
+            model_identifier: interface.model_identifier.clone(),
+            only_once: interface.can_be_instantiated_only_once_per_process,
+            any_step: interface.can_handle_variable_step,
+            default_experiment: model.default_experiment,
+            variables: model.variables.iter().map(variable).collect(),
+            arrays: Vec::new(),
+            aliases: BTreeMap::new(),
+            outputs: written.outputs.clone(),
+            problems: written.problems.clone(),
+            written: Written::Fmi2(written),
+        }
+    }
+}

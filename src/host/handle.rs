@@ -1,0 +1,245 @@
+//! What instances of all versions share: how a call begins and ends, what its failure says, and when an instance
+//! must be left alone.
+
+use std::ffi::{CString, c_char, c_void};
+use std::ptr::NonNull;
+use std::rc::Rc;
+
+use super::logging::Logging;
+use super::number::{DataType, Loss};
+use super::{Description, Fmu, LogMessage, Status, journal};
+use crate::error::{CallFailure, Error};
+
+/// A living instance. It may be freed unless it returned a status after which the standard forbids that: fatal;
+/// pending, since its step may still be running; a number that is no status. Then it and its library are left
+/// as they are until the process ends.
+pub(super) struct Handle {
+    component: NonNull<c_void>,
+    name: String,
+    /// The last time that the FMU got, in seconds; for error texts only.
+    pub(super) time: Option<f64>,
+    warnings: u64,
+    abandoned: bool,
+    /// For the names of variables in error texts.
+    description: Rc<Description>,
+    // These two outlive the instance, because `drop` frees it before fields go.
+    logging: Logging,
+    fmu: Rc<Fmu>,
+}
+
+/// A text for C.
+pub(super) fn c_text(field: &str, value: &str) -> Result<CString, Error> {
+    CString::new(value).map_err(|_| Error::configuration(field, "must not hold a zero byte"))
+}
+
+impl Handle {
+    /// Makes an instance by `make`, whose name is `call`.
+    pub(super) fn instantiate(
+        call: &'static str,
+        (fmu, description): (Rc<Fmu>, Rc<Description>),
+        name: &str,
+        make: impl FnOnce(&Logging) -> *mut c_void,
+    ) -> Result<Self, Error> {
+        let logging = Logging::new();
+        journal::entering(call, name, fmu.path(), None);
+        let Some(component) = NonNull::new(make(&logging)) else {
+            return Err(Error::call(CallFailure {
+                call,
+                instance: name.to_owned(),
+                path: fmu.path().to_owned(),
+                time: None,
+                status: None,
+                log: logging.messages(),
+            }));
+        };
+        let name = name.to_owned();
+        Ok(Self { component, name, time: None, warnings: 0, abandoned: false, description, logging, fmu })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Number of calls that returned a warning (they count as done).
+    pub(super) fn warnings(&self) -> u64 {
+        self.warnings
+    }
+
+    /// Its last log messages, oldest first; at most eight.
+    pub(super) fn log(&self) -> Vec<LogMessage> {
+        self.logging.messages()
+    }
+
+    /// The instance as its library knows it.
+    pub(super) fn component(&self) -> *mut c_void {
+        self.component.as_ptr()
+    }
+
+    /// Whether the instance may be freed. After a fatal status of one instance no other of this FMU may be called
+    /// either.
+    pub(super) fn may_be_freed(&self) -> bool {
+        !self.abandoned && !self.fmu.abandoned.get()
+    }
+
+    #[inline]
+    pub(super) fn entering(&self, call: &'static str) {
+        journal::entering(call, &self.name, self.fmu.path(), self.time);
+    }
+
+    /// The end of a call.
+    #[inline]
+    pub(super) fn check(&mut self, call: &'static str, status: impl Into<Status>) -> Result<(), Error> {
+        let status = status.into();
+        if status.is_ok() { Ok(()) } else { self.not_ok(call, status) }
+    }
+
+    /// The end of a step to the time `end` (s).
+    #[inline]
+    pub(super) fn check_step(
+        &mut self,
+        call: &'static str,
+        status: impl Into<Status>,
+        end: f64,
+    ) -> Result<(), Error> {
+        self.check(call, status)?;
+        self.time = Some(end);
+        Ok(())
+    }
+
+    #[cold]
+    fn not_ok(&mut self, call: &'static str, status: Status) -> Result<(), Error> {
+        if status.is_last() {
+            self.abandoned = true;
+            self.fmu.abandoned.set(true);
+            self.logging.leak();
+        }
+        if status.is_warning() {
+            self.warnings += 1;
+            return Ok(());
+        }
+        Err(Error::call(CallFailure {
+            call,
+            instance: self.name.clone(),
+            path: self.fmu.path().to_owned(),
+            time: self.time,
+            status: Some(status),
+            log: self.logging.messages(),
+        }))
+    }
+
+    /// The error of a call that was done, but not as the standard says.
+    #[cold]
+    pub(super) fn broken(&self, call: &str, how: impl Into<String>) -> Error {
+        let time = self.time.map(|time| format!(" at t = {} s", crate::error::brief_time(time)));
+        let (name, path) = (&self.name, self.fmu.path().display());
+        Error::broken(format!("{call} of {name} ({path}){}", time.unwrap_or_default()), how)
+    }
+
+    /// The error of a number that its type, or a run, cannot hold.
+    #[cold]
+    pub(super) fn lost(&self, call: &str, of: DataType, references: &[u32], loss: &Loss) -> Error {
+        let mut element = loss.at;
+        let mut variable = None;
+        for reference in references {
+            let first = self.description.variables.iter().find(|v| v.is(of, *reference));
+            let count = first.map_or(1, |first| first.count);
+            if element < count {
+                let mut all = self.description.variables.iter();
+                variable = all.find(|v| v.is(of, *reference) && v.element == element);
+                break;
+            }
+            element -= count;
+        }
+        let name = variable.map_or("a variable", |variable| &variable.name);
+        let (least, greatest) = loss.range;
+        self.broken(
+            call,
+            format!(
+                "cannot carry {name} = {}: must be a number of its type, from {least} to {greatest}",
+                loss.value
+            ),
+        )
+    }
+
+    /// The error of a call with another number of values than of value references.
+    #[cold]
+    pub(super) fn lengths_differ(&self, references: usize, values: usize) -> Error {
+        let message = format!("{references} value references and {values} values; the numbers must be equal");
+        Error::configuration(&self.name, message)
+    }
+
+    /// The error of a type that cannot be read or written in this way.
+    #[cold]
+    pub(super) fn has_no(&self, of: DataType, action: &str) -> Error {
+        Error::configuration(&self.name, format!("a variable of type {of:?} cannot be {action} here"))
+    }
+}
+
+/// Texts for C, and their addresses.
+pub(super) struct CTexts {
+    _texts: Vec<CString>,
+    addresses: Vec<*const c_char>,
+}
+
+impl CTexts {
+    pub(super) fn new(field: &str, texts: &[String]) -> Result<Self, Error> {
+        let texts = texts.iter().map(|text| c_text(field, text)).collect::<Result<Vec<_>, _>>()?;
+        // The texts lie on the heap, so they stay where they are when the list moves.
+        let addresses = texts.iter().map(|text| text.as_ptr()).collect();
+        Ok(Self { _texts: texts, addresses })
+    }
+
+    /// The address of the first address; valid while `self` lives.
+    pub(super) fn first(&self) -> *const *const c_char {
+        self.addresses.as_ptr()
+    }
+}
+
+/// Reads numbers through a buffer of their own type.
+macro_rules! get_through {
+    ($self:ident.$function:ident $name:literal $of:ident ($buffer:ident) $references:ident $values:ident $($count:expr)?) => {{
+        let first = number::room(&mut $self.$buffer, $values.len()).cast();
+        $self.handle.entering($name);
+        let (call, component) = ($self.functions.$function, $self.handle.component());
+        let (references, count) = ($references.as_ptr(), $references.len());
+        // SAFETY: the instance lives; as many elements can be read or written from both addresses as is said.
+        let status = unsafe { call(component, references, count, first $(, $count)?) };
+        $self.handle.check($name, status)?;
+        number::give(&$self.$buffer, $values)
+            .map_err(|loss| $self.handle.lost($name, $of, $references, &loss))
+    }};
+}
+pub(super) use get_through;
+
+/// Writes numbers through a buffer of their own type.
+macro_rules! set_through {
+    ($self:ident.$function:ident $name:literal $of:ident ($buffer:ident) $references:ident $values:ident $($count:expr)?) => {{
+        let first = number::take(&mut $self.$buffer, $values)
+            .map_err(|loss| $self.handle.lost($name, $of, $references, &loss))?
+            .cast();
+        $self.handle.entering($name);
+        let (call, component) = ($self.functions.$function, $self.handle.component());
+        let (references, count) = ($references.as_ptr(), $references.len());
+        // SAFETY: the instance lives; as many elements can be read from both addresses as is said.
+        let status = unsafe { call(component, references, count, first $(, $count)?) };
+        $self.handle.check($name, status)
+    }};
+}
+pub(super) use set_through;
+
+/// Calls that take nothing but the instance.
+macro_rules! plain_calls {
+    ($($method:ident $name:literal;)*) => {$(
+        fn $method(&mut self) -> Result<(), Error> {
+            self.handle.entering($name);
+            // SAFETY: the instance lives.
+            let status = unsafe { (self.functions.$method)(self.handle.component()) };
+            self.handle.check($name, status)
+        }
+    )*};
+}
+pub(super) use plain_calls;

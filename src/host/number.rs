@@ -1,0 +1,243 @@
+//! Types of values, and numbers on their way between the doubles of a run and the type of a variable. A number
+//! that would become another one on this way is refused.
+
+use std::fmt::Display;
+
+/// The type of a value, by the functions that read and write it. FMI 2.0 has [`Float64`](Self::Float64) (Real),
+/// [`Int32`](Self::Int32) (Integer), Boolean, String and Enumeration of these.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DataType {
+    /// A float of 32 bits.
+    Float32,
+    /// A double.
+    Float64,
+    /// A whole number of 8 bits.
+    Int8,
+    /// One without sign.
+    UInt8,
+    /// A whole number of 16 bits.
+    Int16,
+    /// One without sign.
+    UInt16,
+    /// A whole number of 32 bits.
+    Int32,
+    /// One without sign.
+    UInt32,
+    /// A whole number of 64 bits.
+    Int64,
+    /// One without sign.
+    UInt64,
+    /// A truth value; as a number 0 or 1.
+    Boolean,
+    /// A text.
+    String,
+    /// Bytes.
+    Binary,
+    /// One of the items of a declared type; of 32 bits in FMI 2.0, of 64 in FMI 3.0.
+    Enumeration,
+    /// A clock of FMI 3.0.
+    Clock,
+}
+
+/// What can be connected: types of the same family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// Floats and doubles.
+    Real,
+    /// Whole numbers of every size.
+    Integer,
+    /// Enumerations.
+    Enumeration,
+    /// Truth values.
+    Boolean,
+    /// What is no number: texts, bytes, clocks.
+    Other,
+}
+
+impl DataType {
+    /// Its family.
+    pub fn family(self) -> Family {
+        match self {
+            Self::Float32 | Self::Float64 => Family::Real,
+            Self::Int8
+            | Self::UInt8
+            | Self::Int16
+            | Self::UInt16
+            | Self::Int32
+            | Self::UInt32
+            | Self::Int64
+            | Self::UInt64 => Family::Integer,
+            Self::Enumeration => Family::Enumeration,
+            Self::Boolean => Family::Boolean,
+            Self::String | Self::Binary | Self::Clock => Family::Other,
+        }
+    }
+
+    /// The least and the greatest whole number that it holds and that a run can carry, of FMI 3.0; `None` for what is
+    /// no whole number.
+    pub fn whole_range(self) -> Option<(f64, f64)> {
+        Some(match self {
+            Self::Int8 => (i8::RANGE.0, i8::RANGE.1),
+            Self::UInt8 => (u8::RANGE.0, u8::RANGE.1),
+            Self::Int16 => (i16::RANGE.0, i16::RANGE.1),
+            Self::UInt16 => (u16::RANGE.0, u16::RANGE.1),
+            Self::Int32 => (i32::RANGE.0, i32::RANGE.1),
+            Self::UInt32 => (u32::RANGE.0, u32::RANGE.1),
+            Self::Int64 | Self::Enumeration => (i64::RANGE.0, i64::RANGE.1),
+            Self::UInt64 => (u64::RANGE.0, u64::RANGE.1),
+            _ => return None,
+        })
+    }
+}
+
+/// A run carries numbers as doubles, which hold every whole number from −2⁵³ to 2⁵³.
+pub const WHOLE: f64 = 9_007_199_254_740_992.0;
+
+/// A number of an FMU.
+pub(crate) trait Number: Copy + Default + Display {
+    /// The least and the greatest value that a run can carry.
+    const RANGE: (f64, f64);
+
+    /// The same number as a double, if there is one.
+    fn to_double(self) -> Option<f64>;
+
+    /// The number that `value` is, if it is one of this type; of a float the nearest.
+    fn of_double(value: f64) -> Option<Self>;
+}
+
+macro_rules! whole {
+    ($($type:ty),*) => {$(
+        impl Number for $type {
+            // Of the types of 64 bits the bound of a double counts.
+            const RANGE: (f64, f64) = {
+                let (least, greatest) = (<$type>::MIN as f64, <$type>::MAX as f64);
+                (
+                    if least < -WHOLE { -WHOLE } else { least },
+                    if greatest > WHOLE { WHOLE } else { greatest },
+                )
+            };
+
+            fn to_double(self) -> Option<f64> {
+                let value = self as f64;
+                let fits = (Self::RANGE.0..=Self::RANGE.1).contains(&value) && value as Self == self;
+                fits.then_some(value)
+            }
+
+            fn of_double(value: f64) -> Option<Self> {
+                let fits = (Self::RANGE.0..=Self::RANGE.1).contains(&value) && value.trunc() == value;
+                fits.then_some(value as Self)
+            }
+        }
+    )*};
+}
+
+whole!(i8, u8, i16, u16, i32, u32, i64, u64);
+
+impl Number for f32 {
+    const RANGE: (f64, f64) = (f32::MIN as f64, f32::MAX as f64);
+
+    fn to_double(self) -> Option<f64> {
+        Some(f64::from(self))
+    }
+
+    fn of_double(value: f64) -> Option<Self> {
+        // What is not a number or infinite stays so.
+        let nearest = value as f32;
+        (nearest.is_finite() || !value.is_finite()).then_some(nearest)
+    }
+}
+
+/// A truth value in the form of a library: 0 is false, any other bits are true.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(transparent)]
+pub(crate) struct Truth<T>(pub(crate) T);
+
+impl<T: Display> Display for Truth<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<T: Copy + Default + Display + PartialEq + From<bool>> Number for Truth<T> {
+    const RANGE: (f64, f64) = (0.0, 1.0);
+
+    fn to_double(self) -> Option<f64> {
+        Some(f64::from(u8::from(self.0 != T::default())))
+    }
+
+    fn of_double(value: f64) -> Option<Self> {
+        Some(Self(T::from(value != 0.0)))
+    }
+}
+
+/// A number that cannot be carried over.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Loss {
+    /// Its position among the values.
+    pub(crate) at: usize,
+    /// The number.
+    pub(crate) value: String,
+    /// The least and the greatest number allowed.
+    pub(crate) range: (f64, f64),
+}
+
+/// Room for `count` numbers in a buffer, which grows where it is too small.
+pub(crate) fn room<T: Number>(buffer: &mut Vec<T>, count: usize) -> *mut T {
+    buffer.clear();
+    buffer.resize(count, T::default());
+    buffer.as_mut_ptr()
+}
+
+/// Gives numbers on as doubles.
+pub(crate) fn give<T: Number>(numbers: &[T], values: &mut [f64]) -> Result<(), Loss> {
+    for (at, (number, value)) in numbers.iter().zip(values).enumerate() {
+        let lost = || Loss { at, value: number.to_string(), range: T::RANGE };
+        *value = number.to_double().ok_or_else(lost)?;
+    }
+    Ok(())
+}
+
+/// Fills a buffer with doubles as numbers, and says where they are.
+pub(crate) fn take<T: Number>(buffer: &mut Vec<T>, values: &[f64]) -> Result<*const T, Loss> {
+    buffer.clear();
+    for (at, value) in values.iter().enumerate() {
+        let lost = || Loss { at, value: value.to_string(), range: T::RANGE };
+        buffer.push(T::of_double(*value).ok_or_else(lost)?);
+    }
+    Ok(buffer.as_ptr())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_beyond_a_type_or_a_double_are_refused() {
+        assert_eq!(u8::of_double(255.0), Some(255));
+        assert_eq!([256.0, -1.0, 0.5, f64::NAN].map(u8::of_double), [None; 4]);
+        assert_eq!(i64::of_double(-WHOLE), Some(-9_007_199_254_740_992));
+        assert_eq!(i64::of_double(-WHOLE - 2.0), None);
+        assert_eq!(9_007_199_254_740_992_u64.to_double(), Some(WHOLE));
+        assert_eq!((WHOLE as u64 + 2).to_double(), None);
+        // Its double is that of the number before it.
+        assert_eq!((WHOLE as u64 + 1).to_double(), None);
+        assert_eq!(u64::MAX.to_double(), None);
+        assert_eq!(DataType::Int16.whole_range(), Some((-32768.0, 32767.0)));
+    }
+
+    #[test]
+    fn floats_are_rounded_to_the_nearest_and_never_become_infinite() {
+        assert_eq!(f32::of_double(0.1), Some(0.1_f32));
+        assert_eq!(f32::of_double(1e39), None);
+        assert_eq!(f32::of_double(f64::NEG_INFINITY), Some(f32::NEG_INFINITY));
+        assert!(f32::of_double(f64::NAN).is_some_and(f32::is_nan));
+    }
+
+    #[test]
+    fn the_first_number_lost_is_told() {
+        let lost = take(&mut Vec::<i8>::new(), &[1.0, 128.0, 999.0]).unwrap_err();
+        assert_eq!(lost, Loss { at: 1, value: "128".into(), range: (-128.0, 127.0) });
+        let lost = give(&[7, i64::MAX], &mut [0.0; 2]).unwrap_err();
+        assert_eq!((lost.at, lost.value.as_str()), (1, "9223372036854775807"));
+    }
+}

@@ -1,0 +1,170 @@
+//! The calls of co-simulation that a master makes, whoever answers them and whatever their version is; and those
+//! that somebody makes who looks at an FMU more closely.
+
+use super::number::DataType;
+use super::{LogMessage, Version};
+use crate::error::Error;
+
+/// An instance that a master steps: an FMU's, or one of this program's own blocks in process.
+///
+/// Numbers travel as doubles. A Boolean is 0 or 1. Of an array all elements are read and written together, in
+/// row-major order, by one value reference.
+pub trait Participant {
+    /// The instance name, which is that of its component.
+    fn name(&self) -> &str;
+
+    /// Goes back to the state after instantiation.
+    ///
+    /// # Errors
+    ///
+    /// The call is refused; so for every call below.
+    fn reset(&mut self) -> Result<(), Error>;
+
+    /// Begins to set structural parameters, which FMI 3.0 alone has.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn enter_configuration_mode(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Ends that.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn exit_configuration_mode(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Sets start and stop time of the run, in s.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error>;
+
+    /// Begins the initialisation.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn enter_initialization_mode(&mut self) -> Result<(), Error>;
+
+    /// Ends the initialisation.
+    ///
+    /// # Errors
+    ///
+    /// As above; also for parameters that contradict each other.
+    fn exit_initialization_mode(&mut self) -> Result<(), Error>;
+
+    /// Makes the step from `time` by `step` (s).
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error>;
+
+    /// Whether its last step asked for the end of the run.
+    fn asks_to_end(&self) -> bool {
+        false
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn terminate(&mut self) -> Result<(), Error>;
+
+    /// Reads variables of type `of` by their value references. Nothing is called where there are none.
+    ///
+    /// # Errors
+    ///
+    /// As above; also for a number that is no double, and a type without numbers.
+    fn get(&mut self, of: DataType, references: &[u32], values: &mut [f64]) -> Result<(), Error>;
+
+    /// Writes variables of type `of`.
+    ///
+    /// # Errors
+    ///
+    /// As above; also for a number that the type cannot hold.
+    fn set(&mut self, of: DataType, references: &[u32], values: &[f64]) -> Result<(), Error>;
+
+    /// Writes a text, or all texts of an array.
+    ///
+    /// # Errors
+    ///
+    /// As above; also for texts with a zero byte.
+    fn set_text(&mut self, reference: u32, texts: &[String]) -> Result<(), Error>;
+
+    /// The instance's remark on a run that succeeded, if it has one.
+    fn remark(&self) -> Option<String>;
+}
+
+/// An instance of an FMU.
+pub trait Slave: Participant {
+    /// Its version of FMI.
+    fn version(&self) -> Version;
+
+    /// Number of calls that returned a warning (they count as done).
+    fn warnings(&self) -> u64;
+
+    /// Its last log messages, oldest first; at most eight.
+    fn log(&self) -> Vec<LogMessage>;
+
+    /// Reads a text, or all `count` texts of an array; `None` for each that is NULL, and for all where there is no
+    /// such function.
+    ///
+    /// # Errors
+    ///
+    /// As for a [`Participant`].
+    fn get_text(&mut self, reference: u32, count: usize) -> Result<Option<Vec<Option<String>>>, Error>;
+}
+
+/// What an instance says of a run that succeeded: how many calls returned `warning`, or a warning in its log.
+pub(super) fn remark(warnings: u64, warning: &str, log: Vec<LogMessage>) -> Option<String> {
+    if warnings > 0 {
+        let last = log.last().map(|m| format!("; last: {m}")).unwrap_or_default();
+        return Some(format!("{warnings} calls returned {warning}{last}"));
+    }
+    log.into_iter().rfind(|message| message.status.is_warning()).map(|message| message.text)
+}
+
+/// Passes calls on to what is inside.
+macro_rules! calls {
+    ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
+        fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
+            self.as_mut().$method($($argument),*)
+        }
+    )*};
+}
+
+impl Participant for Box<dyn Participant> {
+    fn name(&self) -> &str {
+        self.as_ref().name()
+    }
+
+    calls! {
+        reset();
+        enter_configuration_mode();
+        exit_configuration_mode();
+        setup_experiment(start_time: f64, stop_time: f64);
+        enter_initialization_mode();
+        exit_initialization_mode();
+        do_step(time: f64, step: f64);
+        terminate();
+        get(of: DataType, references: &[u32], values: &mut [f64]);
+        set(of: DataType, references: &[u32], values: &[f64]);
+        set_text(reference: u32, texts: &[String]);
+    }
+
+    fn asks_to_end(&self) -> bool {
+        self.as_ref().asks_to_end()
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.as_ref().remark()
+    }
+}

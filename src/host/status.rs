@@ -1,0 +1,66 @@
+//! The status of a call or a message, in the words of its version of FMI.
+
+use std::fmt;
+
+use punctual_fmu::{fmi2, fmi3};
+
+/// A status of FMI 2.0 or 3.0. A library may return any number, so this can hold any.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// `fmi2Status`.
+    Fmi2(fmi2::Status),
+    /// `fmi3Status`.
+    Fmi3(fmi3::Status),
+}
+
+impl Status {
+    /// Whether the call did all that was asked.
+    #[inline]
+    pub fn is_ok(self) -> bool {
+        matches!(self, Self::Fmi2(fmi2::Status::OK) | Self::Fmi3(fmi3::Status::OK))
+    }
+
+    /// Whether the call was done, with a remark in the log.
+    pub fn is_warning(self) -> bool {
+        matches!(self, Self::Fmi2(fmi2::Status::WARNING) | Self::Fmi3(fmi3::Status::WARNING))
+    }
+
+    /// Whether the call was refused and the instance is as before.
+    pub fn is_discard(self) -> bool {
+        matches!(self, Self::Fmi2(fmi2::Status::DISCARD) | Self::Fmi3(fmi3::Status::DISCARD))
+    }
+
+    /// Whether the call goes on in the background, which only FMI 2.0 knows.
+    pub fn is_pending(self) -> bool {
+        self == Self::Fmi2(fmi2::Status::PENDING)
+    }
+
+    /// Whether the standard forbids to free the instance after it, or does not know it.
+    pub fn is_last(self) -> bool {
+        match self {
+            Self::Fmi2(status) => status == fmi2::Status::FATAL || self.is_pending() || !status.is_known(),
+            Self::Fmi3(status) => status == fmi3::Status::FATAL || !status.is_known(),
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fmi2(status) => status.fmt(f),
+            Self::Fmi3(status) => status.fmt(f),
+        }
+    }
+}
+
+impl From<fmi2::Status> for Status {
+    fn from(status: fmi2::Status) -> Self {
+        Self::Fmi2(status)
+    }
+}
+
+impl From<fmi3::Status> for Status {
+    fn from(status: fmi3::Status) -> Self {
+        Self::Fmi3(status)
+    }
+}
