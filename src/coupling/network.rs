@@ -108,7 +108,7 @@ impl<'a> Resolver<'a> {
     }
 
     fn family(&self, port: Port) -> Family {
-        self.variable(port).of.family()
+        self.variable(port).family()
     }
 
     fn component_name(&self, component: usize) -> &'a str {
@@ -326,7 +326,7 @@ impl<'a> Resolver<'a> {
     fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
         let (given, taken) = (self.variable(from), self.variable(to));
         let types = (given.type_name, taken.type_name);
-        if given.of.family() != taken.of.family() || given.is_number() != taken.is_number() {
+        if given.family() != taken.family() || given.is_number() != taken.is_number() {
             let (from, to, (given, taken)) = (self.name(from), self.name(to), types);
             let message = format!("{from} is {given}, but {to} is {taken}; types must be equal");
             return Err(Error::configuration(field, message));

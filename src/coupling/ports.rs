@@ -2,7 +2,7 @@
 //! come from and go to instances without allocation.
 
 use crate::error::Error;
-use crate::host::{DataType, Family, Participant, Variable};
+use crate::host::{DataType, Participant, Variable};
 
 /// Variables of one component that are read or written together, one type after another; their slots follow one
 /// another in this order. Real ones come first.
@@ -57,7 +57,7 @@ impl Group {
                 positions.push(*position);
             }
             if part.slots > 0 {
-                group.reals += if of.family() == Family::Real { part.slots } else { 0 };
+                group.reals += if of.is_float() { part.slots } else { 0 };
                 group.parts.push(part);
             }
         }
@@ -120,6 +120,7 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::{Causality, example};
 
     #[test]
     fn slots_are_laid_out_by_type() {
@@ -129,7 +130,7 @@ mod tests {
             of,
             element,
             count,
-            ..Variable::example()
+            ..example::variable("v", of, Causality::Output)
         };
         let variables = [
             variable(10, Boolean, 0, 1),

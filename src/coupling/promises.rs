@@ -300,7 +300,7 @@ fn loose<'a>(
             || starts.keys().any(|key| description.index_of(key) == Some(variable))
     };
     let all = description.variables.iter().enumerate();
-    let all = all.filter(|(_, v)| v.causality == Causality::Input && v.of.family() == Family::Real);
+    let all = all.filter(|(_, v)| v.causality == Causality::Input && v.family() == Family::Real);
     let ports = all.map(|(variable, v)| (Port { component, variable }, v.name.as_str()));
     let loose = |port: &Port| links.iter().all(|link| link.to != *port);
     ports.filter(|(port, name)| loose(port) && !given(port.variable, name)).collect()

@@ -7,7 +7,7 @@ use punctual_fmu::configuration::ConfigurationError;
 use super::network::sizes;
 use super::system::{Component, StartValue};
 use crate::error::Error;
-use crate::host::{Causality, DataType, Description, Family, Variable};
+use crate::host::{Causality, DataType, Description, Family, Variable, whole_range};
 
 /// A resolved start value: all that is written by one call.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,13 +93,14 @@ pub(super) fn structural(component: &Component, description: &Description) -> BT
     let given = component.start.iter().filter_map(|(name, value)| {
         let variable = &description.variables[description.index_of(name)?];
         let value = number(variable, value).ok()?;
-        variable.structural.then_some((variable.value_reference, value))
+        (variable.causality == Causality::StructuralParameter).then_some((variable.value_reference, value))
     });
     given.collect()
 }
 
 fn check_causality(variable: &Variable) -> Result<(), String> {
-    if matches!(variable.causality, Causality::Parameter | Causality::Input) {
+    use Causality::{Input, Parameter, StructuralParameter};
+    if matches!(variable.causality, Parameter | Input | StructuralParameter) {
         return Ok(());
     }
     let causality = variable.causality.as_str();
@@ -125,7 +126,12 @@ fn place(
             }
             _ => Values::Numbers(all.iter().map(|v| v.start.unwrap_or(0.0)).collect()),
         };
-        starts.push(Start { of, reference, structural: variable.structural, values });
+        starts.push(Start {
+            of,
+            reference,
+            structural: variable.causality == Causality::StructuralParameter,
+            values,
+        });
         starts.len() - 1
     });
     match (&mut starts[at].values, value) {
@@ -138,12 +144,12 @@ fn place(
 
 /// The value as a number that the variable can have.
 fn number(variable: &Variable, value: &StartValue) -> Result<f64, String> {
-    let number = match (variable.of.family(), value) {
+    let number = match (variable.family(), value) {
         (Family::Real, StartValue::Real(x)) => *x,
         // Beyond 2⁵³ the nearest double is taken, as for any decimal number.
         (Family::Real, StartValue::Integer(i)) => *i as f64,
         (Family::Integer | Family::Enumeration, StartValue::Integer(i)) => {
-            let (least, greatest) = variable.of.whole_range().unwrap_or_default();
+            let (least, greatest) = whole_range(variable.of).unwrap_or_default();
             let number = *i as f64;
             if number < least || number > greatest || number as i64 != *i {
                 return Err(format!("is {i}; must be from {least} to {greatest}"));

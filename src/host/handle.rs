@@ -60,10 +60,6 @@ impl Handle {
         &self.name
     }
 
-    pub(super) fn description(&self) -> &Description {
-        &self.description
-    }
-
     /// Number of calls that returned a warning (they count as done).
     pub(super) fn warnings(&self) -> u64 {
         self.warnings

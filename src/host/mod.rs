@@ -23,11 +23,13 @@ pub use archive::{
     Archive, MAX_DESCRIPTION_BYTES, MAX_ENTRIES, MAX_FILE_BYTES, MAX_NAME_BYTES, MAX_RATIO,
     MAX_UNPACKED_BYTES, SMALL_BYTES, declared_encoding, is_latin,
 };
+#[cfg(test)]
+pub(crate) use description::example;
 pub use description::{
     Array, Description, Fmi2Description, Fmi3Description, Output, Variable, Version, Written,
 };
 pub use logging::LogMessage;
-pub use number::{DataType, Family};
+pub use number::{DataType, Family, whole_range};
 pub use participant::{Participant, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
 pub use status::Status;
@@ -114,13 +116,16 @@ impl Fmu {
     ///
     /// # Errors
     ///
-    /// The library cannot be loaded or lacks a function, `name` holds a zero byte, or the FMU
-    /// refuses (its log says why).
+    /// It needs what this program does not offer, the library cannot be loaded or lacks a function, `name` holds a zero
+    /// byte, or the FMU refuses (its log says why).
     pub fn instantiate(
         self: &Rc<Self>,
         description: &Rc<Description>,
         name: &str,
     ) -> Result<Box<dyn Slave>, Error> {
+        if let Some(reason) = description.obstacle() {
+            return Err(Error::fmu(self.path(), FmuProblem::CannotRun(reason)));
+        }
         let of = (Rc::clone(self), Rc::clone(description));
         Ok(match self.library()?.functions {
             Functions::Fmi2(functions) => Box::new(fmi2::Instance::new(of, functions, name)?),

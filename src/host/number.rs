@@ -3,41 +3,7 @@
 
 use std::fmt::Display;
 
-/// The type of a value, by the functions that read and write it. FMI 2.0 has [`Float64`](Self::Float64) (Real),
-/// [`Int32`](Self::Int32) (Integer), Boolean, String and Enumeration of these.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum DataType {
-    /// A float of 32 bits.
-    Float32,
-    /// A double.
-    Float64,
-    /// A whole number of 8 bits.
-    Int8,
-    /// One without sign.
-    UInt8,
-    /// A whole number of 16 bits.
-    Int16,
-    /// One without sign.
-    UInt16,
-    /// A whole number of 32 bits.
-    Int32,
-    /// One without sign.
-    UInt32,
-    /// A whole number of 64 bits.
-    Int64,
-    /// One without sign.
-    UInt64,
-    /// A truth value; as a number 0 or 1.
-    Boolean,
-    /// A text.
-    String,
-    /// Bytes.
-    Binary,
-    /// One of the items of a declared type; of 32 bits in FMI 2.0, of 64 in FMI 3.0.
-    Enumeration,
-    /// A clock of FMI 3.0.
-    Clock,
-}
+pub use punctual_modeldescription::fmi3::DataType;
 
 /// What can be connected: types of the same family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -54,44 +20,27 @@ pub enum Family {
     Other,
 }
 
-impl DataType {
-    /// Its family.
-    pub fn family(self) -> Family {
-        match self {
-            Self::Float32 | Self::Float64 => Family::Real,
-            Self::Int8
-            | Self::UInt8
-            | Self::Int16
-            | Self::UInt16
-            | Self::Int32
-            | Self::UInt32
-            | Self::Int64
-            | Self::UInt64 => Family::Integer,
-            Self::Enumeration => Family::Enumeration,
-            Self::Boolean => Family::Boolean,
-            Self::String | Self::Binary | Self::Clock => Family::Other,
+impl Family {
+    /// The family of a type.
+    pub fn of(data_type: DataType) -> Self {
+        match data_type {
+            DataType::Enumeration => Self::Enumeration,
+            DataType::Boolean => Self::Boolean,
+            of if of.is_float() => Self::Real,
+            of if of.limits().is_some() => Self::Integer,
+            _ => Self::Other,
         }
-    }
-
-    /// The least and the greatest whole number that it holds and that a run can carry, of FMI 3.0; `None` for what is
-    /// no whole number.
-    pub fn whole_range(self) -> Option<(f64, f64)> {
-        Some(match self {
-            Self::Int8 => (i8::RANGE.0, i8::RANGE.1),
-            Self::UInt8 => (u8::RANGE.0, u8::RANGE.1),
-            Self::Int16 => (i16::RANGE.0, i16::RANGE.1),
-            Self::UInt16 => (u16::RANGE.0, u16::RANGE.1),
-            Self::Int32 => (i32::RANGE.0, i32::RANGE.1),
-            Self::UInt32 => (u32::RANGE.0, u32::RANGE.1),
-            Self::Int64 | Self::Enumeration => (i64::RANGE.0, i64::RANGE.1),
-            Self::UInt64 => (u64::RANGE.0, u64::RANGE.1),
-            _ => return None,
-        })
     }
 }
 
+/// The least and the greatest whole number that a type holds and a run can carry; `None` for what is no whole number.
+pub fn whole_range(of: DataType) -> Option<(f64, f64)> {
+    let (least, greatest) = of.limits()?;
+    Some(((least as f64).max(-WHOLE), (greatest as f64).min(WHOLE)))
+}
+
 /// A run carries numbers as doubles, which hold every whole number from −2⁵³ to 2⁵³.
-pub const WHOLE: f64 = 9_007_199_254_740_992.0;
+const WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// A number of an FMU.
 pub(crate) trait Number: Copy + Default + Display {
@@ -109,13 +58,10 @@ macro_rules! whole {
     ($($type:ty),*) => {$(
         impl Number for $type {
             // Of the types of 64 bits the bound of a double counts.
-            const RANGE: (f64, f64) = {
-                let (least, greatest) = (<$type>::MIN as f64, <$type>::MAX as f64);
-                (
-                    if least < -WHOLE { -WHOLE } else { least },
-                    if greatest > WHOLE { WHOLE } else { greatest },
-                )
-            };
+            const RANGE: (f64, f64) = (
+                (<$type>::MIN as f64).max(-WHOLE),
+                (<$type>::MAX as f64).min(WHOLE),
+            );
 
             fn to_double(self) -> Option<f64> {
                 let value = self as f64;
@@ -222,7 +168,9 @@ mod tests {
         // Its double is that of the number before it.
         assert_eq!((WHOLE as u64 + 1).to_double(), None);
         assert_eq!(u64::MAX.to_double(), None);
-        assert_eq!(DataType::Int16.whole_range(), Some((-32768.0, 32767.0)));
+        assert_eq!(whole_range(DataType::Int16), Some(i16::RANGE));
+        assert_eq!(whole_range(DataType::UInt64), Some(u64::RANGE));
+        assert_eq!(whole_range(DataType::Float32), None);
     }
 
     #[test]

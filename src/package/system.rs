@@ -226,7 +226,7 @@ fn connector(
     if !matches!(variable.causality, Input | Output | Parameter | CalculatedParameter) {
         return None;
     }
-    let kind = match variable.of.family() {
+    let kind = match variable.family() {
         Family::Real => VariableKind::Real(Real::default()),
         Family::Integer => VariableKind::Integer(Integer::default()),
         Family::Boolean => VariableKind::Boolean(Plain::default()),
@@ -285,7 +285,7 @@ fn parameter(variable: &Variable, value: &StartValue) -> Option<ParameterValue> 
         StartValue::Real(x) => ParameterValue::Real(*x),
         StartValue::Boolean(b) => ParameterValue::Boolean(*b),
         StartValue::Text(text) => ParameterValue::String(text.clone()),
-        StartValue::Integer(i) if variable.of.family() == Family::Real => ParameterValue::Real(*i as f64),
+        StartValue::Integer(i) if variable.family() == Family::Real => ParameterValue::Real(*i as f64),
         StartValue::Integer(i) => match variable.items.iter().find(|(_, item)| item == i) {
             Some((name, _)) if items(variable).is_some() => ParameterValue::Enumeration(name.clone()),
             _ => ParameterValue::Integer(i32::try_from(*i).ok()?),

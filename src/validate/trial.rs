@@ -322,7 +322,7 @@ fn same(a: &Variable, b: &Variable) -> bool {
 
 fn is_set_by_importers(v: &Variable) -> bool {
     let settable = matches!(v.causality, Causality::Parameter | Causality::Input);
-    settable && !v.structural && v.variability != Variability::Constant
+    settable && v.variability != Variability::Constant
 }
 
 fn set_start(slave: &mut dyn Slave, array: &[Variable]) -> Result<(), Error> {

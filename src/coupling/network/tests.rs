@@ -1,76 +1,41 @@
 //! Resolution of system files against made-up descriptions, one defect each.
 
-use punctual_modeldescription::{EnumerationItem, ModelDescription, Plain, Real, SimpleType};
-
+use super::super::starts::Values;
 use super::*;
-use crate::host::{Variability, VariableKind};
-
-fn real() -> VariableKind {
-    VariableKind::Real(Real::default())
-}
-
-fn boolean() -> VariableKind {
-    VariableKind::Boolean(Plain::default())
-}
-
-fn variable(name: &str, kind: VariableKind, causality: Causality) -> Variable {
-    Variable {
-        name: name.into(),
-        value_reference: 0,
-        kind,
-        causality,
-        variability: Variability::Discrete,
-        initial: None,
-        description: String::new(),
-        dependencies: None,
-        initial_dependencies: None,
-    }
-}
-
-fn description(variables: Vec<Variable>, dependencies: &[(&str, Option<&[&str]>)]) -> Description {
-    let index = |name: &str| variables.iter().position(|v| v.name == name).unwrap();
-    let outputs = dependencies
-        .iter()
-        .map(|(name, list)| Output {
-            variable: index(name),
-            dependencies: list.map(|list| list.iter().map(|name| index(name)).collect()),
-        })
-        .collect();
-    Description {
-        starts: vec![None; variables.len()],
-        model: ModelDescription { variables, ..ModelDescription::default() },
-        outputs,
-        problems: vec![],
-    }
-}
+use crate::host::DataType::Float64;
+use crate::host::example::{description, variable, vector};
 
 fn filter() -> Description {
-    let time = Real { min: Some(0.0), unit: Some("s".into()), ..Real::default() };
-    let deadline = variable("deadline", VariableKind::Real(time), Causality::Parameter);
-    let mode = variable("mode", VariableKind::enumeration("Mode"), Causality::Parameter);
-    let on = EnumerationItem { name: "on".into(), value: 1, description: String::new() };
-    let mut filter = description(
+    let deadline = Variable {
+        range: (Some(0.0), None),
+        unit: Some("s".into()),
+        ..variable("deadline", Float64, Causality::Parameter)
+    };
+    let mode = Variable {
+        items: vec![("on".into(), 1)],
+        value_reference: 1,
+        ..variable("mode", DataType::Enumeration, Causality::Parameter)
+    };
+    description(
         vec![
-            variable("x", real(), Causality::Input),
-            variable("u_ref", real(), Causality::Input),
-            variable("rearm", boolean(), Causality::Input),
-            variable("u", real(), Causality::Output),
-            variable("arrived", boolean(), Causality::Output),
+            variable("x", Float64, Causality::Input),
+            variable("u_ref", Float64, Causality::Input),
+            variable("rearm", DataType::Boolean, Causality::Input),
+            variable("u", Float64, Causality::Output),
+            variable("arrived", DataType::Boolean, Causality::Output),
             deadline,
             mode,
         ],
         &[("u", None), ("arrived", None)],
-    );
-    filter.model.types = vec![SimpleType::enumeration("Mode", "", vec![on])];
-    filter
+    )
 }
 
 fn plant() -> Description {
     description(
         vec![
-            variable("u", real(), Causality::Input),
-            variable("x", real(), Causality::Output),
-            variable("text", VariableKind::String(Plain::default()), Causality::Output),
+            variable("u", Float64, Causality::Input),
+            variable("x", Float64, Causality::Output),
+            variable("text", DataType::String, Causality::Output),
         ],
         &[("x", Some(&[])), ("text", Some(&[]))],
     )
@@ -79,7 +44,7 @@ fn plant() -> Description {
 /// A gain block.
 fn gain() -> Description {
     description(
-        vec![variable("i", real(), Causality::Input), variable("o", real(), Causality::Output)],
+        vec![variable("i", Float64, Causality::Input), variable("o", Float64, Causality::Output)],
         &[("o", Some(&["i"]))],
     )
 }
@@ -193,17 +158,110 @@ fn each_wiring_defect_is_told_with_its_field() {
 
 #[test]
 fn each_start_value_defect_is_told_with_its_field() {
-    assert_eq!(resolved("", "deadline = 5").unwrap().starts[1], [Start::Real(0, 5.0)]);
+    assert_eq!(resolved("", "deadline = 5").unwrap().starts[1], [Start::real(0, 5.0)]);
     let defects = [
         ("deadline = -1.0", "component[1].start.\"deadline\": is -1 s; must be ≥ 0 s"),
         ("deadline = true", "is of type Real; the value given is not"),
         ("mode = 2", "is 2; must be one of 1 (on)"),
-        ("mode = 3000000000", "is 3000000000; must be from -2147483648 to 2147483647"),
+        ("mode = 3000000000", "is 3000000000; must be one of 1 (on)"),
+        ("deadline = [1.0]", "is a list of [1]; must be one value"),
+        ("deadline = \"soon\"", "is of type Real; the value given is not"),
         ("u = 1.0", "has causality output; only parameters and inputs"),
         ("nothing = 1.0", "filter (f) has no variable \"nothing\""),
     ];
     for (start, expected) in defects {
         let message = resolved("", start).unwrap_err().to_string();
         assert!(message.contains(expected), "{start}: {message}");
+    }
+}
+
+/// A block with the vectors `v`, an input, and `w`, an output, and a parameter of each kind.
+fn block(size: usize) -> Description {
+    let mut variables = vector("v", size, Causality::Input);
+    variables.extend(
+        vector("w", size, Causality::Output).into_iter().map(|v| Variable { value_reference: 1, ..v }),
+    );
+    let parameter = |name: &str, of, value_reference| Variable {
+        value_reference,
+        ..variable(name, of, Causality::Parameter)
+    };
+    variables.push(parameter("small", DataType::UInt8, 2));
+    variables.push(parameter("large", DataType::UInt64, 3));
+    variables.push(parameter("text", DataType::String, 4));
+    variables.push(parameter("bytes", DataType::Binary, 5));
+    description(variables, &[("w[1]", Some(&[])), ("w[2]", Some(&[]))])
+}
+
+fn blocks(wiring: &str, start: &str) -> Result<Network, Error> {
+    let text = format!(
+        r#"
+experiment = {{ stop_time = 1.0, step = 0.1 }}
+component = [
+  {{ name = "a", fmu = "a.fmu" }},
+  {{ name = "b", fmu = "b.fmu", start = {{ {start} }} }},
+  {{ name = "c", fmu = "c.fmu" }},
+]
+{wiring}"#
+    );
+    resolve(&System::parse(&text).unwrap(), &[&block(2), &block(2), &block(3)])
+}
+
+#[test]
+fn arrays_connect_as_a_whole_and_by_elements() {
+    let whole = blocks("connection = [{ from = \"a.w\", to = \"b.v\", factor = 2 }]", "").unwrap();
+    let pairs: Vec<_> =
+        whole.links.iter().map(|link| (link.from.variable, link.to.variable, link.factor)).collect();
+    assert_eq!(pairs, [(2, 0, 2.0), (3, 1, 2.0)]);
+    let one = blocks("connection = [{ from = \"a.w[2]\", to = \"c.v[3]\" }]", "").unwrap();
+    assert_eq!((one.links[0].from.variable, one.links[0].to.variable), (3, 2));
+    let record = blocks("record = { signals = [\"b.w\", \"a.w[1]\"] }", "").unwrap();
+    assert_eq!(record.recorded.len(), 3);
+}
+
+#[test]
+fn each_defect_of_arrays_is_told_with_its_field() {
+    let connection = |from: &str, to: &str| format!("connection = [{{ from = \"{from}\", to = \"{to}\" }}]");
+    let defects = [
+        (
+            connection("a.w", "c.v"),
+            "connection[0]: a.w is an array of [2], but c.v is an array of [3]; sizes must be equal",
+        ),
+        (
+            connection("a.w", "c.v[1]"),
+            "connection[0]: a.w is an array of [2], but c.v[1] is a scalar; sizes must be equal",
+        ),
+        (connection("a.w[3]", "c.v[1]"), "connection[0].from: a (a.fmu) has no variable \"w[3]\""),
+        (
+            "plot = [{ kind = \"time\", signals = [\"a.w\"] }]".into(),
+            "\"w\" of a (a.fmu) is an array of [2]; name an element, such as \"w[1]\"",
+        ),
+    ];
+    for (wiring, expected) in defects {
+        let message = blocks(&wiring, "").unwrap_err().to_string();
+        assert!(message.contains(expected), "{wiring}: {message}");
+    }
+}
+
+#[test]
+fn start_values_of_arrays_are_lists_or_elements() {
+    let start = |text: &str| blocks("", text).map(|network| network.starts[1].clone());
+    let numbers = |values: &[f64]| Values::Numbers(values.to_vec());
+    assert_eq!(start("v = [1.0, 2]").unwrap()[0].values, numbers(&[1.0, 2.0]));
+    // Elements come after the whole, and what is not given is what the description says.
+    assert_eq!(start("\"v[2]\" = 3, v = [1, 2]").unwrap()[0].values, numbers(&[1.0, 3.0]));
+    assert_eq!(start("\"v[2]\" = 3").unwrap()[0].values, numbers(&[0.0, 3.0]));
+    assert_eq!(start("text = \"on\"").unwrap()[0].values, Values::Texts(vec!["on".into()]));
+    let defects = [
+        ("v = [1.0]", "component[1].start.\"v\": is a list of [1]; must be a list of [2]"),
+        ("v = 1.0", "is one value; must be a list of [2]"),
+        ("v = [[1], [2, 3]]", "is a list of lists of different length; must be a list of [2]"),
+        ("small = 256", "is 256; must be from 0 to 255"),
+        ("large = 9007199254740993", "is 9007199254740993; must be from 0 to 9007199254740992"),
+        ("text = 1", "is of type String; the value given is not"),
+        ("bytes = \"00\"", "is of type Binary, which cannot be given a value here"),
+    ];
+    for (text, expected) in defects {
+        let message = start(text).unwrap_err().to_string();
+        assert!(message.contains(expected), "{text}: {message}");
     }
 }

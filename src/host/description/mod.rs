@@ -46,7 +46,7 @@ impl Version {
     pub fn platform(self) -> &'static str {
         match self {
             Self::Fmi2 => punctual_modeldescription::PLATFORM,
-            Self::Fmi3 => "x86_64-linux",
+            Self::Fmi3 => punctual_modeldescription::fmi3::PLATFORM,
         }
     }
 }
@@ -66,10 +66,8 @@ pub struct Variable {
     pub of: DataType,
     /// The name of its type in its version, such as `Real` or `Float64`.
     pub type_name: &'static str,
-    /// Its role; that of a structural parameter is parameter.
+    /// Its role.
     pub causality: Causality,
-    /// Whether it decides about the sizes of arrays, or the like, and is set before the initialisation.
-    pub structural: bool,
     /// The instants at which it may change.
     pub variability: Variability,
     /// Its unit.
@@ -96,7 +94,12 @@ impl Variable {
 
     /// Whether it is a number.
     pub fn is_number(&self) -> bool {
-        self.of.family() != Family::Other
+        self.family() != Family::Other
+    }
+
+    /// What it can be connected with.
+    pub fn family(&self) -> Family {
+        Family::of(self.of)
     }
 }
 
@@ -189,6 +192,14 @@ impl Description {
         }
     }
 
+    /// The reason why no instance can be run here, if there is one.
+    pub fn obstacle(&self) -> Option<String> {
+        match &self.written {
+            Written::Fmi2(_) => None,
+            Written::Fmi3(written) => written.obstacle(),
+        }
+    }
+
     /// The same FMU with structural parameters set to these values, by value reference.
     ///
     /// # Errors
@@ -248,7 +259,7 @@ impl Description {
     /// the Integer `status_code` beside `status`.
     pub fn is_twin(&self, index: usize) -> bool {
         let variable = &self.variables[index];
-        let is_whole = variable.of.family() == Family::Integer;
+        let is_whole = variable.family() == Family::Integer;
         let of = variable.name.strip_suffix(CODE).filter(|_| is_whole);
         of.is_some_and(|of| self.variables.iter().any(|v| v.name == of && v.of == DataType::Enumeration))
     }
@@ -278,7 +289,6 @@ impl Description {
             },
             type_name: v.kind.scalar_type().as_str(),
             causality: v.causality,
-            structural: false,
             variability: v.variability,
             unit: v.kind.unit().map(str::to_owned),
             range: v.kind.range(),
@@ -306,5 +316,79 @@ impl Description {
             problems: written.problems.clone(),
             written: Written::Fmi2(written),
         }
+    }
+}
+
+/// Descriptions for the tests of those who use them.
+#[cfg(test)]
+pub(crate) mod example {
+    use super::*;
+
+    /// A variable of this name, type and causality; everything else is left out.
+    pub(crate) fn variable(name: &str, of: DataType, causality: Causality) -> Variable {
+        let type_name = match of {
+            DataType::Float64 => ScalarType::Real.as_str(),
+            of => of.as_str(),
+        };
+        Variable {
+            name: name.to_owned(),
+            value_reference: 0,
+            element: 0,
+            count: 1,
+            of,
+            type_name,
+            causality,
+            variability: Variability::Discrete,
+            unit: None,
+            range: (None, None),
+            start: None,
+            text: None,
+            declared_type: None,
+            items: Vec::new(),
+            description: String::new(),
+        }
+    }
+
+    /// A description of these variables. Outputs depend on what is said, by name.
+    pub(crate) fn description(
+        variables: Vec<Variable>,
+        dependencies: &[(&str, Option<&[&str]>)],
+    ) -> Description {
+        let index = |name: &str| variables.iter().position(|v| v.name == name).unwrap();
+        let outputs = dependencies
+            .iter()
+            .map(|(name, list)| Output {
+                variable: index(name),
+                dependencies: list.map(|list| list.iter().map(|name| index(name)).collect()),
+            })
+            .collect();
+        let arrays = variables.iter().enumerate().filter(|(_, v)| v.name.ends_with("[1]"));
+        let array = |(first, v): (usize, &Variable)| Array {
+            name: v.name.trim_end_matches("[1]").to_owned(),
+            sizes: vec![v.count],
+            first,
+            count: v.count,
+        };
+        let written = Fmi3Description {
+            model: Default::default(),
+            co_simulation: Default::default(),
+            problems: Vec::new(),
+        };
+        Description {
+            arrays: arrays.map(array).collect(),
+            outputs,
+            variables,
+            ..Description::of_fmi3(Arc::new(written), &BTreeMap::new()).unwrap()
+        }
+    }
+
+    /// The elements of a vector.
+    pub(crate) fn vector(name: &str, count: usize, causality: Causality) -> Vec<Variable> {
+        let element = |element: usize| Variable {
+            element,
+            count,
+            ..variable(&format!("{name}[{}]", element + 1), DataType::Float64, causality)
+        };
+        (0..count).map(element).collect()
     }
 }
