@@ -25,7 +25,7 @@ pub use finding::{Finding, Place, rules};
 pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
-use crate::host::Archive;
+use crate::host::{Archive, Version};
 use finding::Findings;
 use punctual_modeldescription::Located;
 
@@ -80,7 +80,8 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     model.check(&mut |violation| findings.violation(&model, violation));
     layout::check(&archive, &model, &mut findings);
     symbols::check(&archive, &model, &mut findings);
-    match (limit, trial::reason_to_skip(&archive, &model, &findings)) {
+    let needs_tool = model.description.co_simulation.needs_execution_tool;
+    match (limit, trial::reason_to_skip(&archive, Version::Fmi2, needs_tool, &findings)) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
         (Some(limit), None) => trial::run(path, limit, &mut findings)?,
