@@ -5,7 +5,7 @@
 //! has no field for are passed over, since a check against the schema finds those.
 
 use crate::notes::{At, Notes, children, list};
-use crate::rules::{Check, Place, UnknownList, Violation};
+use crate::rules::{Check, Place, UnknownList, Violation, fmi2};
 use crate::xsd::{boolean, double, int, unsigned};
 use crate::{
     Causality, CoSimulation, EnumerationItem, Initial, Integer, ModelDescription, ModelStructure,
@@ -73,9 +73,9 @@ impl Located {
         for i in 1..self.interfaces {
             report(add(Place::Interface(i), "CoSimulation is there again; must be there once"));
         }
-        let mut check = Check { description: &self.description, unread: &self.notes.unread, report };
-        check.description();
-        check.structure(&self.structure);
+        let mut check = Check { unread: &self.notes.unread, report };
+        fmi2::description(&self.description, &mut check);
+        fmi2::structure(&self.description, &self.structure, &mut check);
     }
 
     fn root(&mut self, root: Node<'_, '_>) {

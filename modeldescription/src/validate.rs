@@ -6,7 +6,7 @@
 
 use crate::calendar::is_utc_instant;
 use crate::names::{forbidden_character, is_one_line};
-use crate::rules::{Check, Place, Unread, Violation};
+use crate::rules::{Check, Place, Unread, Violation, fmi2};
 use crate::xml::Header;
 use crate::xsd::Number;
 use crate::{
@@ -36,9 +36,15 @@ impl ModelDescription {
                 broken.get_or_insert(violation);
             }
         };
-        Check { description: self, unread: &Unread::new(), report: &mut report }.description();
+        fmi2::description(self, &mut Check { unread: &Unread::new(), report: &mut report });
         if let Some(Violation { rule, place, message }) = broken {
-            return Err(Error::rule(rule, path(self, place), message));
+            let paths = Paths {
+                interfaces: &["co_simulation"],
+                units: &self.units,
+                of_type: &|t| &self.types[t].name,
+                of_variable: &|v| &self.variables[v].name,
+            };
+            return Err(Error::rule(rule, paths.of(place), message));
         }
         header("guid", &self.header())?;
         source_files(self)?;
@@ -59,21 +65,42 @@ pub(crate) fn variable_path(variable: &Variable, field: &str) -> String {
     format!("variables[{:?}].{field}", variable.name)
 }
 
-/// The path of a place in an error.
-fn path(description: &ModelDescription, place: Place) -> String {
-    let of_unit = |u: usize| format!("units[{:?}]", description.units[u].name);
-    let of_type = |t: usize| format!("types[{:?}]", description.types[t].name);
-    match place {
-        Place::Interface(_) => "co_simulation".to_owned(),
-        Place::Experiment => "default_experiment".to_owned(),
-        Place::Category(c) => format!("log_categories[{c}]"),
-        Place::Unit(u) => of_unit(u),
-        Place::DisplayUnit(u, d) => format!("{}.display_units[{d}]", of_unit(u)),
-        Place::Type(t) => of_type(t),
-        Place::Item(t, i) => format!("{}.items[{i}]", of_type(t)),
-        Place::Variable(v) => format!("variables[{:?}]", description.variables[v].name),
-        Place::Start(v) => variable_path(&description.variables[v], "start"),
-        Place::Root | Place::Unknowns(_) | Place::Unknown(..) | Place::Alias(..) => "description".to_owned(),
+/// The names that paths of places are made of.
+pub(crate) struct Paths<'a> {
+    /// The interfaces; the last stands for all after it.
+    pub(crate) interfaces: &'a [&'a str],
+    pub(crate) units: &'a [Unit],
+    /// The name of the declared type at a position.
+    pub(crate) of_type: &'a dyn Fn(usize) -> &'a str,
+    /// The name of the variable at a position.
+    pub(crate) of_variable: &'a dyn Fn(usize) -> &'a str,
+}
+
+impl Paths<'_> {
+    /// The path of a place in an error.
+    pub(crate) fn of(&self, place: Place) -> String {
+        let of_unit = |u: usize| format!("units[{:?}]", self.units[u].name);
+        let of_type = |t: usize| format!("types[{:?}]", (self.of_type)(t));
+        let of_variable = |v: usize| format!("variables[{:?}]", (self.of_variable)(v));
+        match place {
+            Place::Interface(i) => {
+                self.interfaces.get(i).or(self.interfaces.last()).copied().unwrap_or_default().to_owned()
+            }
+            Place::Experiment => "default_experiment".to_owned(),
+            Place::Category(c) => format!("log_categories[{c}]"),
+            Place::Unit(u) => of_unit(u),
+            Place::DisplayUnit(u, d) => format!("{}.display_units[{d}]", of_unit(u)),
+            Place::Type(t) => of_type(t),
+            Place::Item(t, i) => format!("{}.items[{i}]", of_type(t)),
+            Place::Variable(v) => of_variable(v),
+            Place::Start(v) => format!("{}.start", of_variable(v)),
+            Place::Alias(v, a) => format!("{}.aliases[{a}]", of_variable(v)),
+            Place::Terminal(t) => format!("terminals[{t}]"),
+            Place::Member(t, m) => format!("terminals[{t}].members[{m}]"),
+            Place::Unknowns(list) => format!("structure.{}", list.as_str()),
+            Place::Unknown(list, u) => format!("structure.{}[{u}]", list.as_str()),
+            Place::Root => "description".to_owned(),
+        }
     }
 }
 

@@ -4,7 +4,8 @@
 mod support;
 
 use punctual_modeldescription::fmi3::{
-    Clock, Interface, IntervalVariability, Located, ModelDescription, Variable, VariableKind,
+    Clock, Integer, Interface, IntervalVariability, Located, ModelDescription, Unknown, Variable,
+    VariableKind,
 };
 use punctual_modeldescription::{Causality, Place, UnknownList, Variability};
 use roxmltree::Document;
@@ -34,7 +35,22 @@ fn full() -> ModelDescription {
     rearm.clocks = vec![30];
     rearm.can_handle_multiple_set = Some(false);
     description.variables[5].intermediate_update = true;
-    description.variables[18].previous = Some(15);
+    // The status becomes a clocked state.
+    let before = Variable {
+        declared_type: Some("Status".into()),
+        ..Variable::new(
+            "before",
+            31,
+            Causality::Local,
+            Variability::Discrete,
+            VariableKind::Enumeration(Integer::default()),
+        )
+    };
+    description.variables.push(before);
+    let status = &mut description.variables[18];
+    (status.previous, status.clocks) = (Some(31), vec![30]);
+    description.structure.clocked_states = vec![Unknown::new(18)];
+    description.structure.event_indicators = vec![Unknown::new(21)];
     description.variables[20].kind.as_float_mut().expect("a number").reinit = true;
     description.scheduled_execution = Some(Interface {
         model_identifier: "small_3".into(),
@@ -55,6 +71,15 @@ fn what_was_written_comes_back() {
         }
         assert_eq!(located.description, wanted);
         assert_eq!(located.starts[2].as_deref(), Some("0.1 0.2 0.3"));
+    }
+}
+
+#[test]
+fn what_was_written_breaks_no_rule() {
+    for description in [small3(), full()] {
+        let mut rules = Vec::new();
+        read(&description.to_xml().expect("valid")).check(&mut |violation| rules.push(violation.rule));
+        assert_eq!(rules, ["structure.unsaid"], "one output says nothing");
     }
 }
 

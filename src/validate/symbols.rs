@@ -123,6 +123,25 @@ pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
     }
 }
 
+/// The folders of FMI 3.0 (3.0.2, section 2.5.1) for a library of the platform that FMI 2.0 calls `platform`: of a library
+/// for macOS one for each of its processors.
+pub(crate) fn tuples(platform: &'static str, bytes: &[u8]) -> Vec<&'static str> {
+    const INTEL: &str = "x86_64-darwin";
+    const ARM: &str = "aarch64-darwin";
+    match platform {
+        "linux64" => vec!["x86_64-linux"],
+        "linux32" => vec!["x86-linux"],
+        "win64" => vec!["x86_64-windows"],
+        "win32" => vec!["x86-windows"],
+        "darwin64" => match parse(bytes).map(|file| file.architecture()) {
+            Ok(Architecture::Aarch64) => vec![ARM],
+            Ok(_) => vec![INTEL],
+            Err(_) => vec![INTEL, ARM],
+        },
+        same => vec![same],
+    }
+}
+
 fn parse(bytes: &[u8]) -> Result<object::File<'_>, String> {
     object::File::parse(bytes).map_err(|e| format!("is not a shared library: {e}"))
 }

@@ -141,15 +141,7 @@ impl ModelDescription {
     /// The sizes of the dimensions of a variable, as the start values of structural parameters have them.
     /// `None`: a size is not given, or is no start value of a variable.
     pub fn shape(&self, variable: &Variable) -> Option<Vec<u64>> {
-        let size = |dimension: &super::Dimension| match (dimension.start, dimension.value_reference) {
-            (Some(size), None) => Some(size),
-            (None, Some(reference)) => {
-                let start = &self.by_reference(reference)?.kind.as_integer()?.start;
-                u64::try_from(*start.first()?).ok()
-            }
-            _ => None,
-        };
-        variable.dimensions.iter().map(size).collect()
+        variable.shape(|reference| self.by_reference(reference))
     }
 
     /// The interfaces that are there, by the names of their elements.

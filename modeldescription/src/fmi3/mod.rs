@@ -8,11 +8,13 @@
 //! | `validate` | conditions on a description that is to be written |
 //! | `xml` | the file `modelDescription.xml`, written |
 //! | `read` | the same file, read |
+//! | `terminals` | the file `terminalsAndIcons.xml`, written and read |
 
 mod description;
 #[cfg(feature = "read")]
 mod read;
 mod structure;
+mod terminals;
 mod validate;
 mod variable;
 mod xml;
@@ -21,6 +23,9 @@ pub use description::{CoSimulation, Interface, ModelDescription, ModelExchange, 
 #[cfg(feature = "read")]
 pub use read::Located;
 pub use structure::{ModelStructure, Unknown};
+#[cfg(feature = "read")]
+pub use terminals::LocatedTerminals;
+pub use terminals::{StreamMember, TERMINALS, Terminal, TerminalMember, Terminals};
 pub use variable::{
     Alias, Binary, Clock, DataType, Dimension, Float, Integer, IntervalVariability, Plain, Variable,
     VariableKind,
@@ -28,6 +33,9 @@ pub use variable::{
 
 /// One value of an enumeration type, of 64 bits.
 pub type EnumerationItem = crate::EnumerationItem<i64>;
+
+/// Stands for a dimension of a variable among the attributes that cannot be read.
+pub(crate) const DIMENSION: &str = "Dimension";
 
 /// The folder of this platform's binaries inside an archive of FMI 3.0 (section 2.5.1.4.2), such as `x86_64-linux`.
 pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "x86_64")) {

@@ -2,12 +2,12 @@
 //! 2.0.
 
 use super::{
-    Alias, Binary, Clock, CoSimulation, DataType, Dimension, EnumerationItem, Float, Integer, Interface,
-    IntervalVariability, ModelDescription, ModelExchange, ModelStructure, Plain, TypeDefinition, Unknown,
-    Variable, VariableKind,
+    Alias, Binary, Clock, CoSimulation, DIMENSION, DataType, Dimension, EnumerationItem, Float, Integer,
+    Interface, IntervalVariability, ModelDescription, ModelExchange, ModelStructure, Plain, TypeDefinition,
+    Unknown, Variable, VariableKind,
 };
 use crate::notes::{At, Notes, children};
-use crate::rules::Place;
+use crate::rules::{Check, Place, Violation, fmi3};
 use crate::xsd::{boolean, double, float, hexadecimal, integer, unsigned, words};
 use crate::{Causality, Initial, NamingConvention, UnknownList, Variability};
 use roxmltree::{Document, Node};
@@ -37,6 +37,11 @@ impl Located {
     /// beginning of the part that should have it.
     pub fn position(&self, place: Place) -> usize {
         self.notes.position(place)
+    }
+
+    /// Tells every rule of [`RULES`](crate::RULES) that is broken.
+    pub fn check(&self, report: &mut dyn FnMut(Violation)) {
+        fmi3::description(&self.description, &mut Check { unread: &self.notes.unread, report });
     }
 
     /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
@@ -317,6 +322,3 @@ impl At<'_, '_, '_> {
         value
     }
 }
-
-/// Stands for a dimension of a variable among the attributes that cannot be read.
-pub(super) const DIMENSION: &str = "Dimension";

@@ -1,9 +1,10 @@
 //! Conditions on a description of FMI 3.0 that is to be written. The first violation found is reported.
 
 use super::{DataType, Integer, ModelDescription, TypeDefinition, VariableKind};
-use crate::Error;
-use crate::validate::{categories, header, items, line, name, numbers, text, units};
+use crate::rules::{Check, Unread, Violation, fmi3};
+use crate::validate::{Paths, categories, header, items, line, name, numbers, text, units};
 use crate::xsd::Number;
+use crate::{Error, RULES, Severity};
 
 impl ModelDescription {
     /// Checks every rule that [`to_xml`](Self::to_xml) checks.
@@ -15,13 +16,22 @@ impl ModelDescription {
     /// - A date is not in UTC, a factor of a base unit or a nominal value not positive, a bound NaN or infinite on the
     ///   wrong side, a start value infinite without such a bound.
     /// - A number does not fit its type.
-    /// - There is no interface and no variable, or an enumeration has no items or no type.
+    /// - A rule of [`RULES`](crate::RULES) is broken.
+    /// - There is no variable, or an enumeration has no items or no type.
     pub fn validate(&self) -> Result<(), Error> {
-        header("instantiation_token", &self.header())?;
-        if self.interfaces().is_empty() {
-            let allowed = "at least one of model_exchange and co_simulation";
-            return Err(Error::invalid("description", "without interface", allowed));
+        let mut broken = None;
+        let mut report = |violation: Violation| {
+            let harmless = RULES.iter().any(|row| row.0 == violation.rule && row.1 == Severity::Warning);
+            // A flag that contradicts another is refused too.
+            if !harmless || violation.rule == "interface.flags" {
+                broken.get_or_insert(violation);
+            }
+        };
+        fmi3::description(self, &mut Check { unread: &Unread::new(), report: &mut report });
+        if let Some(Violation { rule, place, message }) = broken {
+            return Err(Error::rule(rule, self.paths(|paths| paths.of(place)), message));
         }
+        header("instantiation_token", &self.header())?;
         units(&self.units)?;
         for (t, declared) in self.types.iter().enumerate() {
             name(format!("types[{t}].name"), &declared.name)?;
@@ -46,6 +56,18 @@ impl ModelDescription {
             }
         }
         Ok(())
+    }
+}
+
+impl ModelDescription {
+    /// Gives the paths of places in an error.
+    pub(super) fn paths<T>(&self, with: impl FnOnce(&Paths<'_>) -> T) -> T {
+        with(&Paths {
+            interfaces: &["model_exchange", "co_simulation", "scheduled_execution"],
+            units: &self.units,
+            of_type: &|t| &self.types[t].name,
+            of_variable: &|v| &self.variables[v].name,
+        })
     }
 }
 
@@ -90,7 +112,7 @@ fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error
             .chain(start.iter().map(|&value| ("start", value)))
         {
             if !(least..=most).contains(&value) {
-                let allowed = format!("an {} of {least} to {most}", of.as_str());
+                let allowed = format!("a value of {}, {least} to {most}", of.as_str());
                 return Err(Error::invalid(path(field), value, allowed));
             }
         }

@@ -472,4 +472,17 @@ impl Variable {
     pub fn state(&self) -> Option<u32> {
         self.kind.as_float()?.derivative
     }
+
+    /// The sizes of the dimensions, with `find` for the variables that have them.
+    pub(crate) fn shape<'a>(&self, find: impl Fn(u32) -> Option<&'a Self>) -> Option<Vec<u64>> {
+        let size = |dimension: &Dimension| match (dimension.start, dimension.value_reference) {
+            (Some(size), None) => Some(size),
+            (None, Some(reference)) => {
+                let start = &find(reference)?.kind.as_integer()?.start;
+                u64::try_from(*start.first()?).ok()
+            }
+            _ => None,
+        };
+        self.dimensions.iter().map(size).collect()
+    }
 }

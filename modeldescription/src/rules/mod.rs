@@ -1,19 +1,22 @@
-//! Rules of the standard beyond the schema (FMI 2.0.4, sections 2.2 and 4.3): one list for descriptions that are
-//! about to be written and for those that were read.
+//! Rules of the standard beyond the schema (FMI 2.0.4, sections 2.2 and 4.3; FMI 3.0.2, section 2.4): one list for
+//! both versions, for descriptions that are about to be written and for those that were read.
 //!
-//! A description that is written must keep all rules on the description; its structure follows from its
-//! variables. A description that was read ([`Located`](crate::Located)) may break any rule, and some of its
+//! A description that is written must keep all rules; in FMI 2.0 its structure follows from its variables. A
+//! description that was read ([`Located`](crate::Located)) may break any rule, and some of its
 //! attributes may be no values of their type at all. The model has nothing in their place, and rules that need
 //! them are silent.
+//!
+//! A rule that both versions have stands here, in `variables` or in `structure`; `fmi2` and `fmi3` have their own,
+//! and say what the shared ones ask of a variable.
 
-// The structure of a description that is written follows from its variables.
-#[cfg(feature = "read")]
+pub(crate) mod fmi2;
+pub(crate) mod fmi3;
 mod structure;
 mod variables;
 
-use crate::{ModelDescription, NamingConvention, ScalarType, is_c_identifier};
+use crate::{DefaultExperiment, LogCategory, Unit, is_c_identifier};
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fmt;
 
 /// Severity of breaking a rule.
@@ -43,6 +46,8 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
     ("interface.identifier", Error, "modelIdentifier is a C identifier"),
     ("interface.guid", Error, "guid is not empty"),
+    ("interface.kind", Error, "FMI 3.0: the FMU offers an interface"),
+    ("interface.token", Error, "FMI 3.0: instantiationToken is not empty"),
     ("interface.flags", Warning, "the capability flags do not contradict each other"),
     ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
     ("experiment.step", Warning, "stepSize is at most stopTime - startTime"),
@@ -53,24 +58,50 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("type.unique", Error, "no type is defined twice or named like a variable"),
     ("type.defined", Error, "declaredType names a type of the same kind"),
     ("type.items", Error, "the items of an enumeration have different names and values"),
-    ("variable.unique", Error, "variable names are unique"),
+    ("variable.unique", Error, "variable names are unique, those of aliases too"),
+    ("variable.reference", Error, "FMI 3.0: value references are unique"),
     ("variable.name", Error, "variable names follow the naming convention"),
     ("variable.alias", Warning, "variables with the same value reference agree in start value and unit"),
     ("variable.alias-set", Error, "at most one variable of an alias set can be set from outside"),
     ("variable.combination", Error, "causality, variability and initial go together"),
-    ("variable.continuous", Error, "only Real variables are continuous"),
+    ("variable.continuous", Error, "only floating-point variables are continuous"),
     ("variable.start", Error, "start values are there where they must be, and only there"),
+    (
+        "variable.dimension",
+        Error,
+        "FMI 3.0: sizes of arrays are given, by themselves or by a variable that may",
+    ),
+    ("variable.length", Error, "FMI 3.0: arrays have one start value, or as many as elements"),
+    ("variable.clock", Error, "FMI 3.0: clocks, clocked variables and their previous values go together"),
     ("variable.range", Error, "min <= start <= max"),
     ("variable.enumeration", Error, "start values of enumerations are values of their items"),
-    ("variable.independent", Error, "there is at most one independent variable, and it is Real"),
-    ("variable.derivative", Error, "derivative is the index of a Real variable"),
+    (
+        "variable.independent",
+        Error,
+        "there is at most one independent variable (FMI 3.0: one), a floating-point number",
+    ),
+    ("variable.derivative", Error, "derivative names a floating-point variable (FMI 3.0: of the same size)"),
     ("structure.outputs", Error, "ModelStructure/Outputs lists every output exactly once"),
     ("structure.derivatives", Error, "ModelStructure/Derivatives lists derivatives"),
+    (
+        "structure.states",
+        Warning,
+        "FMI 3.0, model exchange: ContinuousStateDerivative lists every derivative",
+    ),
+    ("structure.clocked-states", Error, "FMI 3.0: ClockedState lists variables with a previous value"),
+    ("structure.event-indicators", Error, "FMI 3.0: EventIndicator lists continuous numbers"),
     ("structure.initial-unknowns", Error, "ModelStructure/InitialUnknowns is complete, without others"),
     ("structure.order", Error, "ModelStructure/InitialUnknowns is sorted by index"),
-    ("structure.index", Error, "indices are those of variables, from 1"),
+    ("structure.index", Error, "indices (FMI 3.0: value references) are those of variables"),
     ("structure.dependencies", Error, "dependencies name variables; dependenciesKind has as many words"),
     ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
+    (
+        "terminal.unique",
+        Error,
+        "FMI 3.0: names of terminals are unique on each level, memberName in each terminal",
+    ),
+    ("terminal.member", Error, "FMI 3.0: members of terminals name variables that can be connected"),
+    ("terminal.name", Error, "FMI 3.0: members have a memberName where the matching rule goes by it"),
 ];
 
 /// A list of [`ModelStructure`](crate::ModelStructure), by its name in FMI 2.0 or its element in FMI 3.0.
@@ -142,6 +173,10 @@ pub enum Place {
     Start(usize),
     /// A variable, and one of its aliases.
     Alias(usize, usize),
+    /// A terminal, those inside of others counted after them.
+    Terminal(usize),
+    /// A terminal, and one of its members; stream members come after the others.
+    Member(usize, usize),
     /// A list of the structure.
     Unknowns(UnknownList),
     /// One of a list of the structure.
@@ -162,30 +197,13 @@ pub struct Violation {
 /// Attributes that are missing though they must be there, or are no value of their type.
 pub(crate) type Unread = HashSet<(Place, &'static str)>;
 
-/// The description that rules look at, and the reporter that they tell.
+/// What could not be read, and the reporter that rules tell.
 pub(crate) struct Check<'a> {
-    pub(crate) description: &'a ModelDescription,
     pub(crate) unread: &'a Unread,
     pub(crate) report: &'a mut dyn FnMut(Violation),
 }
 
 impl Check<'_> {
-    /// Checks every rule on the description.
-    pub(crate) fn description(&mut self) {
-        self.interface();
-        self.experiment();
-        self.categories();
-        self.units();
-        self.types();
-        self.variables();
-    }
-
-    /// Checks every rule on the structure.
-    #[cfg(feature = "read")]
-    pub(crate) fn structure(&mut self, structure: &crate::ModelStructure) {
-        structure::check(self, structure);
-    }
-
     fn add(&mut self, rule: &'static str, place: Place, message: impl Into<String>) {
         (self.report)(Violation { rule, place, message: message.into() });
     }
@@ -194,13 +212,16 @@ impl Check<'_> {
         self.unread.contains(&(place, attribute))
     }
 
-    fn interface(&mut self) {
-        let description = self.description;
-        if description.guid.trim().is_empty() && !self.is_unread(Place::Root, "guid") {
-            self.add("interface.guid", Place::Root, "guid is empty; must be a text that no other FMU has");
+    /// Checks the text that ties description and library together.
+    fn token(&mut self, rule: &'static str, attribute: &'static str, token: &str) {
+        if token.trim().is_empty() && !self.is_unread(Place::Root, attribute) {
+            let message = format!("{attribute} is empty; must be a text that no other FMU has");
+            self.add(rule, Place::Root, message);
         }
-        let (interface, place) = (&description.co_simulation, Place::Interface(0));
-        let name = &interface.model_identifier;
+    }
+
+    /// Checks the name of the libraries.
+    fn identifier(&mut self, place: Place, name: &str) {
         if !is_c_identifier(name) && !self.is_unread(place, "modelIdentifier") {
             let message = format!(
                 "modelIdentifier is {name:?}; must be a C identifier (letters, digits, underscores, no digit first), \
@@ -208,14 +229,18 @@ impl Check<'_> {
             );
             self.add("interface.identifier", place, message);
         }
-        if interface.can_serialize_state && !interface.can_get_and_set_state {
-            let message = "canSerializeFMUstate is true, so canGetAndSetFMUstate must be true; it is false";
+    }
+
+    /// Checks two flags, each with its name, of which the first needs the second.
+    fn flags(&mut self, place: Place, flag: (&str, bool), needs: (&str, bool)) {
+        if flag.1 && !needs.1 {
+            let message = format!("{} is true, so {} must be true; it is false", flag.0, needs.0);
             self.add("interface.flags", place, message);
         }
     }
 
-    fn experiment(&mut self) {
-        let Some(experiment) = self.description.default_experiment else { return };
+    fn experiment(&mut self, experiment: Option<DefaultExperiment>) {
+        let Some(experiment) = experiment else { return };
         let mut complain = |message: String| self.add("experiment.times", Place::Experiment, message);
         let named = [("startTime", experiment.start_time), ("stopTime", experiment.stop_time)];
         for (name, value) in named {
@@ -244,9 +269,9 @@ impl Check<'_> {
         }
     }
 
-    fn categories(&mut self) {
+    fn categories(&mut self, categories: &[LogCategory]) {
         let mut seen = HashSet::new();
-        for (c, category) in self.description.log_categories.iter().enumerate() {
+        for (c, category) in categories.iter().enumerate() {
             if !seen.insert(category.name.as_str()) {
                 let message = format!("the log category {:?} is defined twice", brief(&category.name));
                 self.add("log.unique", Place::Category(c), message);
@@ -254,9 +279,9 @@ impl Check<'_> {
         }
     }
 
-    fn units(&mut self) {
+    fn units(&mut self, units: &[Unit]) {
         let mut seen = HashSet::new();
-        for (u, unit) in self.description.units.iter().enumerate() {
+        for (u, unit) in units.iter().enumerate() {
             if !seen.insert(unit.name.as_str()) {
                 let message = format!("the unit {:?} is defined twice", unit.name);
                 self.add("unit.unique", Place::Unit(u), message);
@@ -267,6 +292,13 @@ impl Check<'_> {
             let mut displayed = HashSet::new();
             for (d, display) in unit.display_units.iter().enumerate() {
                 self.factor(Place::DisplayUnit(u, d), &display.name, display.factor);
+                if display.inverse && display.offset != 0.0 {
+                    let (name, offset) = (brief(&display.name), display.offset);
+                    let message = format!(
+                        "the display unit {name:?} is inverse and has the offset {offset}; must have none"
+                    );
+                    self.add("unit.factor", Place::DisplayUnit(u, d), message);
+                }
                 if !displayed.insert(display.name.as_str()) {
                     let message =
                         format!("the unit {:?} has the display unit {:?} twice", unit.name, display.name);
@@ -282,51 +314,6 @@ impl Check<'_> {
                 format!("the unit {:?} has the factor {factor}; must be finite and not 0", brief(unit));
             self.add("unit.factor", place, message);
         }
-    }
-
-    fn types(&mut self) {
-        let description = self.description;
-        let variables: HashSet<&str> = description.variables.iter().map(|v| v.name.as_str()).collect();
-        let units = variables::Units::new(description);
-        let mut seen = HashSet::new();
-        for (t, declared) in description.types.iter().enumerate() {
-            let (name, place) = (declared.name.as_str(), Place::Type(t));
-            if !seen.insert(name) {
-                self.add("type.unique", place, format!("the type {name:?} is defined twice"));
-            }
-            if variables.contains(name) {
-                let message = format!("the type {name:?} has the name of a variable; names must differ");
-                self.add("type.unique", place, message);
-            }
-            units.check(declared.kind.unit(), declared.kind.display_unit(), place, self);
-            if let (Some(min), Some(max)) = declared.kind.range()
-                && (min.is_nan() || max.is_nan() || min > max)
-            {
-                let message =
-                    format!("the type {name:?} has min = {min} and max = {max}; must be min <= max");
-                self.add("variable.range", place, message);
-            }
-            if declared.kind.scalar_type() == ScalarType::Enumeration {
-                let (mut names, mut values) = (HashSet::new(), HashMap::new());
-                for (i, item) in declared.items.iter().enumerate() {
-                    if !names.insert(item.name.as_str()) {
-                        let message = format!("the type {name:?} has the item {:?} twice", item.name);
-                        self.add("type.items", Place::Item(t, i), message);
-                    }
-                    if let Some(other) = values.insert(item.value, item.name.as_str()) {
-                        let message = format!(
-                            "the items {other:?} and {:?} of {name:?} have the same value {}",
-                            item.name, item.value
-                        );
-                        self.add("type.items", Place::Item(t, i), message);
-                    }
-                }
-            }
-        }
-    }
-
-    fn is_structured(&self) -> bool {
-        self.description.variable_naming_convention == NamingConvention::Structured
     }
 }
 

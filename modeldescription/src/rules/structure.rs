@@ -1,51 +1,56 @@
-//! Rules on `ModelStructure` (FMI 2.0.4, section 2.2.8). Indices count from 1.
+//! Rules on `ModelStructure` that both versions of the standard have (FMI 2.0.4, section 2.2.8; FMI 3.0.2, section
+//! 2.4.8). FMI 2.0 numbers variables by their index from 1, FMI 3.0 by their value reference.
 
 use super::{Check, Place, UnknownList, brief};
-use crate::structure::index;
-use crate::{Causality, Initial, ModelStructure, Real, Unknown, Variable, VariableKind};
 use std::collections::{BTreeSet, HashSet};
 
 /// Most names shown of a longer list.
 const SHOWN: usize = 8;
 
-pub(super) fn check(check: &mut Check<'_>, structure: &ModelStructure) {
-    use UnknownList::{Derivatives, InitialUnknowns, Outputs};
-    for (list, unknowns) in [
-        (Outputs, &structure.outputs),
-        (Derivatives, &structure.derivatives),
-        (InitialUnknowns, &structure.initial_unknowns),
-    ] {
-        check.indices(list, unknowns);
-    }
-    let variables = check.description.variables.iter().enumerate();
-    let outputs =
-        variables.filter(|(_, v)| v.causality == Causality::Output).map(|(i, _)| index(i)).collect();
-    check.complete("structure.outputs", Outputs, &structure.outputs, &outputs);
-    check.derivatives(&structure.derivatives);
-    let wanted = check.initial_unknowns(&structure.derivatives);
-    check.complete("structure.initial-unknowns", InitialUnknowns, &structure.initial_unknowns, &wanted);
-    check.sorted(&structure.initial_unknowns);
-    check.unsaid(&structure.outputs);
+/// A variable that is computed, by its number, and its dependencies.
+pub(super) struct Listed<'a> {
+    pub(super) number: u32,
+    pub(super) dependencies: Option<&'a [u32]>,
+    pub(super) kinds: Option<&'a [String]>,
+}
+
+/// The numbers that lists name variables by.
+pub(super) struct Numbering<'a> {
+    /// The attribute that has the number.
+    pub(super) attribute: &'static str,
+    /// The name of a list.
+    pub(super) of_list: fn(UnknownList) -> &'static str,
+    /// The word for the number.
+    pub(super) word: &'static str,
+    /// The numbers that are allowed.
+    pub(super) wanted: String,
+    /// The word for the number of a dependency, and what is allowed there.
+    pub(super) dependency: &'static str,
+    pub(super) wanted_dependency: String,
+    /// The name of the variable of a number.
+    pub(super) find: &'a dyn Fn(u32) -> Option<&'a str>,
 }
 
 impl Check<'_> {
-    fn indices(&mut self, list: UnknownList, unknowns: &[Unknown]) {
-        let (description, name) = (self.description, list.as_str());
-        let most = description.variables.len();
+    /// Checks that numbers are those of variables, and dependencies in themselves.
+    pub(super) fn numbers(&mut self, list: UnknownList, unknowns: &[Listed<'_>], numbering: &Numbering<'_>) {
+        let (find, name) = (numbering.find, (numbering.of_list)(list));
         for (u, unknown) in unknowns.iter().enumerate() {
             let place = Place::Unknown(list, u);
-            if !self.is_unread(place, "index") && description.at(unknown.index).is_none() {
-                let index = unknown.index;
-                let message = format!("{name}: index is {index}; must be that of a variable, 1 to {most}");
+            if !self.is_unread(place, numbering.attribute) && find(unknown.number).is_none() {
+                let Numbering { attribute, wanted, .. } = numbering;
+                let message = format!("{name}: {attribute} is {}; must be {wanted}", unknown.number);
                 self.add("structure.index", place, message);
             }
             let readable = !self.is_unread(place, "dependencies");
-            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
-            for index in dependencies.iter().filter(|index| readable && description.at(**index).is_none()) {
-                let message = format!("{name}: dependencies name variable {index}; must be 1 to {most}");
+            let dependencies = unknown.dependencies.unwrap_or_default();
+            for number in dependencies.iter().filter(|number| readable && find(**number).is_none()) {
+                let Numbering { dependency, wanted_dependency, .. } = numbering;
+                let message =
+                    format!("{name}: dependencies name {dependency} {number}; must be {wanted_dependency}");
                 self.add("structure.dependencies", place, message);
             }
-            match (&unknown.dependencies, &unknown.dependency_kinds) {
+            match (unknown.dependencies, unknown.kinds) {
                 (None, Some(_)) => {
                     let message = format!("{name}: there is dependenciesKind, but no dependencies");
                     self.add("structure.dependencies", place, message);
@@ -60,7 +65,7 @@ impl Check<'_> {
                 _ => {}
             }
             if list == UnknownList::InitialUnknowns {
-                for kind in unknown.dependency_kinds.iter().flatten() {
+                for kind in unknown.kinds.iter().copied().flatten() {
                     if !["dependent", "constant"].contains(&kind.as_str()) {
                         let message = format!(
                             "{name}: dependenciesKind {:?}; allowed here: dependent, constant",
@@ -73,36 +78,34 @@ impl Check<'_> {
         }
     }
 
-    /// Checks that a list holds the variables wanted, each once, and no other.
-    fn complete(
+    /// Checks that a list holds the variables wanted, each once, and no other than those allowed.
+    pub(super) fn complete(
         &mut self,
         rule: &'static str,
         list: UnknownList,
-        unknowns: &[Unknown],
-        wanted: &BTreeSet<u32>,
+        unknowns: &[Listed<'_>],
+        (wanted, allowed): (&BTreeSet<u32>, &BTreeSet<u32>),
+        numbering: &Numbering<'_>,
     ) {
-        let (description, name) = (self.description, list.as_str());
+        let (find, name, word) = (numbering.find, (numbering.of_list)(list), numbering.word);
         let mut seen = HashSet::new();
         for (u, unknown) in unknowns.iter().enumerate() {
-            let (index, place) = (unknown.index, Place::Unknown(list, u));
-            let Some(variable) = description.at(index) else { continue };
-            let variable = brief(&variable.name);
-            if !seen.insert(index) {
-                self.add(rule, place, format!("{name} lists {variable:?} (index {index}) twice"));
-            } else if !wanted.contains(&index) {
+            let (number, place) = (unknown.number, Place::Unknown(list, u));
+            let Some(variable) = find(number).map(brief) else { continue };
+            if !seen.insert(number) {
+                self.add(rule, place, format!("{name} lists {variable:?} ({word} {number}) twice"));
+            } else if !allowed.contains(&number) {
                 let message =
-                    format!("{name} lists {variable:?} (index {index}), which does not belong there");
+                    format!("{name} lists {variable:?} ({word} {number}), which does not belong there");
                 self.add(rule, place, message);
             }
         }
-        let missing: Vec<u32> = wanted.iter().copied().filter(|index| !seen.contains(index)).collect();
+        let missing: Vec<u32> = wanted.iter().copied().filter(|number| !seen.contains(number)).collect();
         if !missing.is_empty() {
             let names: Vec<_> = missing
                 .iter()
                 .take(SHOWN)
-                .filter_map(|index| {
-                    Some(format!("{:?} (index {index})", brief(&description.at(*index)?.name)))
-                })
+                .filter_map(|number| Some(format!("{:?} ({word} {number})", brief(find(*number)?))))
                 .collect();
             let more = missing.len().saturating_sub(SHOWN);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -111,72 +114,22 @@ impl Check<'_> {
         }
     }
 
-    fn derivatives(&mut self, unknowns: &[Unknown]) {
-        for (u, unknown) in unknowns.iter().enumerate() {
-            let Some(variable) = self.description.at(unknown.index) else { continue };
-            if state_of(variable).is_none() {
-                let message = format!(
-                    "Derivatives lists {:?}, which has no attribute derivative",
-                    brief(&variable.name)
-                );
-                self.add("structure.derivatives", Place::Unknown(UnknownList::Derivatives, u), message);
-            }
-        }
+    /// Tells of a derivative in the list that is none.
+    pub(super) fn no_derivative(&mut self, u: usize, variable: &str, list: &str) {
+        let message = format!("{list} lists {:?}, which has no attribute derivative", brief(variable));
+        self.add("structure.derivatives", Place::Unknown(UnknownList::Derivatives, u), message);
     }
 
-    /// Outputs that are computed in initialization, calculated parameters, and states and derivatives computed
-    /// then.
-    fn initial_unknowns(&self, derivatives: &[Unknown]) -> BTreeSet<u32> {
-        let description = self.description;
-        let computed = |variable: &Variable| {
-            matches!(variable.effective_initial(), Some(Initial::Approx | Initial::Calculated))
-        };
-        let variables = description.variables.iter().enumerate();
-        let mut wanted: BTreeSet<u32> =
-            variables.filter(|(_, v)| v.is_initial_unknown()).map(|(i, _)| index(i)).collect();
-        for listed in derivatives.iter().map(|unknown| unknown.index) {
-            let state = description.at(listed).and_then(state_of);
-            for index in [Some(listed), state].into_iter().flatten() {
-                if description.at(index).is_some_and(computed) {
-                    wanted.insert(index);
-                }
-            }
-        }
-        wanted
-    }
-
-    fn sorted(&mut self, unknowns: &[Unknown]) {
-        let mut before = 0;
-        for (u, unknown) in unknowns.iter().enumerate() {
-            let (after, place) = (unknown.index, Place::Unknown(UnknownList::InitialUnknowns, u));
-            if self.is_unread(place, "index") {
-                continue;
-            }
-            if before > after {
-                let message =
-                    format!("InitialUnknowns has index {after} after {before}; must be sorted by index");
-                self.add("structure.order", place, message);
-                return;
-            }
-            before = after;
-        }
-    }
-
-    fn unsaid(&mut self, outputs: &[Unknown]) {
-        let inputs = self.description.variables.iter().any(|v| v.causality == Causality::Input);
+    /// Checks that outputs say what they depend on, where there are inputs.
+    pub(super) fn unsaid(&mut self, name: &str, outputs: &[Listed<'_>], inputs: bool) {
         let unsaid = outputs.iter().filter(|unknown| unknown.dependencies.is_none()).count();
         if inputs && unsaid > 0 {
             let all = outputs.len();
             let message = format!(
-                "{unsaid} of {all} Outputs have no dependencies, which means that they depend on every input; importers \
+                "{unsaid} of {all} {name} have no dependencies, which means that they depend on every input; importers \
                  then see algebraic loops (dependencies=\"\" says: on none)"
             );
             self.add("structure.unsaid", Place::Unknowns(UnknownList::Outputs), message);
         }
     }
-}
-
-/// The index of the state that a variable is the derivative of.
-fn state_of(variable: &Variable) -> Option<u32> {
-    if let VariableKind::Real(Real { derivative, .. }) = variable.kind { derivative } else { None }
 }

@@ -1,19 +1,60 @@
-//! Rules on variables, one by one and among each other (FMI 2.0.4, section 2.2.7).
+//! Rules on variables and declared types that both versions of the standard have (FMI 2.0.4, section 2.2.7; FMI
+//! 3.0.2, section 2.4.7), over what they ask of one.
 
 use super::{Check, Place, brief};
-use crate::{
-    BaseType, Causality, Initial, InitialRule, ModelDescription, ScalarType, SimpleType, Variability,
-    Variable, VariableKind, is_structured_name,
-};
+use crate::{Causality, Initial, InitialRule, Unit, Variability, is_structured_name};
 use std::collections::{HashMap, HashSet};
+
+/// What the rules ask of a declared type.
+pub(crate) trait AnyType {
+    fn name(&self) -> &str;
+    /// The type, as the standard spells it.
+    fn type_name(&self) -> &'static str;
+    fn unit(&self) -> Option<&str>;
+    fn display_unit(&self) -> Option<&str>;
+    /// Least and greatest value.
+    fn range(&self) -> (Option<f64>, Option<f64>);
+    /// Names and values of an enumeration.
+    fn items(&self) -> Vec<(&str, i64)>;
+}
+
+/// What the rules ask of a variable.
+pub(crate) trait AnyVariable {
+    /// The types of floating-point numbers.
+    const FLOATS: &'static str;
+    /// What is added where a variable is continuous but may not be.
+    const CONTINUOUS: &'static str;
+
+    fn name(&self) -> &str;
+    fn causality(&self) -> Causality;
+    fn variability(&self) -> Variability;
+    fn initial(&self) -> Option<Initial>;
+    /// With the default filled in.
+    fn effective_initial(&self) -> Option<Initial>;
+    /// The rule on `initial` for a pair; `None` if it is not a legal one.
+    fn legal(&self, causality: Causality, variability: Variability) -> Option<InitialRule>;
+    /// The type, as the standard spells it.
+    fn type_name(&self) -> &'static str;
+    fn is_float(&self) -> bool;
+    fn needs_start(&self) -> bool;
+    fn has_start(&self) -> bool;
+    /// The start values as numbers.
+    fn starts(&self) -> Vec<f64>;
+    /// The start values of an enumeration.
+    fn chosen(&self) -> Vec<i64>;
+    fn declared_type(&self) -> Option<&str>;
+    fn unit(&self) -> Option<&str>;
+    fn display_unit(&self) -> Option<&str>;
+    fn range(&self) -> (Option<f64>, Option<f64>);
+}
 
 /// The units defined, with their display units.
 pub(super) struct Units<'a>(HashMap<&'a str, HashSet<&'a str>>);
 
 impl<'a> Units<'a> {
-    pub(super) fn new(description: &'a ModelDescription) -> Self {
-        let display = |unit: &'a crate::Unit| unit.display_units.iter().map(|d| d.name.as_str()).collect();
-        Self(description.units.iter().map(|unit| (unit.name.as_str(), display(unit))).collect())
+    pub(super) fn new(units: &'a [Unit]) -> Self {
+        let display = |unit: &'a Unit| unit.display_units.iter().map(|d| d.name.as_str()).collect();
+        Self(units.iter().map(|unit| (unit.name.as_str(), display(unit))).collect())
     }
 
     pub(super) fn check(
@@ -44,82 +85,143 @@ impl<'a> Units<'a> {
     }
 }
 
-/// Declared types by name, each with its position.
-type Types<'a> = HashMap<&'a str, (usize, &'a SimpleType)>;
+/// What variables refer to, and what is known of those before.
+pub(super) struct Scope<'a, T> {
+    pub(super) units: Units<'a>,
+    /// Declared types by name, each with its position.
+    types: HashMap<&'a str, (usize, &'a T)>,
+    /// The number of the variable, from 1, that has a name first.
+    names: HashMap<&'a str, usize>,
+    independent: Option<&'a str>,
+    structured: bool,
+}
+
+impl<'a, T: AnyType> Scope<'a, T> {
+    pub(super) fn new(units: &'a [Unit], types: &'a [T], structured: bool) -> Self {
+        Self {
+            units: Units::new(units),
+            types: types.iter().enumerate().map(|(t, of)| (of.name(), (t, of))).collect(),
+            names: HashMap::new(),
+            independent: None,
+            structured,
+        }
+    }
+
+    /// The unit of a variable, which may be that of its declared type.
+    pub(super) fn unit_of<V: AnyVariable>(&self, variable: &'a V) -> Option<&'a str> {
+        let declared = || variable.declared_type().and_then(|name| self.types.get(name));
+        variable.unit().or_else(|| declared()?.1.unit())
+    }
+
+    /// Whether a variable was independent.
+    pub(super) fn is_independent_known(&self) -> bool {
+        self.independent.is_some()
+    }
+}
 
 impl Check<'_> {
-    pub(super) fn variables(&mut self) {
-        let description = self.description;
-        let units = Units::new(description);
-        let types: Types<'_> =
-            description.types.iter().enumerate().map(|(t, of)| (of.name.as_str(), (t, of))).collect();
-        let mut names: HashMap<&str, usize> = HashMap::new();
-        let mut independent = None;
-        for (v, variable) in description.variables.iter().enumerate() {
-            let place = Place::Variable(v);
-            if let Some(other) = names.insert(&variable.name, v + 1) {
-                let name = brief(&variable.name);
-                let message = format!("the name {name:?} is also that of variable {other} (from 1)");
-                self.add("variable.unique", place, message);
+    pub(super) fn types<T: AnyType>(&mut self, types: &[T], units: &Units<'_>, variables: &HashSet<&str>) {
+        let mut seen = HashSet::new();
+        for (t, declared) in types.iter().enumerate() {
+            let (name, place) = (declared.name(), Place::Type(t));
+            if !seen.insert(name) {
+                self.add("type.unique", place, format!("the type {name:?} is defined twice"));
             }
-            self.name(v, variable);
-            self.combination(v, variable);
-            self.start(v, variable);
-            let declared = self.declared_type(v, variable, &types);
-            self.range(v, variable, declared);
-            let unit = variable.kind.unit().or_else(|| declared.and_then(|of| of.kind.unit()));
-            units.check(unit, variable.kind.display_unit(), place, self);
-            self.derivative(v, variable);
-            if variable.causality == Causality::Independent {
-                if let Some(other) = independent.replace(variable.name.as_str()) {
-                    let message = format!("{other:?} is independent too; at most one variable may be");
-                    self.add("variable.independent", place, message);
+            if variables.contains(name) {
+                let message = format!("the type {name:?} has the name of a variable; names must differ");
+                self.add("type.unique", place, message);
+            }
+            units.check(declared.unit(), declared.display_unit(), place, self);
+            if let (Some(min), Some(max)) = declared.range()
+                && (min.is_nan() || max.is_nan() || min > max)
+            {
+                let message =
+                    format!("the type {name:?} has min = {min} and max = {max}; must be min <= max");
+                self.add("variable.range", place, message);
+            }
+            let (mut names, mut values) = (HashSet::new(), HashMap::new());
+            for (i, (item, value)) in declared.items().into_iter().enumerate() {
+                if !names.insert(item) {
+                    let message = format!("the type {name:?} has the item {item:?} twice");
+                    self.add("type.items", Place::Item(t, i), message);
                 }
-                let found = variable.kind.scalar_type();
-                if found != ScalarType::Real {
-                    let message = format!("the independent variable is {}; must be Real", found.as_str());
-                    self.add("variable.independent", place, message);
+                if let Some(other) = values.insert(value, item) {
+                    let message =
+                        format!("the items {other:?} and {item:?} of {name:?} have the same value {value}");
+                    self.add("type.items", Place::Item(t, i), message);
                 }
             }
         }
-        self.aliases();
     }
 
-    fn name(&mut self, v: usize, variable: &Variable) {
-        let name = variable.name.as_str();
+    /// Checks one variable, apart from what only one version of the standard has.
+    pub(super) fn variable<'a, V: AnyVariable, T: AnyType>(
+        &mut self,
+        v: usize,
+        variable: &'a V,
+        scope: &mut Scope<'a, T>,
+    ) {
+        let place = Place::Variable(v);
+        self.name(place, v, variable.name(), scope);
+        self.combination(v, variable);
+        self.start(v, variable);
+        let declared = self.declared_type(v, variable, scope);
+        self.range(v, variable, declared);
+        let unit = variable.unit().or_else(|| declared.and_then(AnyType::unit));
+        scope.units.check(unit, variable.display_unit(), place, self);
+        if variable.causality() == Causality::Independent {
+            if let Some(other) = scope.independent.replace(variable.name()) {
+                let message = format!("{other:?} is independent too; at most one variable may be");
+                self.add("variable.independent", place, message);
+            }
+            if !variable.is_float() {
+                let message =
+                    format!("the independent variable is {}; must be {}", variable.type_name(), V::FLOATS);
+                self.add("variable.independent", place, message);
+            }
+        }
+    }
+
+    /// Checks a name of the variable at a position, which may be an alias.
+    pub(super) fn name<'a, T>(&mut self, place: Place, v: usize, name: &'a str, scope: &mut Scope<'a, T>) {
+        if let Some(other) = scope.names.insert(name, v + 1) {
+            let message = format!("the name {:?} is also that of variable {other} (from 1)", brief(name));
+            self.add("variable.unique", place, message);
+        }
         let wrong = if name.is_empty() {
             "is empty"
         } else if name.contains(['\t', '\n', '\r']) {
             "holds a tab or a line break"
-        } else if self.is_structured() && !is_structured_name(name) {
+        } else if scope.structured && !is_structured_name(name) {
             "does not follow variableNamingConvention = structured: identifiers such as a.b[1,2].'c d' or der(x)"
         } else {
             return;
         };
-        self.add("variable.name", Place::Variable(v), format!("the name {:?} {wrong}", brief(name)));
+        self.add("variable.name", place, format!("the name {:?} {wrong}", brief(name)));
     }
 
-    fn combination(&mut self, v: usize, variable: &Variable) {
-        let (causality, variability) = (variable.causality, variable.variability);
-        let (place, of) = (Place::Variable(v), variable.kind.scalar_type());
+    fn combination<V: AnyVariable>(&mut self, v: usize, variable: &V) {
+        let (causality, variability) = (variable.causality(), variable.variability());
+        let place = Place::Variable(v);
         let pair = format!("causality = {} with variability = {}", causality.as_str(), variability.as_str());
-        if variability == Variability::Continuous && of != ScalarType::Real {
-            let said = "(which is the default)";
-            let message = format!("{} variables cannot have variability = continuous {said}", of.as_str());
+        if variability == Variability::Continuous && !variable.is_float() {
+            let (of, said) = (variable.type_name(), V::CONTINUOUS);
+            let message = format!("{of} variables cannot have variability = continuous{said}");
             self.add("variable.continuous", place, message);
             return;
         }
-        let Some(rule) = InitialRule::of(causality, variability) else {
+        let Some(rule) = variable.legal(causality, variability) else {
             let legal: Vec<_> = Variability::ALL
                 .iter()
-                .filter(|v| InitialRule::of(causality, **v).is_some())
+                .filter(|v| variable.legal(causality, **v).is_some())
                 .map(|v| v.as_str())
                 .collect();
-            let message = format!("{pair} is not allowed; allowed variability: {}", legal.join(", "));
+            let legal = if legal.is_empty() { "none".to_owned() } else { legal.join(", ") };
+            let message = format!("{pair} is not allowed; allowed variability: {legal}");
             self.add("variable.combination", place, message);
             return;
         };
-        if let Some(initial) = variable.initial.filter(|initial| !rule.allowed.contains(initial)) {
+        if let Some(initial) = variable.initial().filter(|initial| !rule.allowed.contains(initial)) {
             let allowed: Vec<_> = rule.allowed.iter().map(|initial| initial.as_str()).collect();
             let allowed = if allowed.is_empty() { "none".to_owned() } else { allowed.join(", ") };
             let message =
@@ -128,18 +230,18 @@ impl Check<'_> {
         }
     }
 
-    fn start(&mut self, v: usize, variable: &Variable) {
+    fn start<V: AnyVariable>(&mut self, v: usize, variable: &V) {
         // An illegal combination is told already; further findings on it would be noise.
-        let Some(rule) = InitialRule::of(variable.causality, variable.variability) else { return };
-        if variable.initial.is_some_and(|initial| !rule.allowed.contains(&initial)) {
+        let Some(rule) = variable.legal(variable.causality(), variable.variability()) else { return };
+        if variable.initial().is_some_and(|initial| !rule.allowed.contains(&initial)) {
             return;
         }
-        let because = match (variable.causality, variable.effective_initial()) {
+        let because = match (variable.causality(), variable.effective_initial()) {
             (Causality::Input, _) => "it is an input".to_owned(),
             (Causality::Independent, _) => "it is the independent variable".to_owned(),
             (_, initial) => format!("initial = {}", initial.map_or("", Initial::as_str)),
         };
-        let given = variable.kind.has_start() || self.is_unread(Place::Start(v), "start");
+        let given = variable.has_start() || self.is_unread(Place::Start(v), "start");
         if variable.needs_start() && !given {
             let message = format!("has no start value; must have one, because {because}");
             self.add("variable.start", Place::Variable(v), message);
@@ -150,21 +252,20 @@ impl Check<'_> {
         }
     }
 
-    fn declared_type<'t>(
+    fn declared_type<'t, V: AnyVariable, T: AnyType>(
         &mut self,
         v: usize,
-        variable: &Variable,
-        types: &Types<'t>,
-    ) -> Option<&'t SimpleType> {
-        let name = variable.kind.declared_type()?;
-        let Some(&(t, declared)) = types.get(name) else {
+        variable: &V,
+        scope: &Scope<'t, T>,
+    ) -> Option<&'t T> {
+        let name = variable.declared_type()?;
+        let Some(&(t, declared)) = scope.types.get(name) else {
             let message = format!("declaredType {:?} is not among TypeDefinitions", brief(name));
             self.add("type.defined", Place::Variable(v), message);
             return None;
         };
-        let (found, wanted) = (declared.kind.scalar_type(), variable.kind.scalar_type());
+        let (found, wanted) = (declared.type_name(), variable.type_name());
         if found != wanted && !self.is_unread(Place::Type(t), "type") {
-            let (found, wanted) = (found.as_str(), wanted.as_str());
             let message = format!("declaredType {name:?} is a type of {found}; must be of {wanted}");
             self.add("type.defined", Place::Variable(v), message);
             return None;
@@ -172,8 +273,8 @@ impl Check<'_> {
         Some(declared)
     }
 
-    fn range(&mut self, v: usize, variable: &Variable, declared: Option<&SimpleType>) {
-        let (own, given) = (variable.kind.range(), declared.map(|of| of.kind.range()).unwrap_or_default());
+    fn range<V: AnyVariable, T: AnyType>(&mut self, v: usize, variable: &V, declared: Option<&T>) {
+        let (own, given) = (variable.range(), declared.map(AnyType::range).unwrap_or_default());
         let min = own.0.or(given.0).unwrap_or(f64::NEG_INFINITY);
         let max = own.1.or(given.1).unwrap_or(f64::INFINITY);
         if min.is_nan() || max.is_nan() || min > max {
@@ -181,85 +282,20 @@ impl Check<'_> {
             self.add("variable.range", Place::Variable(v), message);
             return;
         }
-        let Some(start) = variable.kind.start_number() else { return };
-        if start.is_nan() || start < min || start > max {
+        let outside = |start: &f64| start.is_nan() || *start < min || *start > max;
+        if let Some(start) = variable.starts().into_iter().find(outside) {
             let message = format!("start is {start}; must be in [{min}, {max}]");
             self.add("variable.range", Place::Start(v), message);
         }
-        if let (VariableKind::Enumeration(_), Some(declared)) = (&variable.kind, declared)
-            && !declared.items.iter().any(|item| f64::from(item.value) == start)
-        {
+        let Some(declared) = declared else { return };
+        let items = declared.items();
+        let is_item = |start: &i64| items.iter().any(|(_, value)| value == start);
+        if let Some(start) = variable.chosen().into_iter().find(|start| !is_item(start)) {
             let items: Vec<_> =
-                declared.items.iter().take(20).map(|item| format!("{} {}", item.value, item.name)).collect();
+                items.iter().take(20).map(|(name, value)| format!("{value} {name}")).collect();
             let message =
-                format!("start is {start}; must be a value of {}: {}", declared.name, items.join(", "));
+                format!("start is {start}; must be a value of {}: {}", declared.name(), items.join(", "));
             self.add("variable.enumeration", Place::Start(v), message);
         }
     }
-
-    fn derivative(&mut self, v: usize, variable: &Variable) {
-        let VariableKind::Real(crate::Real { derivative: Some(index), .. }) = variable.kind else { return };
-        let message = match self.description.at(index) {
-            None => {
-                let most = self.description.variables.len();
-                format!("derivative is {index}; must be the index of a variable, 1 to {most}")
-            }
-            Some(Variable { kind: VariableKind::Real(_), variability: Variability::Continuous, .. }) => {
-                return;
-            }
-            Some(state) => {
-                format!("derivative names {:?}, which is not a continuous Real", brief(&state.name))
-            }
-        };
-        self.add("variable.derivative", Place::Variable(v), message);
-    }
-
-    fn aliases(&mut self) {
-        let mut first: HashMap<(BaseType, u32), &Variable> = HashMap::new();
-        let mut set: HashMap<(BaseType, u32), &Variable> = HashMap::new();
-        for (v, variable) in self.description.variables.iter().enumerate() {
-            let place = Place::Variable(v);
-            if self.is_unread(place, "valueReference") {
-                continue;
-            }
-            let reference = variable.value_reference;
-            let key = (variable.kind.base_type(), reference);
-            let Some(other) = first.get(&key) else {
-                first.insert(key, variable);
-                if is_settable(variable) {
-                    set.insert(key, variable);
-                }
-                continue;
-            };
-            let with = format!("has the value reference {reference} of {:?}", brief(&other.name));
-            if is_settable(variable)
-                && let Some(setter) = set.insert(key, variable)
-            {
-                let message = format!(
-                    "has the value reference {reference} of {:?}, and both can be set; of all {} variables with one \
-                     value reference at most one may be a parameter or an input",
-                    brief(&setter.name),
-                    variable.kind.scalar_type().as_str()
-                );
-                self.add("variable.alias-set", place, message);
-            }
-            if let (Some(a), Some(b)) = (other.kind.start_number(), variable.kind.start_number())
-                && a != b
-            {
-                let message = format!("{with}, so both are one, but starts at {b} and the other at {a}");
-                self.add("variable.alias", Place::Start(v), message);
-            }
-            if let (Some(a), Some(b)) = (other.kind.unit(), variable.kind.unit())
-                && a != b
-            {
-                let message = format!("{with}, so both are one, but its unit is {b:?} and the other's {a:?}");
-                self.add("variable.alias", place, message);
-            }
-        }
-    }
-}
-
-/// Whether an importer sets the variable.
-fn is_settable(variable: &Variable) -> bool {
-    matches!(variable.causality, Causality::Parameter | Causality::Input)
 }
