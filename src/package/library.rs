@@ -7,7 +7,7 @@ use std::time::SystemTime;
 use punctual_fmu::product::MARK;
 
 use crate::error::Error;
-use crate::host::PLATFORM;
+use crate::host::{PLATFORM, Version};
 use crate::validate::layout::ending;
 use crate::validate::symbols;
 
@@ -27,7 +27,7 @@ impl Library {
     /// Its name in the archive.
     pub fn entry(&self, identifier: &str) -> String {
         // Each platform that a file can be for has an ending.
-        let ending = ending(self.platform).unwrap_or(DLL_SUFFIX);
+        let ending = ending(Version::Fmi2, self.platform).unwrap_or(DLL_SUFFIX);
         format!("binaries/{}/{identifier}{ending}", self.platform)
     }
 }

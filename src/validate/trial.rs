@@ -8,13 +8,11 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Duration;
 
-use punctual_modeldescription::Located;
-
 use super::finding::{Finding, Findings, Place, severity};
+use super::model::Model;
 use crate::error::Error;
 use crate::host::{
-    Archive, Causality, DataType, Description, Fmu, PLATFORM, Slave, Status, Variability, Variable, Version,
-    journal,
+    Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
 use crate::isolation::{self, Child, End, Voice};
 
@@ -31,7 +29,7 @@ const STEP: f64 = 0.01;
 const CLOSE: f64 = 1e-12;
 
 /// The reason why there can be no trial, if there is one.
-pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Findings) -> Option<String> {
+pub(super) fn reason_to_skip(archive: &Archive, model: &Model, findings: &Findings) -> Option<String> {
     for (head, reason) in [
         ("schema.", "the description breaks the schema"),
         ("interface.co-simulation", "there is no co-simulation"),
@@ -42,19 +40,22 @@ pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Find
         }
     }
     // What is wrong with the library of another platform is no obstacle.
-    let own = format!("binaries/{PLATFORM}/");
+    let platform = model.version().platform();
+    let own = format!("binaries/{platform}/");
     for (head, reason) in
         [("archive.binary", "there is no library"), ("symbols.", "the library is not complete")]
     {
         if findings.any_in(head, |file| file.is_empty() || file.starts_with(&own)) {
-            return Some(format!("{reason} for {PLATFORM}"));
+            return Some(format!("{reason} for {platform}"));
         }
     }
-    if !archive.platforms().iter().any(|platform| platform == PLATFORM) {
-        return Some(format!("there is no library for {PLATFORM}"));
+    if !archive.platforms().iter().any(|present| present == platform) {
+        return Some(format!("there is no library for {platform}"));
     }
-    let needs_tool = model.description.co_simulation.needs_execution_tool;
-    needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
+    if !model.has_co_simulation() {
+        return Some("there is no co-simulation".to_owned());
+    }
+    model.needs_tool().then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
 /// Tries the FMU in a child process, at most for `limit`.
