@@ -30,7 +30,7 @@ pub use description::{
 };
 pub use logging::LogMessage;
 pub use number::{DataType, Family, whole_range};
-pub use participant::{Participant, Slave};
+pub use participant::{Participant, Saved, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
 pub use status::Status;
 

@@ -106,6 +106,16 @@ const AFTER: &[Rule] = &[
     ("trial.start", Warning, "parameters and inputs have the start values that the description says"),
     ("trial.text", Warning, "fmi2GetString gives a text"),
     ("trial.reset", Warning, "after fmi2Reset the FMU does the same again"),
+    (
+        "trial.state",
+        Warning,
+        "a step from a state that was set back gives the same outputs, bit for bit (FMI 3.0)",
+    ),
+    (
+        "trial.derivative",
+        Warning,
+        "derivatives agree with differences, and adjoint with directional ones (FMI 3.0)",
+    ),
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
 

@@ -87,7 +87,10 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
         companions::check(&archive, &model.description, &mut findings);
     }
     symbols::check(&archive, &model, &mut findings);
-    match (limit, trial::reason_to_skip(&archive, &model, &findings)) {
+    let reason = trial::reason_to_skip(&archive, model.version(), model.needs_tool(), &findings);
+    let reason =
+        reason.or_else(|| (!model.has_co_simulation()).then(|| "there is no co-simulation".to_owned()));
+    match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
         (Some(limit), None) => trial::run(path, limit, &mut findings)?,

@@ -15,8 +15,8 @@ use crate::host::{Archive, Version};
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
-/// The processors of libraries for a platform, by its names in FMI 2.0, then by those that FMI 3.0 adds.
-const PROCESSORS: [(&str, &[Architecture]); 15] = [
+/// The processors of libraries for a platform.
+const PROCESSORS: [(&str, &[Architecture]); 8] = [
     ("linux64", &[Architecture::X86_64]),
     ("linux32", &[Architecture::I386]),
     ("aarch64-linux", &[Architecture::Aarch64]),
@@ -25,6 +25,10 @@ const PROCESSORS: [(&str, &[Architecture]); 15] = [
     ("aarch64-windows", &[Architecture::Aarch64]),
     ("darwin64", &[Architecture::X86_64, Architecture::Aarch64]),
     ("darwin32", &[Architecture::I386]),
+];
+
+/// The same by the names that FMI 3.0 adds.
+const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
     ("x86_64-linux", &[Architecture::X86_64]),
     ("x86-linux", &[Architecture::I386]),
     ("aarch32-linux", &[Architecture::Arm]),
@@ -111,7 +115,7 @@ fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
         return Err(format!("has the format {:?}; {platform} has {format:?}", file.format()));
     }
     let found = file.architecture();
-    let known = PROCESSORS.iter().find(|(name, _)| *name == platform);
+    let known = PROCESSORS.iter().chain(&PROCESSORS_OF_FMI3).find(|(name, _)| *name == platform);
     if let Some((_, wanted)) = known.filter(|(_, wanted)| !wanted.contains(&found)) {
         return Err(format!("is for the processor {found:?}; {platform} has {:?}", wanted[0]));
     }
@@ -142,6 +146,25 @@ pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
     match fmi2::FUNCTIONS.iter().find(|function| !exported.contains(**function)) {
         Some(missing) => Err(format!("does not export {missing}, so it is not the library of an FMU")),
         None => Ok(name),
+    }
+}
+
+/// The folders of FMI 3.0 (3.0.2, section 2.5.1) for a library of the platform that FMI 2.0 calls `platform`: of a library
+/// for macOS one for each of its processors.
+pub(crate) fn tuples(platform: &'static str, bytes: &[u8]) -> Vec<&'static str> {
+    const INTEL: &str = "x86_64-darwin";
+    const ARM: &str = "aarch64-darwin";
+    match platform {
+        "linux64" => vec!["x86_64-linux"],
+        "linux32" => vec!["x86-linux"],
+        "win64" => vec!["x86_64-windows"],
+        "win32" => vec!["x86-windows"],
+        "darwin64" => match parse(bytes).map(|file| file.architecture()) {
+            Ok(Architecture::Aarch64) => vec![ARM],
+            Ok(_) => vec![INTEL],
+            Err(_) => vec![INTEL, ARM],
+        },
+        same => vec![same],
     }
 }
 
