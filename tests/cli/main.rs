@@ -13,6 +13,7 @@ mod campaigns;
 mod checking;
 mod demonstrating;
 mod failing;
+mod fmi3;
 mod help;
 mod hostile;
 mod html;
