@@ -1,4 +1,4 @@
-//! The FMI 2.0 co-simulation state machine in safe Rust: modes, time, values, lazy outputs.
+//! The state machine of FMI 2.0 and 3.0 in safe Rust: modes, time, values, lazy outputs.
 //!
 //! Everything here takes references and returns `Result`; the C interface is only guard and conversion.
 //! A failed call leaves the instance as it was.
@@ -14,13 +14,14 @@
 //! bytes that it had, and with right times it decides nothing.
 
 mod access;
+mod arrays;
 mod derivative;
 
 use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
-use crate::configuration::{Configuration, ConfigurationError};
-use crate::product::Product;
+use crate::configuration::{Configuration, ConfigurationError, FmiVersion};
+use crate::product::{Access, Product};
 
 /// Times in s that differ by no more than this and [`TIME_ROUND_OFF`] are the same communication point:
 /// importers count time in nanoseconds.
@@ -47,6 +48,8 @@ impl Mode {
     pub const STEP: Self = Self(4);
     /// After `fmi2Terminate`.
     pub const TERMINATED: Self = Self(8);
+    /// None of them.
+    pub const NONE: Self = Self(0);
     /// All of them.
     pub const ANY: Self = Self(15);
 
@@ -74,7 +77,7 @@ impl Mode {
     }
 }
 
-/// The calls whose legality depends on the mode.
+/// The calls whose legality depends on the mode. Those of FMI 3.0 have the same names but for the prefix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
     /// `fmi2SetupExperiment`.
@@ -91,23 +94,39 @@ pub enum Call {
     Set,
     /// `fmi2DoStep`.
     DoStep,
-    /// `fmi2GetDirectionalDerivative`.
+    /// `fmi2GetDirectionalDerivative`; `fmi3GetAdjointDerivative` too.
     GetDirectionalDerivative,
 }
 
-/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11). They
-/// are wider than the standard where importers are: values may be read in every mode. Calls that are not here are
-/// legal in every mode.
-pub const LEGAL: [(Call, Mode); 8] = [
-    (Call::SetupExperiment, Mode::INSTANTIATED),
-    (Call::EnterInitializationMode, Mode::INSTANTIATED),
-    (Call::ExitInitializationMode, Mode::INITIALIZATION),
-    (Call::Terminate, Mode::STEP),
-    (Call::Get, Mode::ANY),
-    (Call::Set, Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP)),
-    (Call::DoStep, Mode::STEP),
-    (Call::GetDirectionalDerivative, Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED)),
-];
+/// The modes in which each call is legal in FMI 2.0 and in FMI 3.0, in the order of [`Call`] (FMI 2.0.4, section 4.2.4,
+/// figure 11; FMI 3.0.2, sections 2.3.2 to 2.3.8 and 4.2.1). They are wider than the standards where importers are:
+/// values may be read in every mode. Calls that are not here are legal in every mode.
+pub const LEGAL: [(Call, Mode, Mode); 8] = {
+    const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP);
+    const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED);
+    [
+        // FMI 3.0 has the experiment in fmi3EnterInitializationMode.
+        (Call::SetupExperiment, Mode::INSTANTIATED, Mode::NONE),
+        (Call::EnterInitializationMode, Mode::INSTANTIATED, Mode::INSTANTIATED),
+        (Call::ExitInitializationMode, Mode::INITIALIZATION, Mode::INITIALIZATION),
+        (Call::Terminate, Mode::STEP, Mode::STEP),
+        (Call::Get, Mode::ANY, Mode::ANY),
+        (Call::Set, SETTABLE, SETTABLE),
+        (Call::DoStep, Mode::STEP, Mode::STEP),
+        (Call::GetDirectionalDerivative, KNOWN, KNOWN),
+    ]
+};
+
+impl Call {
+    /// The modes in which it is legal in a version of FMI, by [`LEGAL`].
+    pub fn modes(self, fmi: FmiVersion) -> Mode {
+        let (_, two, three) = LEGAL[self as usize];
+        match fmi {
+            FmiVersion::Two => two,
+            FmiVersion::Three => three,
+        }
+    }
+}
 
 /// Steps that followed each other without a gap, times in s.
 #[derive(Clone, Copy, Debug)]
@@ -150,6 +169,8 @@ pub struct State {
     pub mode: Mode,
     /// The communication point in s.
     pub time: f64,
+    /// The end of the run in s, past which FMI 3.0 allows no step; infinite where none was told, and with FMI 2.0.
+    pub stop: f64,
     /// Whether a step was made since initialization.
     pub stepped: bool,
     /// The length of the last step in s.
@@ -169,12 +190,16 @@ pub struct Instance {
     product: Product,
     /// Type and causality by value reference: checked at every read and write, in few bytes.
     kinds: Vec<(BaseType, Causality, Variability)>,
+    /// The same for FMI 3.0, with the lengths of arrays; empty for FMI 2.0.
+    accesses: Vec<Access>,
     block: Box<dyn Block>,
     /// The state of a new block, which remembers nothing yet.
     start: BlockState,
     mode: Mode,
     /// The present communication point in s.
     time: f64,
+    /// The end of the run in s, if a step past it is an error.
+    stop: f64,
     values: Values,
     /// Whether a step was made since initialization.
     stepped: bool,
@@ -186,8 +211,9 @@ pub struct Instance {
     configured: bool,
     unbroken: Unbroken,
     mistimed: Mistimed,
-    /// Scratch: a direction and the derivative along it, at the indices of the variables.
-    derivative: [Vec<f64>; 2],
+    /// Scratch: a direction and the derivative along it, at the indices of the variables; and what an adjoint
+    /// derivative has gathered.
+    derivative: [Vec<f64>; 3],
 }
 
 impl Instance {
@@ -214,13 +240,16 @@ impl Instance {
         block.save(&mut start);
         let kinds =
             product.variables.iter().map(|v| (v.kind.base_type(), v.causality, v.variability)).collect();
+        let accesses = product.accesses();
         let mut instance = Self {
             product,
             kinds,
+            accesses,
             block,
             start,
             mode: Mode::INSTANTIATED,
             time: 0.0,
+            stop: f64::INFINITY,
             stepped: false,
             last_step: 0.0,
             values,
@@ -228,7 +257,7 @@ impl Instance {
             configured: false,
             unbroken: Unbroken::at(0.0),
             mistimed: Mistimed::Never,
-            derivative: [vec![0.0; len], vec![0.0; len]],
+            derivative: std::array::from_fn(|_| vec![0.0; len]),
         };
         instance.start_values();
         Ok(instance)
@@ -249,13 +278,18 @@ impl Instance {
         &self.product
     }
 
+    /// The version of FMI that it is an instance of.
+    pub fn fmi(&self) -> FmiVersion {
+        self.product.configuration.experiment().fmi
+    }
+
     /// Whether `call` is legal now.
     ///
     /// # Errors
     ///
     /// A call that [`LEGAL`] excludes in this mode.
     pub fn check(&self, call: Call) -> Result<(), Failure> {
-        let (_, modes) = LEGAL[call as usize];
+        let modes = call.modes(self.fmi());
         if self.mode.is_in(modes) {
             return Ok(());
         }
@@ -274,13 +308,30 @@ impl Instance {
     /// The wrong mode; a time that is not finite; a stop time before the start time.
     pub fn setup_experiment(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Failure> {
         self.check(Call::SetupExperiment)?;
+        Self::check_times(start_time, stop_time)?;
+        self.time = start_time;
+        Ok(())
+    }
+
+    /// Goes to initialization mode as FMI 3.0 does: with the start time, and the stop time past which no step may go.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Self::setup_experiment`].
+    pub fn begin(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Failure> {
+        self.check(Call::EnterInitializationMode)?;
+        Self::check_times(start_time, stop_time)?;
+        (self.time, self.stop) = (start_time, stop_time.unwrap_or(f64::INFINITY));
+        self.enter_initialization_mode()
+    }
+
+    fn check_times(start_time: f64, stop_time: Option<f64>) -> Result<(), Failure> {
         if !start_time.is_finite() {
             return Err(format!("startTime is {start_time}, must be finite"));
         }
         if let Some(stop) = stop_time.filter(|stop| stop.is_nan() || *stop < start_time) {
             return Err(format!("stopTime is {stop}, must be >= startTime = {start_time}"));
         }
-        self.time = start_time;
         Ok(())
     }
 
@@ -325,7 +376,7 @@ impl Instance {
     /// Goes back to the state after `fmi2Instantiate`, start values included.
     pub fn reset(&mut self) {
         self.mode = Mode::INSTANTIATED;
-        self.time = 0.0;
+        (self.time, self.stop) = (0.0, f64::INFINITY);
         self.stepped = false;
         self.last_step = 0.0;
         self.fresh = false;
@@ -345,6 +396,7 @@ impl Instance {
             guid: String::new(),
             mode: self.mode,
             time: 0.0,
+            stop: f64::INFINITY,
             stepped: false,
             last_step: 0.0,
             fresh: false,
@@ -362,10 +414,12 @@ impl Instance {
         let Self {
             product,
             kinds: _,
+            accesses: _,
             block,
             start: _,
             mode,
             time,
+            stop,
             values,
             stepped,
             last_step,
@@ -376,7 +430,7 @@ impl Instance {
             derivative: _,
         } = self;
         state.guid.clone_from(&product.guid);
-        (state.mode, state.time, state.last_step) = (*mode, *time, *last_step);
+        (state.mode, state.time, state.stop, state.last_step) = (*mode, *time, *stop, *last_step);
         (state.stepped, state.fresh, state.configured) = (*stepped, *fresh, *configured);
         state.values.clone_from(values);
         block.save(&mut state.block);
@@ -389,7 +443,7 @@ impl Instance {
     ///
     /// The state of another FMU.
     pub fn restore(&mut self, state: &State) -> Result<(), Failure> {
-        let State { guid, mode, time, stepped, last_step, fresh, configured, values, block } = state;
+        let State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block } = state;
         if *guid != self.product.guid {
             return Err(format!(
                 "the state belongs to the FMU with the GUID {guid:?}, must be {:?}",
@@ -403,7 +457,7 @@ impl Instance {
             self.block.configure(values).map_err(|e| e.to_string())?;
         }
         self.block.restore(block)?;
-        (self.mode, self.time, self.last_step) = (*mode, *time, *last_step);
+        (self.mode, self.time, self.stop, self.last_step) = (*mode, *time, *stop, *last_step);
         (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
         self.values.clone_from(values);
         if !(self.unbroken.begin..=self.unbroken.end).contains(time) {
@@ -454,6 +508,13 @@ impl Instance {
         }
         if !(t + h).is_finite() {
             return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
+        }
+        if t + h > self.stop + same {
+            return Err(format!(
+                "the step of {h} s at t = {t} ends at {}, must end by stopTime = {}",
+                t + h,
+                self.stop
+            ));
         }
         let gap = t - self.time;
         let rounding = GAP * self.last_step;
@@ -540,24 +601,36 @@ impl Instance {
     pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
         self.check_settable(BaseType::Real, references)?;
         for (&reference, &value) in references.iter().zip(values) {
-            if let Some(i) = (reference as usize).checked_sub(self.product.layout.parameters) {
-                let name = &self.product.variables[reference as usize].name;
-                self.product.ranges[i].check(name, value).map_err(|e| e.to_string())?;
-            }
+            self.check_range(reference as usize, value)?;
         }
-        let mut tuned = false;
         for (&reference, &value) in references.iter().zip(values) {
             self.values.reals[reference as usize] = value;
-            tuned |= reference as usize >= self.product.layout.parameters;
         }
+        self.taken_over(references);
+        Ok(())
+    }
+
+    /// Checks that the real number `index` may have the `value`: a parameter within its range, all else any.
+    fn check_range(&self, index: usize, value: f64) -> Result<(), Failure> {
+        match index.checked_sub(self.product.layout.parameters) {
+            None => Ok(()),
+            Some(i) => {
+                let name = &self.product.variables[index].name;
+                self.product.ranges[i].check(name, value).map_err(|e| e.to_string())
+            }
+        }
+    }
+
+    /// Notes that reals were set.
+    fn taken_over(&mut self, references: &[u32]) {
         self.fresh &= references.is_empty();
+        let tuned = references.iter().any(|&reference| reference as usize >= self.product.layout.parameters);
         if tuned && self.mode == Mode::STEP {
             // The block reads from the values what may change in a run. It matters at once.
             self.block.output(self.time, &mut self.values);
         } else if tuned {
             self.configured = false;
         }
-        Ok(())
     }
 
     /// Writes integers: there is no integer input or parameter.

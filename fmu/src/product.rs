@@ -3,8 +3,12 @@
 //! The table built here is the only place that knows value references. The XML file and the accessors of the
 //! running instance are both read from it.
 
+mod arrays;
+mod description;
 mod outputs;
 
+pub(crate) use arrays::Access;
+pub use arrays::{Item, TIME};
 pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 
 use punctual_core::filter::{Phase, Standing, Status};
@@ -16,8 +20,8 @@ use uuid::Uuid;
 
 use crate::configuration::{
     BarrierInput, Configuration, ConfigurationError, Controller, ControllerConfiguration,
-    FilterConfiguration, Parameter, PlantConfiguration, PlantSection, Range, VariableSection, base_unit,
-    quantity,
+    FilterConfiguration, FmiVersion, Parameter, PlantConfiguration, PlantSection, Range, VariableSection,
+    base_unit, quantity,
 };
 
 /// Log categories: name and meaning.
@@ -42,6 +46,9 @@ pub struct Product {
     pub ranges: Vec<Range>,
     /// `{…}`: differs between FMUs that differ in configuration, variables or version.
     pub guid: String,
+    /// The variables of an FMU for FMI 3.0, in the order of their value references; none for FMI 2.0, whose
+    /// variables are those of the table.
+    pub items: Vec<Item>,
 }
 
 /// Value references of the groups of variables, in the order of the table.
@@ -65,7 +72,7 @@ impl Product {
     ///
     /// # Errors
     ///
-    /// None in practice: a completed configuration always has a canonical form.
+    /// A name that FMI 3.0 needs for itself, in a configuration with `fmi = 3`.
     pub fn new(configuration: Configuration) -> Result<Self, ConfigurationError> {
         let (Table { variables, ranges }, layout) = match &configuration {
             Configuration::Filter(c) => filter_variables(c),
@@ -73,7 +80,28 @@ impl Product {
             Configuration::Controller(c) => controller_variables(c),
         };
         let guid = guid(&configuration.canonical()?, &variables);
-        Ok(Self { configuration, variables, layout, ranges, guid })
+        let experiment = configuration.experiment();
+        let items = match experiment.fmi {
+            FmiVersion::Two => Vec::new(),
+            FmiVersion::Three => arrays::items(&variables, &layout, experiment.arrays, 0),
+        };
+        if let Some(other) = variables.iter().find(|v| !items.is_empty() && v.name == TIME) {
+            let message =
+                format!("is {:?}, which is the name of the time with `fmi = 3`; choose another", other.name);
+            return Err(ConfigurationError::new("plant.parameters", message));
+        }
+        Ok(Self { configuration, variables, layout, ranges, guid, items })
+    }
+
+    /// The variable of FMI 3.0 that has the scalar `index`, which must be one of the table's.
+    pub(crate) fn item_of(&self, index: usize) -> &Item {
+        let after = self.items.partition_point(|item| item.scalars.start <= index);
+        &self.items[after.saturating_sub(1)]
+    }
+
+    /// What an importer of FMI 3.0 may do with each value reference; nothing for FMI 2.0.
+    pub(crate) fn accesses(&self) -> Vec<Access> {
+        arrays::accesses(&self.variables, &self.items)
     }
 
     /// The outputs that are enumerations. Each has a twin that is an Integer, from [`Layout::end`] on in the same order:

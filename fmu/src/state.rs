@@ -19,7 +19,7 @@ use punctual_modeldescription::BaseType;
 
 use crate::LoopState;
 use crate::block::{BlockState, Values};
-use crate::configuration::Configuration;
+use crate::configuration::{Configuration, FmiVersion};
 use crate::instance::{Failure, Mode, State};
 use crate::product::Product;
 
@@ -41,6 +41,11 @@ const CHECKSUM: usize = u32::SIZE;
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
     let plan = if follows_plans(product) { u64::SIZE + commitment(state)?.len() } else { 0 };
     Ok(fixed_size(product) + plan)
+}
+
+/// Whether a state of `product` has a stop time: those of FMI 2.0 have none.
+fn has_stop(product: &Product) -> bool {
+    product.configuration.experiment().fmi == FmiVersion::Three
 }
 
 fn follows_plans(product: &Product) -> bool {
@@ -77,7 +82,8 @@ fn fixed_size(product: &Product) -> usize {
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
         Configuration::Controller(_) => u32::SIZE,
     };
-    HEADER + flags + values + block + CHECKSUM
+    let stop = if has_stop(product) { f64::SIZE } else { 0 };
+    HEADER + flags + stop + values + block + CHECKSUM
 }
 
 /// Writes a state of `product` to the first [`size`] bytes of `bytes` and zeros to the rest.
@@ -86,7 +92,7 @@ fn fixed_size(product: &Product) -> usize {
 ///
 /// Too few bytes; the state of another product. Nothing was written.
 pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
-    let State { guid, mode, time, stepped, last_step, fresh, configured, values, block } = state;
+    let State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block } = state;
     let plan = follows_plans(product).then(|| commitment(state)).transpose()?;
     let size = fixed_size(product) + plan.as_ref().map_or(0, |plan| u64::SIZE + plan.len());
     if bytes.len() < size {
@@ -102,6 +108,9 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     // The fields of the instance, and the values in the order of the table.
     mode.write(&mut out);
     time.write(&mut out);
+    if has_stop(product) {
+        stop.write(&mut out);
+    }
     stepped.write(&mut out);
     last_step.write(&mut out);
     fresh.write(&mut out);
@@ -188,6 +197,10 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
     let time = input.finite("time")?;
+    let stop = if has_stop(product) { input.field("stop")? } else { f64::INFINITY };
+    if stop.is_nan() {
+        return Err(format!("stop is {stop}, must be a number"));
+    }
     let stepped = input.field("stepped")?;
     let last_step = input.finite("last_step")?;
     let fresh = input.field("fresh")?;
@@ -225,7 +238,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         }
     };
     let guid = product.guid.clone();
-    Ok(State { guid, mode, time, stepped, last_step, fresh, configured, values, block })
+    Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
 /// The commitment that comes last. Whether it is one of this filter is found when it is restored.

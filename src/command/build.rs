@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_fmu::configuration::{Configuration, FmiVersion};
+
 use crate::error::Error;
-use crate::host::PLATFORM;
 use crate::{output, package};
 
 /// Arguments of `punctual build`.
@@ -19,6 +20,27 @@ pub struct Arguments {
     /// beside this program]
     #[arg(long = "library", value_name = "FILE")]
     libraries: Vec<PathBuf>,
+    /// The version of FMI; `both` writes that of 3.0 to a file beside, NAME-fmi3.fmu [default: `experiment.fmi` of the
+    /// configuration, or 2]
+    #[arg(long, value_name = "VERSION")]
+    fmi: Option<Versions>,
+    /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
+    #[arg(long)]
+    scalars: bool,
+}
+
+/// The versions of FMI to build for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Versions {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[value(name = "3")]
+    Three,
+    /// An FMU of each
+    #[value(name = "both")]
+    Both,
 }
 
 /// Builds the FMU and tries it, or packs the system.
@@ -33,19 +55,50 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return pack(arguments, file);
     }
     let configuration = package::read_configuration(file)?;
-    let fmu = package::build(configuration, &arguments.libraries, &arguments.output)?;
-    if !fmu.platforms().iter().any(|platform| platform == PLATFORM) {
-        output::note(&format!("not tried: no library is for this platform, {PLATFORM}"));
+    let experiment = *configuration.experiment();
+    let versions = match arguments.fmi {
+        None => vec![experiment.fmi],
+        Some(Versions::Two) => vec![FmiVersion::Two],
+        Some(Versions::Three) => vec![FmiVersion::Three],
+        Some(Versions::Both) => vec![FmiVersion::Two, FmiVersion::Three],
+    };
+    if arguments.scalars && !versions.contains(&FmiVersion::Three) {
+        let message = "is for FMI 3.0, such as `--fmi 3`; FMI 2.0 has no arrays";
+        return Err(Error::configuration("--scalars", message));
     }
+    let several = versions.len() > 1;
+    for fmi in versions {
+        let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
+        let beside = several && fmi == FmiVersion::Three;
+        let output = if beside { beside_it(&arguments.output) } else { arguments.output.clone() };
+        build(configuration, &arguments.libraries, &output)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The file for FMI 3.0 beside the one for 2.0.
+fn beside_it(file: &Path) -> PathBuf {
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push("-fmi3.");
+    name.push(file.extension().unwrap_or("fmu".as_ref()));
+    file.with_file_name(name)
+}
+
+fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<(), Error> {
+    let fmu = package::build(configuration, libraries, file)?;
     let description = fmu.description();
+    let platform = description.version().platform();
+    if !fmu.platforms().iter().any(|found| found == platform) {
+        output::note(&format!("not tried: no library is for this platform, {platform}"));
+    }
     output::result(&format!(
         "{}: {} with {} variables, guid {}",
-        arguments.output.display(),
+        file.display(),
         if description.text.is_empty() { &description.model_name } else { &description.text },
         description.variables.len(),
         description.token,
     ));
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Arguments of `punctual try-plugin`.
@@ -71,6 +124,11 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
     if !arguments.libraries.is_empty() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
+    }
+    if arguments.fmi.is_some() || arguments.scalars {
+        let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
+        let option = if arguments.scalars { "--scalars" } else { "--fmi" };
+        return Err(Error::configuration(option, message));
     }
     if let Ok(configuration) = package::read_configuration(file) {
         let message = format!("is {:?}; an .ssp file is made from a system file", configuration.kind());

@@ -10,7 +10,7 @@ use super::handle::{CTexts, Handle, c_text, get_through, plain_calls, set_throug
 use super::library::functions;
 use super::logging::owned;
 use super::number::{self, DataType, Truth};
-use super::participant::{Participant, Slave, remark};
+use super::participant::{Participant, Saved, Slave, remark};
 use super::{Description, Fmu, LogMessage, Version};
 use crate::error::{Error, FmuProblem, brief_time};
 
@@ -52,8 +52,19 @@ functions! {
         set_string: "fmi3SetString", fmi3::SetString;
         enter_configuration_mode: "fmi3EnterConfigurationMode", fmi3::EnterConfigurationMode;
         exit_configuration_mode: "fmi3ExitConfigurationMode", fmi3::ExitConfigurationMode;
+        get_state: "fmi3GetFMUState", fmi3::GetState;
+        set_state: "fmi3SetFMUState", fmi3::SetState;
+        free_state: "fmi3FreeFMUState", fmi3::FreeState;
+        state_size: "fmi3SerializedFMUStateSize", fmi3::SerializedStateSize;
+        serialize: "fmi3SerializeFMUState", fmi3::SerializeState;
+        deserialize: "fmi3DeserializeFMUState", fmi3::DeserializeState;
+        directional: "fmi3GetDirectionalDerivative", fmi3::GetDirectionalDerivative;
+        adjoint: "fmi3GetAdjointDerivative", fmi3::GetAdjointDerivative;
     }
 }
+
+/// The greatest size of a state as bytes.
+const MAX_STATE: usize = 1 << 30;
 
 /// The share of a step by which the time reached may differ from the time asked for without a remark.
 const ON_TIME: f64 = 1e-6;
@@ -66,6 +77,8 @@ pub(super) struct Instance {
     experiment: (f64, f64),
     /// Whether the last step asked for the end of the run.
     asks_to_end: bool,
+    /// Whether a step may be taken back.
+    may_go_back: bool,
     /// The first step that ended at another time than asked for: the time asked for and the time reached.
     off: Option<(f64, f64)>,
     float32: Vec<f32>,
@@ -116,6 +129,7 @@ impl Instance {
             functions,
             experiment: (0.0, 0.0),
             asks_to_end: false,
+            may_go_back: false,
             off: None,
             float32: Vec::new(),
             int8: Vec::new(),
@@ -128,6 +142,12 @@ impl Instance {
             uint64: Vec::new(),
             truths: Vec::new(),
         })
+    }
+
+    /// The state that a call gave.
+    fn saved(&self, call: &str, state: fmi3::State) -> Result<Saved, Error> {
+        let state = std::ptr::NonNull::new(state);
+        state.map(Saved).ok_or_else(|| self.handle.broken(call, "gave no state, though it returned fmi3OK"))
     }
 
     /// One of the calls around structural parameters.
@@ -211,10 +231,11 @@ impl Participant for Instance {
         let (call, component) = (self.functions.do_step, self.handle.component());
         let (mut event, mut end, mut early) = (FALSE, FALSE, FALSE);
         let mut reached = time + step;
+        let for_ever = if self.may_go_back { FALSE } else { TRUE };
         let (event_to, end_to) = (&raw mut event, &raw mut end);
         let (early_to, reached_to) = (&raw mut early, &raw mut reached);
         // SAFETY: the instance lives; the last four arguments can be written.
-        let status = unsafe { call(component, time, step, TRUE, event_to, end_to, early_to, reached_to) };
+        let status = unsafe { call(component, time, step, for_ever, event_to, end_to, early_to, reached_to) };
         self.handle.check_step("fmi3DoStep", status, time + step)?;
         self.asks_to_end = end != FALSE;
         if early != FALSE {
@@ -338,6 +359,92 @@ impl Slave for Instance {
         // SAFETY: the standard has the FMU keep zero-terminated texts until its next call; NULL is allowed for.
         let text = |text: fmi3::Text| (!text.is_null()).then(|| unsafe { owned(text) });
         Ok(Some(texts.into_iter().map(text).collect()))
+    }
+
+    fn may_go_back(&mut self, may: bool) {
+        self.may_go_back = may;
+    }
+
+    fn save(&mut self) -> Result<Option<Saved>, Error> {
+        let Some(call) = self.functions.get_state else { return Ok(None) };
+        self.handle.entering("fmi3GetFMUState");
+        let mut state = std::ptr::null_mut();
+        // SAFETY: the instance lives; the address can be written, and NULL asks for a new state.
+        let status = unsafe { call(self.handle.component(), &raw mut state) };
+        self.handle.check("fmi3GetFMUState", status)?;
+        self.saved("fmi3GetFMUState", state).map(Some)
+    }
+
+    fn restore(&mut self, state: &Saved) -> Result<(), Error> {
+        let Some(call) = self.functions.set_state else { return Ok(()) };
+        self.handle.entering("fmi3SetFMUState");
+        // SAFETY: the instance lives, and so does the state until it is released.
+        let status = unsafe { call(self.handle.component(), state.0.as_ptr()) };
+        self.handle.check("fmi3SetFMUState", status)
+    }
+
+    fn release(&mut self, state: Saved) -> Result<(), Error> {
+        let Some(call) = self.functions.free_state else { return Ok(()) };
+        self.handle.entering("fmi3FreeFMUState");
+        let mut state = state.0.as_ptr();
+        // SAFETY: the instance lives; the state is not used after this.
+        let status = unsafe { call(self.handle.component(), &raw mut state) };
+        self.handle.check("fmi3FreeFMUState", status)
+    }
+
+    fn to_bytes(&mut self, state: &Saved) -> Result<Option<Vec<u8>>, Error> {
+        let Some((size_of, call)) = self.functions.state_size.zip(self.functions.serialize) else {
+            return Ok(None);
+        };
+        self.handle.entering("fmi3SerializedFMUStateSize");
+        let mut size = 0;
+        // SAFETY: the instance and the state live; the size can be written.
+        let status = unsafe { size_of(self.handle.component(), state.0.as_ptr(), &raw mut size) };
+        self.handle.check("fmi3SerializedFMUStateSize", status)?;
+        if size > MAX_STATE {
+            let how = format!("said {size} bytes; allowed are at most {MAX_STATE}");
+            return Err(self.handle.broken("fmi3SerializedFMUStateSize", how));
+        }
+        let mut bytes = vec![0; size];
+        self.handle.entering("fmi3SerializeFMUState");
+        // SAFETY: the instance and the state live; as many bytes can be written as is said.
+        let status = unsafe { call(self.handle.component(), state.0.as_ptr(), bytes.as_mut_ptr(), size) };
+        self.handle.check("fmi3SerializeFMUState", status)?;
+        Ok(Some(bytes))
+    }
+
+    fn of_bytes(&mut self, bytes: &[u8]) -> Result<Option<Saved>, Error> {
+        let Some(call) = self.functions.deserialize else { return Ok(None) };
+        self.handle.entering("fmi3DeserializeFMUState");
+        let mut state = std::ptr::null_mut();
+        let (first, size) = (bytes.as_ptr(), bytes.len());
+        // SAFETY: the instance lives; the bytes can be read and the address written.
+        let status = unsafe { call(self.handle.component(), first, size, &raw mut state) };
+        self.handle.check("fmi3DeserializeFMUState", status)?;
+        self.saved("fmi3DeserializeFMUState", state).map(Some)
+    }
+
+    fn derivative(
+        &mut self,
+        adjoint: bool,
+        (unknown, known): (u32, u32),
+        seed: &[f64],
+        derivatives: &mut [f64],
+    ) -> Result<bool, Error> {
+        let (name, call) = match adjoint {
+            true => ("fmi3GetAdjointDerivative", self.functions.adjoint),
+            false => ("fmi3GetDirectionalDerivative", self.functions.directional),
+        };
+        let Some(call) = call else { return Ok(false) };
+        self.handle.entering(name);
+        let component = self.handle.component();
+        let (unknown, known) = (&raw const unknown, &raw const known);
+        let (seeds, given, to, wanted) =
+            (seed.as_ptr(), seed.len(), derivatives.as_mut_ptr(), derivatives.len());
+        // SAFETY: the instance lives; as many elements can be read or written from the addresses as is said.
+        let status = unsafe { call(component, unknown, 1, known, 1, seeds, given, to, wanted) };
+        self.handle.check(name, status)?;
+        Ok(true)
     }
 }
 

@@ -30,7 +30,7 @@ pub use description::{
 };
 pub use logging::LogMessage;
 pub use number::{DataType, Family, whole_range};
-pub use participant::{Anew, Participant, Slave};
+pub use participant::{Anew, Participant, Saved, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
 pub use status::Status;
 
@@ -58,11 +58,20 @@ impl Fmu {
     /// The file cannot be read, is not a sound archive, or its description is missing, malformed,
     /// not of FMI 2.0 or 3.0, or without a co-simulation interface that can be run.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let archive = Archive::open(path)?;
+        Self::of(Archive::open(path)?)
+    }
+
+    /// Reads the FMU of an archive that is unpacked.
+    ///
+    /// # Errors
+    ///
+    /// Its description is missing, malformed, not of FMI 2.0 or 3.0, or without a co-simulation interface that can be
+    /// run.
+    pub fn of(archive: Archive) -> Result<Self, Error> {
         let description = archive
             .model_description()
             .and_then(|text| Description::parse(&text))
-            .map_err(|problem| Error::fmu(path, problem))?;
+            .map_err(|problem| Error::fmu(archive.source(), problem))?;
         let description = Rc::new(description);
         Ok(Self { description, library: OnceCell::new(), abandoned: Cell::new(false), archive })
     }

@@ -1,6 +1,8 @@
 //! The calls of co-simulation that a master makes, whoever answers them and whatever their version is; and those
 //! that somebody makes who looks at an FMU more closely.
 
+use std::ffi::c_void;
+use std::ptr::NonNull;
 use std::rc::Rc;
 
 use super::number::DataType;
@@ -105,6 +107,10 @@ pub trait Participant {
     fn remark(&self) -> Option<String>;
 }
 
+/// A state of an instance, as its library knows it. Its memory is given back by [`Slave::release`].
+#[derive(Debug)]
+pub struct Saved(pub(super) NonNull<c_void>);
+
 /// An instance of an FMU.
 pub trait Slave: Participant {
     /// Its version of FMI.
@@ -123,6 +129,71 @@ pub trait Slave: Participant {
     ///
     /// As for a [`Participant`].
     fn get_text(&mut self, reference: u32, count: usize) -> Result<Option<Vec<Option<String>>>, Error>;
+
+    /// Tells the instance with each step whether it may be taken back to before it, by [`Slave::restore`]. It may not
+    /// unless this is said.
+    fn may_go_back(&mut self, _may: bool) {}
+
+    /// Saves its state; `None` where it offers no such call. So for the calls below.
+    ///
+    /// # Errors
+    ///
+    /// As for a [`Participant`]; so for the calls below.
+    fn save(&mut self) -> Result<Option<Saved>, Error> {
+        Ok(None)
+    }
+
+    /// Goes back to a state of this FMU.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn restore(&mut self, _state: &Saved) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Gives the memory of a state back.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn release(&mut self, _state: Saved) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Turns a state to bytes.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn to_bytes(&mut self, _state: &Saved) -> Result<Option<Vec<u8>>, Error> {
+        Ok(None)
+    }
+
+    /// Makes a state of bytes.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn of_bytes(&mut self, _bytes: &[u8]) -> Result<Option<Saved>, Error> {
+        Ok(None)
+    }
+
+    /// The derivative of the real variable `unknown` in the direction `seed` of the real variable `known`, or, `adjoint`,
+    /// of `seed · unknown` by each element of `known`, into `derivatives`. False where it offers no such call.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn derivative(
+        &mut self,
+        _adjoint: bool,
+        (_unknown, _known): (u32, u32),
+        _seed: &[f64],
+        _derivatives: &mut [f64],
+    ) -> Result<bool, Error> {
+        Ok(false)
+    }
 }
 
 /// What an instance says of a run that succeeded: how many calls returned `warning`, or a warning in its log.

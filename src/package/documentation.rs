@@ -1,33 +1,69 @@
 //! `documentation/index.html` of an FMU: its purpose, its coupling, its variables.
 
-use punctual_fmu::configuration::{Configuration, SamplingName};
+use punctual_fmu::configuration::{Configuration, FmiVersion, SamplingName};
 use punctual_fmu::product::Product;
-use punctual_modeldescription::{ModelDescription, Real, VariableKind};
+use punctual_modeldescription::{Real, Variable, VariableKind, fmi3};
+
+/// A variable for a human: name, causality, unit, start, range, meaning.
+pub(super) type Row = [String; 6];
+
+/// A model description as its file, and as rows of the page.
+pub(super) struct Described {
+    pub(super) xml: String,
+    pub(super) rows: Vec<Row>,
+}
+
+/// The range of a number, in words.
+fn range(min: Option<f64>, max: Option<f64>) -> String {
+    let text = |value: Option<f64>| value.map(shown).unwrap_or_default();
+    match (min, max) {
+        (None, None) => String::new(),
+        _ => format!("{} … {}", text(min), text(max)),
+    }
+}
+
+/// The row of a variable of FMI 2.0.
+pub(super) fn row(v: &Variable) -> Row {
+    let (unit, start, range) = match &v.kind {
+        VariableKind::Real(Real { start, min, max, unit, .. }) => {
+            (unit.clone().unwrap_or_default(), start.map(shown).unwrap_or_default(), range(*min, *max))
+        }
+        VariableKind::Enumeration(of) => {
+            (String::new(), String::new(), of.declared_type.clone().unwrap_or_default())
+        }
+        VariableKind::Boolean(of) => {
+            (String::new(), of.start.map(|s| s.to_string()).unwrap_or_default(), String::new())
+        }
+        _ => Default::default(),
+    };
+    [v.name.clone(), v.causality.as_str().to_owned(), unit, start, range, v.description.clone()]
+}
+
+/// The row of a variable of FMI 3.0; an array has its sizes beside its name.
+pub(super) fn row_of_fmi3(v: &fmi3::Variable) -> Row {
+    let sizes: Vec<_> = v.dimensions.iter().filter_map(|d| Some(d.start?.to_string())).collect();
+    let name = if sizes.is_empty() { v.name.clone() } else { format!("{}[{}]", v.name, sizes.join(",")) };
+    let (unit, start, range) = match &v.kind {
+        fmi3::VariableKind::Float64(of) => {
+            let start: Vec<_> = of.start.iter().map(|value| shown(*value)).collect();
+            (of.unit.clone().unwrap_or_default(), start.join(" "), range(of.min, of.max))
+        }
+        fmi3::VariableKind::Boolean(of) => {
+            let start: Vec<_> = of.start.iter().map(ToString::to_string).collect();
+            (String::new(), start.join(" "), String::new())
+        }
+        _ => (String::new(), String::new(), v.declared_type.clone().unwrap_or_default()),
+    };
+    [name, v.causality.as_str().to_owned(), unit, start, range, v.description.clone()]
+}
 
 /// Writes the page.
-pub(super) fn page(product: &Product, description: &ModelDescription, canonical: &str) -> String {
+pub(super) fn page(product: &Product, described: &Described, canonical: &str) -> String {
+    let description = &product.model_description();
     // The rows of variables, and the enumerations.
     let mut rows = String::new();
-    for v in &description.variables {
-        let (unit, start, range) = match &v.kind {
-            VariableKind::Real(Real { start, min, max, unit, .. }) => {
-                let text = |value: &Option<f64>| value.map(shown).unwrap_or_default();
-                let range = match (min, max) {
-                    (None, None) => String::new(),
-                    _ => format!("{} … {}", text(min), text(max)),
-                };
-                (unit.clone().unwrap_or_default(), text(start), range)
-            }
-            VariableKind::Enumeration(of) => {
-                (String::new(), String::new(), of.declared_type.clone().unwrap_or_default())
-            }
-            VariableKind::Boolean(of) => {
-                (String::new(), of.start.map(|s| s.to_string()).unwrap_or_default(), String::new())
-            }
-            _ => Default::default(),
-        };
-        let cells = [&v.name, v.causality.as_str(), &unit, &start, &range, &v.description];
-        let cells: String = cells.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
+    for row in &described.rows {
+        let cells: String = row.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
         rows += &format!("<tr>{cells}</tr>\n");
     }
     let mut enumerations = String::new();
@@ -62,10 +98,16 @@ pub(super) fn page(product: &Product, description: &ModelDescription, canonical:
         given += if c.is_assured() { ASSURED } else { ROWS };
         given += if c.external().is_some() { EXTERNAL } else { "" };
     }
-    let step = product.configuration.experiment().step_size;
+    let experiment = product.configuration.experiment();
+    let step = experiment.step_size;
+    let mut texts = format!("{use_of}{given}");
+    if experiment.fmi == FmiVersion::Three && experiment.arrays {
+        // Arrays have the names that scalars begin with.
+        texts = texts.replace(".*</code>", "</code>");
+    }
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}</title>\n<style>{STYLE}</style></head>\n\
-         <body>\n<h1>{name}</h1>\n<p>{text}. Made for a communication step of {step} s.</p>\n{use_of}{given}\n\
+         <body>\n<h1>{name}</h1>\n<p>{text}. Made for a communication step of {step} s.</p>\n{texts}\n\
          <h2>Variables</h2>\n<table>\n<tr><th>name</th><th>causality</th><th>unit</th><th>start</th><th>range</th>\
          <th>meaning</th></tr>\n{rows}</table>\n{enumerations}<h2>Configuration</h2>\n<pre>{canonical}</pre>\n\
          <p>{tool}</p>\n</body></html>\n",

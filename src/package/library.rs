@@ -4,10 +4,11 @@ use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use punctual_fmu::configuration::FmiVersion;
 use punctual_fmu::product::MARK;
 
 use crate::error::Error;
-use crate::host::PLATFORM;
+use crate::host::{PLATFORM, Version};
 use crate::validate::layout::ending;
 use crate::validate::symbols;
 
@@ -24,11 +25,15 @@ pub struct Library {
 }
 
 impl Library {
-    /// Its name in the archive.
-    pub fn entry(&self, identifier: &str) -> String {
+    /// Its names in the archive of an FMU of the version `fmi`: one for each processor that it is for.
+    pub fn entries(&self, identifier: &str, fmi: FmiVersion) -> Vec<String> {
         // Each platform that a file can be for has an ending.
-        let ending = ending(self.platform).unwrap_or(DLL_SUFFIX);
-        format!("binaries/{}/{identifier}{ending}", self.platform)
+        let ending = ending(Version::Fmi2, self.platform).unwrap_or(DLL_SUFFIX);
+        let folders = match fmi {
+            FmiVersion::Two => vec![self.platform],
+            FmiVersion::Three => symbols::tuples(self.platform, &self.bytes),
+        };
+        folders.into_iter().map(|folder| format!("binaries/{folder}/{identifier}{ending}")).collect()
     }
 }
 

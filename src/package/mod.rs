@@ -12,7 +12,7 @@ pub mod system;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use punctual_fmu::configuration::{Configuration, RESOURCE};
+use punctual_fmu::configuration::{Configuration, FmiVersion, RESOURCE};
 use punctual_fmu::product::Product;
 use punctual_modeldescription::{Archive, Timestamp};
 
@@ -48,6 +48,27 @@ fn timestamp() -> Result<Timestamp, Error> {
     }
 }
 
+/// The model description of `product` in its version of FMI, as the file and as rows for a human.
+fn described(product: &Product) -> Result<documentation::Described, Error> {
+    let broken = |e: punctual_modeldescription::Error| broken(&e);
+    Ok(match product.configuration.experiment().fmi {
+        FmiVersion::Two => {
+            let description = product.model_description();
+            documentation::Described {
+                xml: description.to_xml().map_err(broken)?,
+                rows: description.variables.iter().map(documentation::row).collect(),
+            }
+        }
+        FmiVersion::Three => {
+            let description = product.model_description_of_fmi3();
+            documentation::Described {
+                xml: description.to_xml().map_err(broken)?,
+                rows: description.variables.iter().map(documentation::row_of_fmi3).collect(),
+            }
+        }
+    })
+}
+
 /// The entries of the FMU of `product` around its shared libraries. Entries carry the time of
 /// the environment variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
 ///
@@ -57,22 +78,28 @@ fn timestamp() -> Result<Timestamp, Error> {
 pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Error> {
     let broken = |e: punctual_modeldescription::Error| broken(&e);
     let timestamp = timestamp()?;
-    let description = product.model_description();
+    let fmi = product.configuration.experiment().fmi;
     let canonical = product.configuration.canonical()?;
-    let page = documentation::page(product, &description, &canonical);
+    let described = described(product)?;
+    let page = documentation::page(product, &described, &canonical);
     let plugin = product.configuration.plugin();
     let plugin = plugin.map(|plugin| {
         let bytes = std::fs::read(&plugin.path).map_err(|e| Error::io("read", &plugin.path, e))?;
         Ok::<_, Error>((format!("resources/{PLATFORM}/{}", plugin.file), bytes))
     });
     let mut archive = Archive::new().with_timestamp(timestamp);
-    archive.add("modelDescription.xml", description.to_xml().map_err(broken)?).map_err(broken)?;
-    archive.add("model.png", ICON).map_err(broken)?;
+    archive.add("modelDescription.xml", described.xml).map_err(broken)?;
+    let icon = match fmi {
+        FmiVersion::Two => "model.png",
+        FmiVersion::Three => "terminalsAndIcons/icon.png",
+    };
+    archive.add(icon, ICON).map_err(broken)?;
     archive.add("documentation/index.html", page).map_err(broken)?;
     archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
     for library in libraries {
-        let entry = library.entry(&description.co_simulation.model_identifier);
-        archive.add(&entry, library.bytes).map_err(broken)?;
+        for entry in library.entries(product.configuration.name(), fmi) {
+            archive.add(&entry, library.bytes.clone()).map_err(broken)?;
+        }
     }
     if let Some((place, bytes)) = plugin.transpose()? {
         archive.add(&place, bytes).map_err(broken)?;

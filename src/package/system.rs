@@ -12,7 +12,7 @@ use punctual_modeldescription::{
 
 use crate::coupling::{self, Link, Port, StartValue, System};
 use crate::error::Error;
-use crate::host::{DataType, Description, Family, Fmu, Variable};
+use crate::host::{Array, DataType, Description, Family, Fmu, Variable};
 use crate::text;
 use crate::whole;
 
@@ -124,6 +124,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
     let descriptions: Vec<&Description> = models.iter().map(coupling::Model::description).collect();
     let links = coupling::links(system, &descriptions)?;
     let parameters = start_values(system, &descriptions)?;
+    refuse_arrays(system, &descriptions, &links, &parameters)?;
     let starts = &parameters;
     let experiment = system.experiment();
     let mut enumerations = Enumerations::default();
@@ -135,7 +136,9 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
                 let port = Port { component: c, variable: *v };
                 // An input that is neither connected nor set keeps the start value of its FMU, so it is no
                 // connector. Some masters write zero to every input that is one.
-                variable.causality != Causality::Input
+                let is_scalar = !description.is_element(*v);
+                let is_input = variable.causality == Causality::Input;
+                is_scalar && !is_input
                     || starts.iter().any(|(name, _)| *name == format!("{}.{}", component.name, variable.name))
                     || links.iter().any(|link| link.to == port)
             };
@@ -192,6 +195,32 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
         archive.add(&place, bytes).map_err(broken)?;
     }
     Ok((archive, packed))
+}
+
+/// SSP 1.0 knows no arrays, so none can be connected or given a value.
+fn refuse_arrays(
+    system: &System,
+    descriptions: &[&Description],
+    links: &[Link],
+    starts: &[(String, ParameterValue)],
+) -> Result<(), Error> {
+    for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
+        let used = |v: usize| {
+            let port = Port { component: c, variable: v };
+            let name = format!("{}.{}", component.name, description.variables[v].name);
+            links.iter().any(|link| link.from == port || link.to == port)
+                || starts.iter().any(|(given, _)| *given == name)
+        };
+        let elements = |array: &Array| array.first..array.first + array.count;
+        if let Some(array) = description.arrays.iter().find(|array| elements(array).any(used)) {
+            let message = format!(
+                "{} of {} ({}) is an array, for which SSP 1.0 has no place; `punctual run` couples it",
+                array.name, component.name, component.fmu
+            );
+            return Err(Error::configuration(format!("component[{c}]"), message));
+        }
+    }
+    Ok(())
 }
 
 /// The enumerations of all components, each once. Where two share a name but not the items, the later one is

@@ -1,19 +1,23 @@
-//! Defects of an FMI 2.0 co-simulation FMU, ours or another's, as a list of findings. Each module asks one kind
-//! of question and uses only those above it:
+//! Defects of an FMU of FMI 2.0 co-simulation or of FMI 3.0, ours or another's, as a list of findings. Each module asks
+//! one kind of question and uses only those above it:
 //!
 //! | module | asks |
 //! |---|---|
 //! | `finding` | how a finding is told |
-//! | `schema` | what the XML schema says: elements, attributes, types of values |
+//! | `schema` | what the XML schemas say: elements, attributes, types of values |
+//! | `model` | what the description of either version says |
 //! | `layout` | which files the archive must and may hold |
+//! | `companions` | terminals and build descriptions of FMI 3.0 |
 //! | `symbols` | whether the libraries export what they must, without loading them |
 //! | `trial` | whether an instance does what it should, in a child process |
 //!
 //! The rules of the standard on a description beyond the schema are those of `punctual_modeldescription`, for the
 //! same model as where a description is written.
 
+mod companions;
 mod finding;
 pub(crate) mod layout;
+mod model;
 mod schema;
 pub(crate) mod symbols;
 pub mod trial;
@@ -26,8 +30,8 @@ pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
 use crate::host::Archive;
-use finding::Findings;
-use punctual_modeldescription::Located;
+use finding::{DESCRIPTION, Findings};
+use model::Model;
 
 /// Findings on one FMU.
 #[derive(Clone, Debug, Default)]
@@ -66,21 +70,27 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let text = match archive.model_description() {
         Ok(text) => text,
         Err(problem) => {
-            findings.archive(rule(&problem), "modelDescription.xml", problem.to_string());
+            findings.archive(rule(&problem), DESCRIPTION, problem.to_string());
             skipped.push("everything else: there is no description to go by".to_owned());
             return Ok(Report { findings: findings.finish(), skipped });
         }
     };
-    let Some(document) = schema::parse(&text, &mut findings) else {
+    let Some(document) = schema::parse(DESCRIPTION, &text, &mut findings) else {
         skipped.push("everything else: the description is not well-formed".to_owned());
         return Ok(Report { findings: findings.finish(), skipped });
     };
-    schema::check(&document, &mut findings);
-    let model = Located::read(&document);
-    model.check(&mut |violation| findings.violation(&model, violation));
+    let model = Model::read(&document);
+    schema::check(&document, model.schema(), &mut findings);
+    model.check(&mut findings);
     layout::check(&archive, &model, &mut findings);
+    if let Model::Fmi3(model) = &model {
+        companions::check(&archive, &model.description, &mut findings);
+    }
     symbols::check(&archive, &model, &mut findings);
-    match (limit, trial::reason_to_skip(&archive, &model, &findings)) {
+    let reason = trial::reason_to_skip(&archive, model.version(), model.needs_tool(), &findings);
+    let reason =
+        reason.or_else(|| (!model.has_co_simulation()).then(|| "there is no co-simulation".to_owned()));
+    match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
         (Some(limit), None) => trial::run(path, limit, &mut findings)?,

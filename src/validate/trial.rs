@@ -8,13 +8,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Duration;
 
-use punctual_modeldescription::Located;
-
 use super::finding::{Finding, Findings, Place, severity};
 use crate::error::Error;
 use crate::host::{
-    Archive, Causality, DataType, Description, Fmu, PLATFORM, Slave, Status, Variability, Variable, Version,
-    journal,
+    Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
 use crate::isolation::{self, Child, End, Voice};
 
@@ -30,8 +27,23 @@ const STEP: f64 = 0.01;
 /// ways.
 const CLOSE: f64 = 1e-12;
 
-/// The reason why there can be no trial, if there is one.
-pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Findings) -> Option<String> {
+/// The greatest number of pairs of an output and an input whose derivatives are compared.
+const PAIRS: usize = 50;
+/// The change of inputs for quotients of differences, by the size of the input.
+const DIFFERENCE: f64 = 1e-6;
+/// Difference of a derivative from a quotient of differences that is allowed, by its size: the quotient is that inexact.
+const AGREE: f64 = 1e-4;
+/// Relative difference of the adjoint derivative from the directional one that is allowed; both are exact.
+const ADJOINT: f64 = 1e-9;
+
+/// The reason why there can be no trial of an FMU of this `version`, if there is one. `needs_tool` says whether it needs
+/// another program to run.
+pub(super) fn reason_to_skip(
+    archive: &Archive,
+    version: Version,
+    needs_tool: bool,
+    findings: &Findings,
+) -> Option<String> {
     for (head, reason) in [
         ("schema.", "the description breaks the schema"),
         ("interface.co-simulation", "there is no co-simulation"),
@@ -42,18 +54,18 @@ pub(super) fn reason_to_skip(archive: &Archive, model: &Located, findings: &Find
         }
     }
     // What is wrong with the library of another platform is no obstacle.
-    let own = format!("binaries/{PLATFORM}/");
+    let own = version.platform();
+    let folder = format!("binaries/{own}/");
     for (head, reason) in
         [("archive.binary", "there is no library"), ("symbols.", "the library is not complete")]
     {
-        if findings.any_in(head, |file| file.is_empty() || file.starts_with(&own)) {
-            return Some(format!("{reason} for {PLATFORM}"));
+        if findings.any_in(head, |file| file.is_empty() || file.starts_with(&folder)) {
+            return Some(format!("{reason} for {own}"));
         }
     }
-    if !archive.platforms().iter().any(|platform| platform == PLATFORM) {
-        return Some(format!("there is no library for {PLATFORM}"));
+    if !archive.platforms().iter().any(|platform| platform == own) {
+        return Some(format!("there is no library for {own}"));
     }
-    let needs_tool = model.description.co_simulation.needs_execution_tool;
     needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
@@ -111,6 +123,8 @@ pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
         let rule = match error.as_call() {
             Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
             Some(_) => "trial.call",
+            // A call that was done, but not as the standard says.
+            None if error.as_fmu_problem().is_none() => "trial.call",
             None => "trial.load",
         };
         trial.tell(rule, None, &error.to_string());
@@ -198,8 +212,17 @@ impl Trial {
             variables.chunk_by(same).try_for_each(|array| self.compare_start(slave, array))?;
         }
         for k in 0..plan.steps {
-            slave.do_step(plan.start + f64::from(k) * plan.step, plan.step)?;
+            if !set && k == plan.steps / 2 && description.states[0] {
+                self.go_back(slave, description, (plan.time(k), plan.step))?;
+            }
+            slave.do_step(plan.time(k), plan.step)?;
             self.outputs(slave, variables)?;
+            if slave.asks_to_end() {
+                break;
+            }
+        }
+        if !set {
+            self.derivatives(slave, description)?;
         }
         let last = self.outputs(slave, variables)?;
         slave.terminate()?;
@@ -274,6 +297,129 @@ impl Trial {
         Ok(())
     }
 
+    /// Makes a step, goes back, and makes it again: from the state, and from the state that was bytes between.
+    fn go_back(
+        &mut self,
+        slave: &mut dyn Slave,
+        description: &Description,
+        (time, step): (f64, f64),
+    ) -> Result<(), Error> {
+        let variables = &description.variables;
+        let Some(before) = slave.save()? else { return Ok(()) };
+        slave.may_go_back(true);
+        slave.do_step(time, step)?;
+        let first = self.outputs(slave, variables)?;
+        slave.restore(&before)?;
+        slave.do_step(time, step)?;
+        let again = self.outputs(slave, variables)?;
+        self.compare_states(&first, &again, "it was set back");
+        if description.states[1]
+            && let Some(bytes) = slave.to_bytes(&before)?
+        {
+            if let Some(state) = slave.of_bytes(&bytes)? {
+                slave.restore(&state)?;
+                slave.do_step(time, step)?;
+                let again = self.outputs(slave, variables)?;
+                self.compare_states(&first, &again, "its state went through bytes");
+                slave.release(state)?;
+            }
+        }
+        slave.restore(&before)?;
+        slave.release(before)?;
+        slave.may_go_back(false);
+        Ok(())
+    }
+
+    fn compare_states(&mut self, first: &[(String, f64)], again: &[(String, f64)], after: &str) {
+        for ((name, a), (_, b)) in first.iter().zip(again) {
+            if a.to_bits() != b.to_bits() {
+                let text = format!(
+                    "is {b} after a step that was made again after {after}, but was {a} the first time"
+                );
+                self.tell("trial.state", Some(name), &text);
+            }
+        }
+    }
+
+    /// Compares derivatives of outputs by inputs with differences, and adjoint ones with directional ones.
+    fn derivatives(&mut self, slave: &mut dyn Slave, description: &Description) -> Result<(), Error> {
+        if !description.derivatives[0] || slave.version() != Version::Fmi3 {
+            return Ok(());
+        }
+        let real = |v: &Variable| v.of == DataType::Float64 && v.variability == Variability::Continuous;
+        let array = |first: usize| &description.variables[first..first + description.variables[first].count];
+        let mut pairs = Vec::new();
+        for output in &description.outputs {
+            let inputs = description.direct_inputs(output).into_iter();
+            pairs.extend(inputs.map(|input| (output.variable, input)).filter(|(output, input)| {
+                let (output, input) = (&description.variables[*output], &description.variables[*input]);
+                real(output) && real(input) && output.element == 0 && input.element == 0
+            }));
+        }
+        for (output, input) in pairs.into_iter().take(PAIRS) {
+            self.derivative(slave, array(output), array(input), description.derivatives[1])?;
+        }
+        Ok(())
+    }
+
+    fn derivative(
+        &mut self,
+        slave: &mut dyn Slave,
+        output: &[Variable],
+        input: &[Variable],
+        adjoint: bool,
+    ) -> Result<(), Error> {
+        let (unknown, known) = (output[0].value_reference, input[0].value_reference);
+        let direction: Vec<f64> = (0..input.len()).map(|i| 1.0 / (1.0 + i as f64)).collect();
+        let mut directional = vec![f64::NAN; output.len()];
+        if !slave.derivative(false, (unknown, known), &direction, &mut directional)? {
+            return Ok(());
+        }
+        // Differences to both sides; where they differ, there is a kink, and nothing to compare with.
+        let mut at = vec![0.0; input.len()];
+        slave.get(DataType::Float64, &[known], &mut at)?;
+        let size = at.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
+        let moved = |slave: &mut dyn Slave, by: f64| {
+            let to: Vec<f64> = at.iter().zip(&direction).map(|(x, d)| x + by * d).collect();
+            slave.set(DataType::Float64, &[known], &to)?;
+            let mut values = vec![f64::NAN; output.len()];
+            slave.get(DataType::Float64, &[unknown], &mut values)?;
+            Ok::<_, Error>(values)
+        };
+        let by = DIFFERENCE * size;
+        let (up, down, here) = (moved(slave, by)?, moved(slave, -by)?, moved(slave, 0.0)?);
+        for (i, v) in output.iter().enumerate() {
+            let [right, left] = [(up[i] - here[i]) / by, (here[i] - down[i]) / by];
+            let allowed = AGREE * (1.0 + right.abs());
+            let is_smooth = (right - left).abs() <= allowed;
+            if is_smooth && !((directional[i] - right).abs() <= allowed) {
+                let text = format!(
+                    "its directional derivative by {} is {}, the quotient of differences {right}",
+                    input[0].name, directional[i]
+                );
+                self.tell("trial.derivative", Some(&v.name), &text);
+            }
+        }
+        if !adjoint {
+            return Ok(());
+        }
+        let weights: Vec<f64> = (0..output.len()).map(|i| 1.0 / (2.0 + i as f64)).collect();
+        let mut reverse = vec![f64::NAN; input.len()];
+        if !slave.derivative(true, (unknown, known), &weights, &mut reverse)? {
+            return Ok(());
+        }
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (forward, reverse) = (product(&weights, &directional), product(&reverse, &direction));
+        if !((forward - reverse).abs() <= ADJOINT * (1.0 + forward.abs())) {
+            let text = format!(
+                "its adjoint derivative by {} gives {reverse} where the directional one gives {forward}",
+                input[0].name
+            );
+            self.tell("trial.derivative", Some(&output[0].name), &text);
+        }
+        Ok(())
+    }
+
     fn two_instances(&mut self, fmu: &Rc<Fmu>, other: &dyn Slave, plan: Plan) {
         let made = fmu.instantiate(fmu.description(), "trial2").and_then(|mut slave| {
             slave.setup_experiment(plan.start, plan.stop)?;
@@ -301,6 +447,11 @@ struct Plan {
 }
 
 impl Plan {
+    /// The time of step `k`.
+    fn time(&self, k: u32) -> f64 {
+        self.start + f64::from(k) * self.step
+    }
+
     /// The suggested experiment, cut short.
     fn of(description: &Description) -> Self {
         let suggested = description.default_experiment.unwrap_or_default();

@@ -109,7 +109,7 @@ fn missing_resources() {
         assert!(message.contains(RESOURCE), "{location}: {message}");
     }
     let message = Arguments { location: c("https://host/resources"), ..Arguments::of(&fmu) }.refused();
-    let wanted = "fmi2Instantiate: fmuResourceLocation is \"https://host/resources\", must be a file URI";
+    let wanted = "fmi2Instantiate: the resource location is \"https://host/resources\", must be a file URI";
     assert_eq!(message, wanted);
 }
 

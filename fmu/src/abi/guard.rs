@@ -1,13 +1,13 @@
 //! The one boundary between C and Rust: NULL checks, panics, slices.
 
 use std::any::Any;
-use std::ffi::CStr;
+use std::ffi::{CStr, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, Once, PoisonError};
 
-use super::fmi2::{Component, Status, Text};
-
 use super::logger::Logger;
+use super::{fmi2, fmi3};
+use crate::configuration::FmiVersion;
 use crate::instance::{Failure, Instance};
 
 /// An instance behind a component pointer.
@@ -16,6 +16,39 @@ pub(super) struct Handle {
     pub(super) logger: Logger,
     /// Set once a panic came out of this instance: its values cannot be trusted any more.
     pub(super) poisoned: bool,
+}
+
+impl Handle {
+    /// Makes a step, and logs what the user should know of it.
+    pub(super) fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.instance.do_step(t, h)?;
+        while let Some(notice) = self.instance.notice() {
+            self.logger.warning(&notice);
+        }
+        Ok(())
+    }
+}
+
+/// The status that the functions of one version of FMI return.
+pub(super) trait Answer: Copy {
+    /// The version.
+    const FMI: FmiVersion;
+    /// Done.
+    const OK: Self;
+    /// Not done.
+    const ERROR: Self;
+}
+
+impl Answer for fmi2::Status {
+    const FMI: FmiVersion = FmiVersion::Two;
+    const OK: Self = Self::OK;
+    const ERROR: Self = Self::ERROR;
+}
+
+impl Answer for fmi3::Status {
+    const FMI: FmiVersion = FmiVersion::Three;
+    const OK: Self = Self::OK;
+    const ERROR: Self = Self::ERROR;
 }
 
 /// Message and place of the last panic, kept by the hook for the log.
@@ -46,31 +79,45 @@ pub(super) fn catch<R>(body: impl FnOnce() -> R) -> Result<R, String> {
 ///
 /// # Safety
 ///
-/// `component` is NULL or was returned by `fmi2Instantiate` and not freed since, and no other call
+/// `component` is NULL or was returned by a function that instantiates and not freed since, and no other call
 /// for it is under way.
-pub(super) unsafe fn guarded(
-    component: Component,
+pub(super) unsafe fn guarded<S: Answer>(
+    component: *mut c_void,
     name: &str,
-    body: impl FnOnce(&mut Handle) -> Result<Status, Failure>,
-) -> Status {
+    body: impl FnOnce(&mut Handle) -> Result<S, Failure>,
+) -> S {
     // SAFETY: the caller's contract; a NULL pointer gives None.
-    let Some(handle) = (unsafe { component.cast::<Handle>().as_mut() }) else { return Status::ERROR };
+    let Some(handle) = (unsafe { component.cast::<Handle>().as_mut() }) else { return S::ERROR };
     if handle.poisoned {
         handle.logger.error(&format!("{name}: the instance failed before and can only be freed"));
-        return Status::ERROR;
+        return S::ERROR;
+    }
+    let fmi = handle.instance.fmi();
+    if fmi != S::FMI {
+        let prefix = &name[..4];
+        handle.logger.error(&format!(
+            "{name}: the instance is one of FMI {}, which has no functions that begin with {prefix}",
+            fmi.name()
+        ));
+        return S::ERROR;
     }
     match catch(|| body(handle)) {
         Ok(Ok(status)) => status,
         Ok(Err(failure)) => {
             handle.logger.error(&format!("{name}: {failure}"));
-            Status::ERROR
+            S::ERROR
         }
         Err(panic) => {
             handle.poisoned = true;
             handle.logger.error(&format!("{name}: {panic}"));
-            Status::ERROR
+            S::ERROR
         }
     }
+}
+
+/// Returns OK where nothing is asked for, else an error with the reason.
+pub(super) fn none<S: Answer>(why: &str, count: usize) -> Result<S, Failure> {
+    if count == 0 { Ok(S::OK) } else { Err(format!("{why}: {count} values were asked for, must be 0")) }
 }
 
 /// `len` elements at `pointer`; nothing is read where `len` is 0.
@@ -131,7 +178,7 @@ fn check_array<T>(name: &str, pointer: *const T, len: usize) -> Result<(), Failu
 /// # Safety
 ///
 /// `pointer` is NULL or points to a NUL-terminated string.
-pub(super) unsafe fn text(pointer: Text) -> Option<String> {
+pub(super) unsafe fn text(pointer: *const c_char) -> Option<String> {
     if pointer.is_null() {
         return None;
     }

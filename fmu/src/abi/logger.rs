@@ -1,8 +1,8 @@
 //! Messages to the importer's logger.
 
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, c_void};
 
-use super::fmi2::{self, CallbackFunctions, Environment, Status};
+use super::{fmi2, fmi3};
 
 use crate::product::LOG_CATEGORIES;
 
@@ -15,43 +15,80 @@ const EVENTS: &CStr = c"logEvents";
 /// The category of what the user should know though the call succeeded.
 const WARNINGS: &CStr = c"logStatusWarning";
 
-/// The logger of one instance, copied out of the importer's structure.
+/// The function of the importer that takes messages, as its version of FMI declares it.
+enum Function {
+    Fmi2 { logger: fmi2::Logger, instance_name: CString },
+    Fmi3(unsafe extern "C" fn(fmi3::Environment, fmi3::Status, fmi3::Text, fmi3::Text)),
+}
+
+/// The logger of one instance, copied out of what the importer gave.
 pub(super) struct Logger {
-    function: Option<fmi2::Logger>,
-    environment: Environment,
-    instance_name: CString,
-    /// Whether events are wanted (`loggingOn` and the categories). Errors and warnings are always logged.
+    function: Option<Function>,
+    environment: *mut c_void,
+    /// Whether events are wanted (`loggingOn` and the categories). Errors are always logged.
     events: bool,
+    /// Whether warnings are wanted. FMI 2.0 does not forbid one that nobody asked for, FMI 3.0 does.
+    warnings: bool,
 }
 
 // SAFETY: the environment pointer is only handed back to the importer's own function, within calls
 // that the importer makes; FMI lets it make them from any one thread at a time.
 unsafe impl Send for Logger {}
 
+/// What a message is about: the status and the category that it is sent with.
+#[derive(Clone, Copy)]
+enum Matter {
+    Error,
+    Warning,
+    Event,
+    /// A call that was not done, after which the run may go on.
+    Discarded,
+}
+
 impl Logger {
-    pub(super) fn new(callbacks: Option<&CallbackFunctions>, instance_name: CString, events: bool) -> Self {
+    /// The logger that `fmi2Instantiate` gave.
+    pub(super) fn of_fmi2(
+        callbacks: Option<&fmi2::CallbackFunctions>,
+        instance_name: CString,
+        events: bool,
+    ) -> Self {
+        let logger = callbacks.and_then(|c| c.logger);
         Self {
-            function: callbacks.and_then(|c| c.logger),
+            function: logger.map(|logger| Function::Fmi2 { logger, instance_name }),
             environment: callbacks.map_or(std::ptr::null_mut(), |c| c.environment),
-            instance_name,
             events,
+            warnings: true,
         }
+    }
+
+    /// The logger that a function of FMI 3.0 gave.
+    pub(super) fn of_fmi3(function: fmi3::LogMessage, environment: fmi3::Environment, on: bool) -> Self {
+        Self { function: function.map(Function::Fmi3), environment, events: on, warnings: on }
     }
 
     /// Logs a failed call.
     pub(super) fn error(&self, message: &str) {
-        self.send(Status::ERROR, ERRORS, message);
+        self.send(Matter::Error, message);
     }
 
     /// Logs what the user should know.
     pub(super) fn warning(&self, message: &str) {
-        self.send(Status::WARNING, WARNINGS, message);
+        if self.warnings {
+            self.send(Matter::Warning, message);
+        }
+    }
+
+    /// Logs why a call was not done, after which the run may go on.
+    pub(super) fn discarded(&self, message: &str) {
+        if self.warnings {
+            self.send(Matter::Discarded, message);
+        }
     }
 
     /// Logs an event, if events are wanted.
     pub(super) fn event(&self, message: &str) {
         if self.events {
-            self.send(Status::OK, EVENTS, message);
+            self.send(Matter::Event, message);
         }
     }
 
@@ -61,20 +98,48 @@ impl Logger {
             let names = LOG_CATEGORIES.map(|(name, _)| name).join(", ");
             return Err(format!("the log category {unknown:?} is unknown, must be one of {names}"));
         }
-        if categories.is_empty() || categories.iter().any(|c| *c == LOG_CATEGORIES[1].0) {
+        let named = |category: usize| {
+            categories.is_empty() || categories.iter().any(|c| *c == LOG_CATEGORIES[category].0)
+        };
+        if named(1) {
             self.events = on;
+        }
+        if named(2) && matches!(self.function, Some(Function::Fmi3(_))) {
+            self.warnings = on;
         }
         Ok(())
     }
 
-    fn send(&self, status: Status, category: &CStr, message: &str) {
-        let Some(function) = self.function else { return };
-        let text = loggable(message);
-        let (name, category) = (self.instance_name.as_ptr(), category.as_ptr());
-        // SAFETY: the importer guarantees that its logger stays callable with its environment while the
-        // instance lives; the strings are NUL-terminated and outlive the call; the text has no
-        // conversion, so no further argument is read.
-        unsafe { function(self.environment, name, status, category, text.as_ptr()) };
+    fn send(&self, matter: Matter, message: &str) {
+        let category = match matter {
+            Matter::Error => ERRORS,
+            Matter::Warning | Matter::Discarded => WARNINGS,
+            Matter::Event => EVENTS,
+        }
+        .as_ptr();
+        // In both versions a status is the same number.
+        let status = match matter {
+            Matter::Error => fmi3::Status::ERROR,
+            Matter::Warning => fmi3::Status::WARNING,
+            Matter::Discarded => fmi3::Status::DISCARD,
+            Matter::Event => fmi3::Status::OK,
+        };
+        match &self.function {
+            None => {}
+            Some(Function::Fmi2 { logger, instance_name }) => {
+                let (text, status) = (loggable(message), fmi2::Status(status.0));
+                // SAFETY: the importer guarantees that its logger stays callable with its environment while the
+                // instance lives; the strings are NUL-terminated and outlive the call; the text has no
+                // conversion, so no further argument is read.
+                unsafe { logger(self.environment, instance_name.as_ptr(), status, category, text.as_ptr()) };
+            }
+            Some(Function::Fmi3(function)) => {
+                // A single # would begin a value reference.
+                let text = loggable(&message.replace('#', "##"));
+                // SAFETY: as above; the function has these four arguments.
+                unsafe { function(self.environment, status, category, text.as_ptr()) };
+            }
+        }
     }
 }
 

@@ -1,16 +1,12 @@
-//! The 34 functions of FMI 2.0 co-simulation. Each only guards, converts and delegates to
-//! [`Instance`](crate::instance::Instance).
+//! The functions of FMI 2.0 and FMI 3.0. Each only guards, converts and delegates to
+//! [`Instance`].
 //!
 //! # Safety
 //!
 //! Every function expects this of its caller, besides what it says itself: a component is NULL or came from
-//! `fmi2Instantiate` and was not freed; calls for one component do not overlap; an array is NULL or has as many
-//! elements as its count says; a string is NULL or NUL-terminated. NULL and wrong counts of zero are met with a
-//! status, never with a crash.
-//!
-//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned. Several importers take a warning for a
-//! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
-//! for does not exist.
+//! `fmi2Instantiate` or `fmi3InstantiateCoSimulation` and was not freed; calls for one component do not overlap; an
+//! array is NULL or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong counts of
+//! zero are met with a status, never with a crash. A component of one version in a function of the other is refused.
 
 #[macro_use]
 pub mod fmi2;
@@ -23,83 +19,60 @@ mod logger;
 mod plugin;
 mod resources;
 mod states;
-mod unsupported;
 
-use std::ffi::{CString, c_int};
+/// Defines exports that take nothing but the component.
+macro_rules! plain {
+    ($status:ty; $($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
+        $(#[$doc])*
+        ///
+        /// # Safety
+        ///
+        /// See the module.
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $name(component: *mut std::ffi::c_void) -> $status {
+            let body: fn(&mut Handle) -> Result<(), String> = $body;
+            // SAFETY: the caller's contract for components.
+            unsafe {
+                guarded(component, stringify!($name), |handle| body(handle).map(|()| <$status>::OK))
+            }
+        }
+    )*};
+}
+
+mod version2;
+mod version3;
+
+use std::ffi::c_void;
 use std::ptr;
 
 #[cfg(windows)]
 pub use plugin::loadable;
 pub use plugin::{PluginFolder, file_name};
 
-use fmi2::{
-    Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
-    TERMINATED, Text, ValueReference,
-};
-use guard::{Handle, catch, guarded, install_panic_hook, slice, slice_mut, text};
+use guard::{Answer, Handle, catch, install_panic_hook, slice, text};
 use logger::Logger;
-use states::{
-    fmi2DeSerializeFMUstate, fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SerializeFMUstate,
-    fmi2SerializedFMUstateSize, fmi2SetFMUstate,
-};
-use unsupported::fmi2CancelStep;
 
-use crate::instance::{Call, Instance, Mode};
+use crate::configuration::FmiVersion;
+use crate::instance::{Failure, Instance};
 
-/// Defines exports with the types of the standard.
-macro_rules! exported {
-    ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
-        $(const _: fmi2::$type = $symbol;)*
-    };
-}
-
-fmi2_functions!(exported);
-
-/// Returns `"default"`: the types of `fmi2TypesPlatform.h`.
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetTypesPlatform() -> Text {
-    c"default".as_ptr()
-}
-
-/// Returns `"2.0"`.
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetVersion() -> Text {
-    c"2.0".as_ptr()
-}
-
-/// Makes a new instance, or returns NULL with a log message.
-///
-/// # Safety
-///
-/// See the module; `callbacks` is NULL or points to a structure that is read during this call only.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2Instantiate(
-    instance_name: Text,
-    fmu_type: c_int,
-    guid: Text,
-    resource_location: Text,
-    callbacks: *const CallbackFunctions,
-    _visible: Boolean,
-    logging_on: Boolean,
-) -> Component {
+/// A new instance behind a pointer, or NULL with a log message under `name`. `arguments` checks what the importer said,
+/// and gives the token of the FMU and the place of its resources.
+fn instantiated(
+    name: &str,
+    fmi: FmiVersion,
+    logger: Logger,
+    arguments: impl FnOnce() -> Result<(String, String), Failure>,
+) -> *mut c_void {
     install_panic_hook();
-    // SAFETY: the caller's contract for strings.
-    let name = unsafe { text(instance_name) };
-    // SAFETY: the caller's contract for the callbacks; a NULL pointer gives None.
-    let callbacks = unsafe { callbacks.as_ref() };
-    let c_name = CString::new(name.unwrap_or_default()).unwrap_or_default();
-    let logger = Logger::new(callbacks, c_name, logging_on != 0);
-    // SAFETY: the caller's contract for strings.
-    let guid = unsafe { text(guid) };
-    // SAFETY: the caller's contract for strings.
-    let location = unsafe { text(resource_location) };
     let built = catch(|| {
-        if fmu_type != CO_SIMULATION {
-            return Err(format!("fmuType is {fmu_type}, must be 1 (fmi2CoSimulation)"));
+        let (token, location) = arguments()?;
+        let configuration = resources::configuration(&location)?;
+        let found = configuration.experiment().fmi;
+        if found != fmi {
+            let (found, asked) = (found.name(), fmi.name());
+            return Err(format!("the FMU is one of FMI {found}, which has no instance of FMI {asked}"));
         }
-        let guid = guid.ok_or("fmuGUID is NULL")?;
-        let location = location.ok_or("fmuResourceLocation is NULL")?;
-        Instance::new(resources::configuration(&location)?, &guid)
+        Instance::new(configuration, &token)
     });
     match built.and_then(|result| result) {
         Ok(instance) => {
@@ -107,7 +80,7 @@ unsafe extern "C" fn fmi2Instantiate(
             Box::into_raw(Box::new(Handle { instance, logger, poisoned: false })).cast()
         }
         Err(failure) => {
-            logger.error(&format!("fmi2Instantiate: {failure}"));
+            logger.error(&format!("{name}: {failure}"));
             ptr::null_mut()
         }
     }
@@ -118,10 +91,9 @@ unsafe extern "C" fn fmi2Instantiate(
 /// # Safety
 ///
 /// See the module; the component is not used afterwards.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2FreeInstance(component: Component) {
+unsafe fn free(component: *mut c_void) {
     if !component.is_null() {
-        // SAFETY: not NULL, so it came from `Box::into_raw` in `fmi2Instantiate`, and is freed once.
+        // SAFETY: not NULL, so it came from `Box::into_raw` in `instantiated`, and is freed once.
         let handle = unsafe { Box::from_raw(component.cast::<Handle>()) };
         // A panic while dropping must not reach the importer; memory that it leaves behind is leaked.
         let _ = catch(|| {
@@ -136,330 +108,19 @@ unsafe extern "C" fn fmi2FreeInstance(component: Component) {
 /// # Safety
 ///
 /// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetDebugLogging(
-    component: Component,
-    logging_on: Boolean,
+unsafe fn switch<S: Answer>(
+    handle: &mut Handle,
+    on: bool,
     count: usize,
-    categories: *const Text,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let pointers = unsafe { slice("categories", categories, count) }?;
-        let mut names = Vec::with_capacity(count);
-        for &pointer in pointers {
-            // SAFETY: the caller's contract for strings.
-            names.push(unsafe { text(pointer) }.ok_or("a category is NULL")?);
-        }
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        handle.logger.set_debug_logging(logging_on != 0, &names).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SetDebugLogging", body) }
-}
-
-/// Takes the start time.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetupExperiment(
-    component: Component,
-    _tolerance_defined: Boolean,
-    _tolerance: f64,
-    start_time: f64,
-    stop_time_defined: Boolean,
-    stop_time: f64,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        let stop_time = (stop_time_defined != 0).then_some(stop_time);
-        handle.instance.setup_experiment(start_time, stop_time).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SetupExperiment", body) }
-}
-
-/// Defines exports that take nothing but the component.
-macro_rules! plain {
-    ($($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
-        $(#[$doc])*
-        ///
-        /// # Safety
-        ///
-        /// See the module.
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(component: Component) -> Status {
-            let body: fn(&mut Handle) -> Result<(), String> = $body;
-            // SAFETY: the caller's contract for components.
-            unsafe { guarded(component, stringify!($name), |handle| body(handle).map(|()| Status::OK)) }
-        }
-    )*};
-}
-
-plain! {
-    /// Goes to initialization mode.
-    fmi2EnterInitializationMode => |handle| handle.instance.enter_initialization_mode();
-    /// Takes the parameters over and goes to step mode.
-    fmi2ExitInitializationMode => |handle| {
-        handle.instance.exit_initialization_mode()?;
-        handle.logger.event("initialized");
-        Ok(())
-    };
-    /// Ends the run.
-    fmi2Terminate => |handle| handle.instance.terminate();
-    /// Goes back to the instantiated state.
-    fmi2Reset => |handle| {
-        handle.instance.reset();
-        handle.logger.event("reset");
-        Ok(())
-    };
-}
-
-/// Defines exports that read or write an array of values of one type.
-macro_rules! values {
-    ($($(#[$doc:meta])* $name:ident($pointer:ty, $slice:ident) => $method:ident;)*) => {$(
-        $(#[$doc])*
-        ///
-        /// # Safety
-        ///
-        /// See the module.
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(
-            component: Component,
-            references: *const ValueReference,
-            count: usize,
-            values: $pointer,
-        ) -> Status {
-            let body = |handle: &mut Handle| {
-                // SAFETY: the caller's contract for arrays.
-                let references = unsafe { slice("vr", references, count) }?;
-                // SAFETY: the caller's contract for arrays.
-                let values = unsafe { $slice("value", values, count) }?;
-                handle.instance.$method(references, values).map(|()| Status::OK)
-            };
-            // SAFETY: the caller's contract for components.
-            unsafe { guarded(component, stringify!($name), body) }
-        }
-    )*};
-}
-
-values! {
-    /// Reads reals.
-    fmi2GetReal(*mut f64, slice_mut) => get_real;
-    /// Reads integers and enumerations.
-    fmi2GetInteger(*mut c_int, slice_mut) => get_integer;
-    /// Reads booleans.
-    fmi2GetBoolean(*mut Boolean, slice_mut) => get_boolean;
-    /// Writes reals.
-    fmi2SetReal(*const f64, slice) => set_real;
-    /// Writes integers.
-    fmi2SetInteger(*const c_int, slice) => set_integer;
-    /// Writes booleans.
-    fmi2SetBoolean(*const Boolean, slice) => set_boolean;
-}
-
-/// Reads strings; there are none, so only zero of them can be read.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetString(
-    component: Component,
-    references: *const ValueReference,
-    count: usize,
-    _values: *mut Text,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let references = unsafe { slice("vr", references, count) }?;
-        handle.instance.check_strings(Call::Get, references).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2GetString", body) }
-}
-
-/// Writes strings; there are none, so only zero of them can be written.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetString(
-    component: Component,
-    references: *const ValueReference,
-    count: usize,
-    _values: *const Text,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let references = unsafe { slice("vr", references, count) }?;
-        handle.instance.check_strings(Call::Set, references).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SetString", body) }
-}
-
-/// Computes the derivative of outputs along a direction of inputs.
-///
-/// # Safety
-///
-/// See the module; `unknowns` and `result` have `unknown_count` elements, `knowns` and `seed` `known_count`.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetDirectionalDerivative(
-    component: Component,
-    unknowns: *const ValueReference,
-    unknown_count: usize,
-    knowns: *const ValueReference,
-    known_count: usize,
-    seed: *const f64,
-    result: *mut f64,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let unknowns = unsafe { slice("vUnknown_ref", unknowns, unknown_count) }?;
-        // SAFETY: the caller's contract for arrays.
-        let knowns = unsafe { slice("vKnown_ref", knowns, known_count) }?;
-        // SAFETY: the caller's contract for arrays.
-        let seed = unsafe { slice("dvKnown", seed, known_count) }?;
-        // SAFETY: the caller's contract for arrays.
-        let result = unsafe { slice_mut("dvUnknown", result, unknown_count) }?;
-        handle.instance.directional_derivative(unknowns, knowns, seed, result).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2GetDirectionalDerivative", body) }
-}
-
-/// Makes a communication step. The last argument is ignored: importers pass true while rolling back.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2DoStep(
-    component: Component,
-    current_communication_point: f64,
-    communication_step_size: f64,
-    _no_set_fmu_state_prior_to_current_point: Boolean,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        let (t, h) = (current_communication_point, communication_step_size);
-        handle.instance.do_step(t, h)?;
-        while let Some(notice) = handle.instance.notice() {
-            handle.logger.warning(&notice);
-        }
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2DoStep", body) }
-}
-
-/// Gives the end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
-///
-/// # Safety
-///
-/// See the module; `value` is NULL or writable.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: StatusKind, value: *mut f64) -> Status {
-    let body = |handle: &mut Handle| {
-        if kind != LAST_SUCCESSFUL_TIME {
-            return Ok(Status::DISCARD);
-        }
-        // SAFETY: the caller's contract for `value`.
-        let value = unsafe { slice_mut("value", value, 1) }?;
-        value[0] = handle.instance.time();
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2GetRealStatus", body) }
-}
-
-/// Tells whether the run has ended (`fmi2Terminated`); other kinds are discarded.
-///
-/// # Safety
-///
-/// See the module; `value` is NULL or writable.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetBooleanStatus(
-    component: Component,
-    kind: StatusKind,
-    value: *mut Boolean,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        if kind != TERMINATED {
-            return Ok(Status::DISCARD);
-        }
-        // SAFETY: the caller's contract for `value`.
-        let value = unsafe { slice_mut("value", value, 1) }?;
-        value[0] = Boolean::from(handle.instance.mode() == Mode::TERMINATED);
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2GetBooleanStatus", body) }
-}
-
-/// Defines exports for statuses that do not exist, since nothing is asynchronous here: discarded.
-macro_rules! no_status {
-    ($($name:ident($pointer:ty);)*) => {$(
-        /// A status of asynchronous steps, of which there are none: discarded.
-        ///
-        /// # Safety
-        ///
-        /// See the module.
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $name(component: Component, _kind: StatusKind, _value: $pointer) -> Status {
-            let body = |_: &mut Handle| Ok(Status::DISCARD);
-            // SAFETY: the caller's contract for components.
-            unsafe { guarded(component, stringify!($name), body) }
-        }
-    )*};
-}
-
-no_status! {
-    fmi2GetStatus(*mut c_int);
-    fmi2GetIntegerStatus(*mut c_int);
-    fmi2GetStringStatus(*mut Text);
-}
-
-/// Reads time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetRealOutputDerivatives(
-    component: Component,
-    _references: *const ValueReference,
-    count: usize,
-    _orders: *const c_int,
-    _values: *mut f64,
-) -> Status {
-    // SAFETY: the caller's contract for components.
-    unsafe {
-        guarded(component, "fmi2GetRealOutputDerivatives", |_| {
-            unsupported::none("maxOutputDerivativeOrder is 0", count)
-        })
+    categories: *const fmi2::Text,
+) -> Result<S, Failure> {
+    // SAFETY: the caller's contract for arrays.
+    let pointers = unsafe { slice("categories", categories, count) }?;
+    let mut names = Vec::with_capacity(count);
+    for &pointer in pointers {
+        // SAFETY: the caller's contract for strings.
+        names.push(unsafe { text(pointer) }.ok_or("a category is NULL")?);
     }
-}
-
-/// Sets time derivatives of inputs: `canInterpolateInputs` is false, so only zero of them can be set.
-///
-/// # Safety
-///
-/// See the module.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetRealInputDerivatives(
-    component: Component,
-    _references: *const ValueReference,
-    count: usize,
-    _orders: *const c_int,
-    _values: *const f64,
-) -> Status {
-    // SAFETY: the caller's contract for components.
-    unsafe {
-        guarded(component, "fmi2SetRealInputDerivatives", |_| {
-            unsupported::none("canInterpolateInputs is false", count)
-        })
-    }
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    handle.logger.set_debug_logging(on, &names).map(|()| S::OK)
 }

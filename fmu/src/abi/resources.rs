@@ -1,4 +1,4 @@
-//! From `fmuResourceLocation` to the configuration.
+//! From `fmuResourceLocation` or `resourcePath` to the configuration.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ pub(super) fn configuration(location: &str) -> Result<Configuration, String> {
     let folder = folder(location)?;
     let path = folder.join(RESOURCE);
     let text = std::fs::read_to_string(&path)
-        .map_err(|e| format!("cannot read {} (fmuResourceLocation {location:?}): {e}", path.display()))?;
+        .map_err(|e| format!("cannot read {} (resources at {location:?}): {e}", path.display()))?;
     let plugins = PluginFolder::new(folder.join(PLATFORM));
     Configuration::parse_with(&text, &plugins).map_err(|e| format!("{}: {e}", path.display()))
 }
@@ -24,11 +24,11 @@ fn folder(location: &str) -> Result<PathBuf, String> {
         percent_decode_str(text)
             .decode_utf8()
             .map(|text| text.into_owned())
-            .map_err(|_| format!("fmuResourceLocation {location:?} is not UTF-8 after percent-decoding"))
+            .map_err(|_| format!("the resource location {location:?} is not UTF-8 after percent-decoding"))
     };
     let Some(rest) = location.strip_prefix("file:") else {
         if location.contains("://") {
-            return Err(format!("fmuResourceLocation is {location:?}, must be a file URI"));
+            return Err(format!("the resource location is {location:?}, must be a file URI"));
         }
         return Ok(PathBuf::from(location));
     };

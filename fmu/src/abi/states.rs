@@ -1,17 +1,17 @@
-//! States: snapshots in memory, and as bytes.
+//! States: snapshots in memory, and as bytes. The six functions are the same in both versions of FMI but for their names
+//! and types.
 //!
 //! The importer holds a number, not an address. Nothing is ever read through it, a number is given once, and one
 //! that is not of a live state is refused. A state can be used by every instance of its FMU in the process. It
-//! ends with `fmi2FreeFMUstate`, or with the instance that made it.
+//! ends with `fmi2FreeFMUstate` or `fmi3FreeFMUState`, or with the instance that made it.
 
 use std::collections::BTreeMap;
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::fmi2::{self, Component, Status};
-
 use super::guard::{Handle, guarded, slice, slice_mut};
+use super::{fmi2, fmi3};
 use crate::instance::{Failure, State};
 use crate::state;
 
@@ -35,20 +35,19 @@ impl States {
         STATES.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn insert(&mut self, owner: &Handle, state: State) -> fmi2::State {
+    fn insert(&mut self, owner: &Handle, state: State) -> *mut c_void {
         self.last += 1;
         self.live.insert(self.last, Entry { state: Box::new(state), owner: ptr::from_ref(owner).addr() });
         ptr::without_provenance_mut(self.last)
     }
 
     /// Finds a live state of the FMU of `handle`.
-    fn find(&mut self, handle: &Handle, pointer: fmi2::State) -> Result<&mut State, Failure> {
+    fn find(&mut self, handle: &Handle, pointer: *mut c_void) -> Result<&mut State, Failure> {
         if pointer.is_null() {
             return Err("FMUstate is NULL".to_owned());
         }
         let entry = self.live.get_mut(&pointer.addr()).ok_or(
-            "FMUstate is none that fmi2GetFMUstate or fmi2DeSerializeFMUstate gave, or was freed, \
-             or the instance that made it was",
+            "FMUstate is none that was got or deserialised here, or was freed, or the instance that made it was",
         )?;
         let (found, wanted) = (&entry.state.guid, &handle.instance.product().guid);
         if found != wanted {
@@ -69,136 +68,153 @@ pub(super) fn free_all(owner: &Handle) {
     }
 }
 
-/// Takes a snapshot, in any mode: into a new state where `*state` is NULL, else over that one.
-///
-/// # Safety
-///
-/// See the module above; `state` is NULL or points to a state pointer.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut fmi2::State) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for `state`.
-        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
-        if state[0].is_null() {
-            let snapshot = handle.instance.state();
-            state[0] = States::lock().insert(handle, snapshot);
-        } else {
-            handle.instance.save(States::lock().find(handle, state[0])?);
+/// Defines the six functions of a version: the types of its status and of its bytes, then the names.
+macro_rules! states {
+    ($status:ty, $byte:ty; $get:ident $set:ident $free:ident $size:ident $serialize:ident $deserialize:ident) => {
+        /// Takes a snapshot, in any mode: into a new state where `*state` is NULL, else over that one.
+        ///
+        /// # Safety
+        ///
+        /// See the module above; `state` is NULL or points to a state pointer.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $get(component: *mut c_void, state: *mut *mut c_void) -> $status {
+            let body = |handle: &mut Handle| {
+                // SAFETY: the caller's contract for `state`.
+                let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+                if state[0].is_null() {
+                    let snapshot = handle.instance.state();
+                    state[0] = States::lock().insert(handle, snapshot);
+                } else {
+                    handle.instance.save(States::lock().find(handle, state[0])?);
+                }
+                Ok(<$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($get), body) }
         }
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2GetFMUstate", body) }
-}
 
-/// Restores a snapshot, an earlier or a later one, from any mode.
-///
-/// # Safety
-///
-/// See the module above.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2SetFMUstate(component: Component, state: fmi2::State) -> Status {
-    let body = |handle: &mut Handle| {
-        let mut states = States::lock();
-        let state = states.find(handle, state)?;
-        handle.instance.restore(state).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SetFMUstate", body) }
-}
-
-/// Frees a state and sets `*state` to NULL; NULL is fine.
-///
-/// # Safety
-///
-/// See the module above; `state` is NULL or points to a state pointer.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut fmi2::State) -> Status {
-    let body = |handle: &mut Handle| {
-        if state.is_null() {
-            return Ok(Status::OK);
+        /// Restores a snapshot, an earlier or a later one, from any mode.
+        ///
+        /// # Safety
+        ///
+        /// See the module above.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $set(component: *mut c_void, state: *mut c_void) -> $status {
+            let body = |handle: &mut Handle| {
+                let mut states = States::lock();
+                let state = states.find(handle, state)?;
+                handle.instance.restore(state).map(|()| <$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($set), body) }
         }
-        // SAFETY: the caller's contract for `state`.
-        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
-        if !state[0].is_null() {
-            let mut states = States::lock();
-            states.find(handle, state[0])?;
-            states.live.remove(&state[0].addr());
-            state[0] = ptr::null_mut();
+
+        /// Frees a state and sets `*state` to NULL; NULL is fine.
+        ///
+        /// # Safety
+        ///
+        /// See the module above; `state` is NULL or points to a state pointer.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $free(component: *mut c_void, state: *mut *mut c_void) -> $status {
+            let body = |handle: &mut Handle| {
+                if state.is_null() {
+                    return Ok(<$status>::OK);
+                }
+                // SAFETY: the caller's contract for `state`.
+                let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+                if !state[0].is_null() {
+                    let mut states = States::lock();
+                    states.find(handle, state[0])?;
+                    states.live.remove(&state[0].addr());
+                    state[0] = ptr::null_mut();
+                }
+                Ok(<$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($free), body) }
         }
-        Ok(Status::OK)
+
+        /// Tells the number of bytes of a state: the same for all states of an FMU that follows no plans.
+        ///
+        /// # Safety
+        ///
+        /// See the module above; `size` is NULL or writable.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $size(
+            component: *mut c_void,
+            state: *mut c_void,
+            size: *mut usize,
+        ) -> $status {
+            let body = |handle: &mut Handle| {
+                let mut states = States::lock();
+                let state = states.find(handle, state)?;
+                // SAFETY: the caller's contract for `size`.
+                let size = unsafe { slice_mut("size", size, 1) }?;
+                size[0] = state::size(handle.instance.product(), state)?;
+                Ok(<$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($size), body) }
+        }
+
+        /// Writes a state to `size` bytes; bytes beyond those needed become 0.
+        ///
+        /// # Safety
+        ///
+        /// See the module above.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $serialize(
+            component: *mut c_void,
+            state: *mut c_void,
+            bytes: *mut $byte,
+            size: usize,
+        ) -> $status {
+            let body = |handle: &mut Handle| {
+                let mut states = States::lock();
+                let state = states.find(handle, state)?;
+                // SAFETY: the caller's contract for arrays.
+                let bytes = unsafe { slice_mut("serializedState", bytes.cast::<u8>(), size) }?;
+                state::write(handle.instance.product(), state, bytes).map(|()| <$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($serialize), body) }
+        }
+
+        /// Makes a new state from bytes. The old value of `*state` is not looked at: the standard does not define it.
+        ///
+        /// # Safety
+        ///
+        /// See the module above; `state` is NULL or writable.
+        #[unsafe(no_mangle)]
+        pub(super) unsafe extern "C" fn $deserialize(
+            component: *mut c_void,
+            bytes: *const $byte,
+            size: usize,
+            state: *mut *mut c_void,
+        ) -> $status {
+            let body = |handle: &mut Handle| {
+                // SAFETY: the caller's contract for arrays.
+                let bytes = unsafe { slice("serializedState", bytes.cast::<u8>(), size) }?;
+                // SAFETY: the caller's contract for `state`.
+                let state = unsafe { slice_mut("FMUstate", state, 1) }?;
+                let read = state::read(handle.instance.product(), bytes)?;
+                state[0] = States::lock().insert(handle, read);
+                Ok(<$status>::OK)
+            };
+            // SAFETY: the caller's contract for components.
+            unsafe { guarded(component, stringify!($deserialize), body) }
+        }
     };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2FreeFMUstate", body) }
 }
 
-/// Tells the number of bytes of a state: the same for all states of an FMU that follows no plans.
-///
-/// # Safety
-///
-/// See the module above; `size` is NULL or writable.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2SerializedFMUstateSize(
-    component: Component,
-    state: fmi2::State,
-    size: *mut usize,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        let mut states = States::lock();
-        let state = states.find(handle, state)?;
-        // SAFETY: the caller's contract for `size`.
-        let size = unsafe { slice_mut("size", size, 1) }?;
-        size[0] = state::size(handle.instance.product(), state)?;
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SerializedFMUstateSize", body) }
-}
+states!(
+    fmi2::Status, c_char;
+    fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate fmi2SerializedFMUstateSize fmi2SerializeFMUstate
+    fmi2DeSerializeFMUstate
+);
 
-/// Writes a state to `size` bytes; bytes beyond those needed become 0.
-///
-/// # Safety
-///
-/// See the module above.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2SerializeFMUstate(
-    component: Component,
-    state: fmi2::State,
-    bytes: *mut c_char,
-    size: usize,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        let mut states = States::lock();
-        let state = states.find(handle, state)?;
-        // SAFETY: the caller's contract for arrays.
-        let bytes = unsafe { slice_mut("serializedState", bytes.cast::<u8>(), size) }?;
-        state::write(handle.instance.product(), state, bytes).map(|()| Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2SerializeFMUstate", body) }
-}
-
-/// Makes a new state from bytes. The old value of `*state` is not looked at: the standard does not define it.
-///
-/// # Safety
-///
-/// See the module above; `state` is NULL or writable.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    component: Component,
-    bytes: *const c_char,
-    size: usize,
-    state: *mut fmi2::State,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let bytes = unsafe { slice("serializedState", bytes.cast::<u8>(), size) }?;
-        // SAFETY: the caller's contract for `state`.
-        let state = unsafe { slice_mut("FMUstate", state, 1) }?;
-        let read = state::read(handle.instance.product(), bytes)?;
-        state[0] = States::lock().insert(handle, read);
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2DeSerializeFMUstate", body) }
-}
+states!(
+    fmi3::Status, u8;
+    fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState fmi3SerializedFMUStateSize fmi3SerializeFMUState
+    fmi3DeserializeFMUState
+);

@@ -157,6 +157,20 @@ impl Configuration {
             Self::Controller(c) => &c.experiment,
         }
     }
+
+    /// The same configuration for another version of FMI, with arrays or without.
+    #[must_use]
+    pub fn for_fmi(mut self, fmi: FmiVersion, arrays: bool) -> Self {
+        let experiment = match &mut self {
+            Self::Filter(c) => &mut c.experiment,
+            Self::Plant(c) => &mut c.experiment,
+            Self::Controller(c) => &mut c.experiment,
+        };
+        experiment.fmi = fmi;
+        // FMI 2.0 has none to do without.
+        experiment.arrays = arrays || fmi == FmiVersion::Two;
+        self
+    }
 }
 
 /// The files and their tables, each after the tables that contain it.
@@ -179,10 +193,17 @@ pub static SECTIONS: [&Section; 12] = [
 static EXPERIMENT: Section = Section {
     name: "experiment",
     keys: || {
-        static KEYS: [Key; 3] = [
+        static KEYS: [Key; 5] = [
             Key::new("start_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("0"), "when it begins"),
             Key::new("stop_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("10"), "after the start"),
             Key::new("step_size", STEP_SIZE, Some("0.001"), "the communication step"),
+            Key::new("fmi", Value::Count(2, 3), Some("2"), "the version of FMI: 2 for 2.0, 3 for 3.0"),
+            Key::new(
+                "arrays",
+                Value::Flag,
+                Some("`true`"),
+                "with `fmi = 3`: whether signals that belong together are [one array](fmu.md#fmi-30)",
+            ),
         ];
         KEYS.iter().collect()
     },
@@ -200,11 +221,68 @@ pub struct ExperimentSection {
     pub stop_time: f64,
     /// Communication step in s, finite, > 0. Default 0.001.
     pub step_size: f64,
+    /// The version of FMI. Default 2.0.
+    #[serde(skip_serializing_if = "is_default")]
+    pub fmi: FmiVersion,
+    /// Whether signals that belong together are one array, which FMI 3.0 alone has. Default: true.
+    #[serde(skip_serializing_if = "is_true")]
+    pub arrays: bool,
 }
 
 impl Default for ExperimentSection {
     fn default() -> Self {
-        Self { start_time: 0.0, stop_time: 10.0, step_size: 0.001 }
+        Self { start_time: 0.0, stop_time: 10.0, step_size: 0.001, fmi: FmiVersion::Two, arrays: true }
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "for serde")]
+fn is_true(value: &bool) -> bool {
+    *value
+}
+
+/// The version of FMI that an FMU is made for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(try_from = "u64", into = "u64")]
+pub enum FmiVersion {
+    /// FMI 2.0.
+    #[default]
+    Two,
+    /// FMI 3.0.
+    Three,
+}
+
+impl FmiVersion {
+    /// The name of the version, as `fmi2GetVersion` and `fmi3GetVersion` give it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Two => "2.0",
+            Self::Three => "3.0",
+        }
+    }
+}
+
+impl TryFrom<u64> for FmiVersion {
+    type Error = String;
+
+    fn try_from(number: u64) -> Result<Self, String> {
+        match number {
+            2 => Ok(Self::Two),
+            3 => Ok(Self::Three),
+            _ => Err(format!("is {number}, must be 2 or 3")),
+        }
+    }
+}
+
+impl From<FmiVersion> for u64 {
+    fn from(version: FmiVersion) -> Self {
+        match version {
+            FmiVersion::Two => 2,
+            FmiVersion::Three => 3,
+        }
     }
 }
 
@@ -216,6 +294,10 @@ impl ExperimentSection {
         if self.stop_time <= self.start_time {
             let message = format!("is {}, must be > start_time = {}", self.stop_time, self.start_time);
             return Err(ConfigurationError::new("experiment.stop_time", message));
+        }
+        if self.fmi == FmiVersion::Two && !self.arrays {
+            let message = "is false, must be left out with `fmi = 2`: FMI 2.0 has no arrays";
+            return Err(ConfigurationError::new("experiment.arrays", message));
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use punctual_modeldescription::fmi3::{self, CoSimulation, ModelDescription, VariableKind};
-use punctual_modeldescription::{Causality, is_c_identifier};
+use punctual_modeldescription::{Causality, Place, is_c_identifier};
 use roxmltree::Document;
 
 use super::{Array, Description, Output, Variable, Written};
@@ -32,7 +32,16 @@ impl Fmi3Description {
     ///
     /// One without a co-simulation interface, or whose library has no name.
     pub(super) fn read(document: &Document<'_>) -> Result<Self, FmuProblem> {
-        Self::of(read(document))
+        let read = fmi3::Located::read(document);
+        for (v, variable) in read.description.variables.iter().enumerate() {
+            for attribute in ["name", "valueReference"] {
+                if read.is_unread(Place::Variable(v), attribute) {
+                    let text = format!("{attribute} of variable {:?} is missing or no value", variable.name);
+                    return Err(FmuProblem::Description(text));
+                }
+            }
+        }
+        Self::of(read.description)
     }
 
     fn of(model: ModelDescription) -> Result<Self, FmuProblem> {
@@ -109,6 +118,9 @@ impl Description {
             model_identifier: interface.model_identifier.clone(),
             only_once: interface.can_be_instantiated_only_once_per_process,
             any_step: written.co_simulation.can_handle_variable_step,
+            states: [interface.can_get_and_set_state, interface.can_serialize_state],
+            derivatives: [interface.provides_directional_derivatives, interface.provides_adjoint_derivatives],
+            needs_tool: interface.needs_execution_tool,
             default_experiment: model.default_experiment,
             variables: flat.variables,
             arrays: flat.arrays,
@@ -118,10 +130,6 @@ impl Description {
             written: Written::Fmi3(written),
         })
     }
-}
-
-fn read(_document: &Document<'_>) -> ModelDescription {
-    ModelDescription::default()
 }
 
 /// Scalars while they are collected.

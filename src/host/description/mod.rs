@@ -154,6 +154,12 @@ pub struct Description {
     pub only_once: bool,
     /// Whether steps can differ in length.
     pub any_step: bool,
+    /// Whether states can be saved and restored, and turned to bytes.
+    pub states: [bool; 2],
+    /// Whether there are directional derivatives, and adjoint ones.
+    pub derivatives: [bool; 2],
+    /// Whether it needs another program to run.
+    pub needs_tool: bool,
     /// The suggested experiment.
     pub default_experiment: Option<DefaultExperiment>,
     /// All scalars.
@@ -180,6 +186,10 @@ impl Description {
         let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
         if version.starts_with("3.") {
             return Self::of_fmi3(Arc::new(Fmi3Description::read(&document)?), &BTreeMap::new());
+        }
+        if !version.is_empty() && !version.starts_with("2.") {
+            let text = format!("fmiVersion is {version:?}; this program runs FMUs of 2.0 and 3.0");
+            return Err(FmuProblem::Description(text));
         }
         Fmi2Description::read(&document).map(|written| Self::of_fmi2(Arc::new(written)))
     }
@@ -217,10 +227,8 @@ impl Description {
     /// The position of the scalar of this name.
     pub fn index_of(&self, name: &str) -> Option<usize> {
         // A scalar that is called like an element of an array is meant before the element.
-        let named = |scalar: bool| {
-            self.variables.iter().position(|v| v.name == name && (!scalar || self.array_at(v).is_none()))
-        };
-        named(true).or_else(|| named(false)).or_else(|| self.aliased(name))
+        let named = || self.variables.iter().enumerate().filter(|(_, v)| v.name == name).map(|(v, _)| v);
+        named().find(|v| !self.is_element(*v)).or_else(|| named().next()).or_else(|| self.aliased(name))
     }
 
     /// The position of the scalar that has this other name.
@@ -246,13 +254,9 @@ impl Description {
         self.arrays.iter().find(|array| array.first == first)
     }
 
-    /// The array that a scalar is an element of.
-    fn array_at(&self, variable: &Variable) -> Option<&Array> {
-        self.arrays.iter().find(|array| {
-            array.count > 0
-                && self.variables[array.first].value_reference == variable.value_reference
-                && variable.name.strip_prefix(&array.name).is_some_and(|place| place.starts_with('['))
-        })
+    /// Whether the scalar at `index` is an element of an array.
+    pub fn is_element(&self, index: usize) -> bool {
+        self.arrays.iter().any(|array| (array.first..array.first + array.count).contains(&index))
     }
 
     /// Whether the variable at `index` says what an enumeration of the same FMU says, for importers that drop enumerations:
@@ -308,6 +312,9 @@ impl Description {
             model_identifier: interface.model_identifier.clone(),
             only_once: interface.can_be_instantiated_only_once_per_process,
             any_step: interface.can_handle_variable_step,
+            states: [interface.can_get_and_set_state, interface.can_serialize_state],
+            derivatives: [interface.provides_directional_derivative, false],
+            needs_tool: interface.needs_execution_tool,
             default_experiment: model.default_experiment,
             variables: model.variables.iter().map(variable).collect(),
             arrays: Vec::new(),
