@@ -551,10 +551,7 @@ fn a_campaign_needs_no_fmus() {
         .fails(2, "c.toml: system.experiment.step: is -0.05 s; must be > 0");
 }
 
-/// An entry of an archive, by name, to what it becomes.
-type Edit = fn(&str, Vec<u8>) -> Option<Vec<u8>>;
-
-/// An FMU that is not ours, and one by another version, cannot run in process, and the message says so.
+/// An FMU by another version of this program cannot run in process, and the message says so.
 #[test]
 fn fmus_of_another_version_are_refused() {
     let workshop = with_fmus(3, "random");
