@@ -205,7 +205,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     let last_step = input.finite("last_step")?;
     let fresh = input.field("fresh")?;
     let configured: bool = input.field("configured")?;
-    if !configured && mode.is_in(Mode::STEP.or(Mode::TERMINATED)) {
+    if !configured && !mode.is_in(Mode::INSTANTIATED.or(Mode::INITIALIZATION)) {
         return Err(format!("configured: is false, must be true in the mode {:?}", mode.name()));
     }
     let values = read_values(product, &mut input)?;
