@@ -196,6 +196,9 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     // The fields of the instance, and the values in the order of the table.
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
+    if mode.is_in(Mode::EVENT.or(Mode::CONTINUOUS)) && !(has_stop(product) && product.layout.rates > 0) {
+        return Err(format!("mode: is {:?}, which this FMU does not have", mode.name()));
+    }
     let time = input.finite("time")?;
     let stop = if has_stop(product) { input.field("stop")? } else { f64::INFINITY };
     if stop.is_nan() {

@@ -1,13 +1,18 @@
-//! `punctual inspect`: the variables and capabilities of an FMU.
+//! `punctual inspect`: the variables and capabilities of an FMU of FMI 2.0 or 3.0.
 
+mod fmi2;
+mod fmi3;
+
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use punctual_modeldescription::{CoSimulation, Variable};
+use punctual_modeldescription::fmi3::Located;
+use roxmltree::Document;
 use serde::Serialize;
 
 use crate::error::{Error, FmuProblem};
-use crate::host::{DefaultExperiment, Fmi2Description as Description, Fmu, Output, Written};
+use crate::host::{Archive, DefaultExperiment, Fmu, Written};
 use crate::output;
 
 /// Arguments of `punctual inspect`.
@@ -20,39 +25,41 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The report on an FMU, as JSON.
-#[derive(Serialize)]
+/// The report on an FMU, as JSON. What only one version of FMI has is absent for the other.
+#[derive(Default, Serialize)]
 struct Report<'a> {
     file: String,
     model_name: &'a str,
-    guid: &'a str,
-    model_identifier: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fmi_version: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    guid: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instantiation_token: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model_identifier: Option<&'a str>,
     description: Option<&'a str>,
     author: Option<&'a str>,
     version: Option<&'a str>,
     generation_tool: Option<&'a str>,
     generation_time: Option<&'a str>,
     platforms: &'a [String],
-    capabilities: Capabilities,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    capabilities: Option<fmi2::Capabilities>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interfaces: Option<Vec<fmi3::Interface<'a>>>,
     default_experiment: Option<Experiment>,
     variables: Vec<VariableReport<'a>>,
     /// For each output the inputs it depends on directly; `null` where the FMU does not say.
     dependencies: Vec<DependencyReport<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    states: Option<Vec<&'a str>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    terminals: Option<Vec<fmi3::Terminal<'a>>>,
     problems: &'a [String],
 }
 
-#[derive(Serialize)]
-struct Capabilities {
-    can_handle_variable_communication_step_size: bool,
-    can_interpolate_inputs: bool,
-    can_get_and_set_fmu_state: bool,
-    can_serialize_fmu_state: bool,
-    provides_directional_derivative: bool,
-    can_be_instantiated_only_once_per_process: bool,
-    needs_execution_tool: bool,
-}
-
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 struct Experiment {
     start_time: Option<f64>,
     stop_time: Option<f64>,
@@ -60,7 +67,7 @@ struct Experiment {
     tolerance: Option<f64>,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct VariableReport<'a> {
     name: &'a str,
     value_reference: u32,
@@ -73,7 +80,12 @@ struct VariableReport<'a> {
     max: Option<f64>,
     description: Option<&'a str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    items: Vec<(&'a str, i32)>,
+    items: Vec<(&'a str, i64)>,
+    /// The sizes of an array, as numbers or by the variables that have them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    dimensions: Vec<fmi3::Size<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    aliases: Vec<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -82,64 +94,51 @@ struct DependencyReport<'a> {
     on: Option<Vec<&'a str>>,
 }
 
+/// Facts for the head of the text, with their names.
+type Facts = Vec<(&'static str, String)>;
+
 /// Shows the FMU.
 ///
 /// # Errors
 ///
-/// The file is not a readable FMI 2.0 co-simulation FMU.
+/// The file is not a readable FMU of FMI 2.0 co-simulation or of FMI 3.0.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
-    let fmu = Fmu::open(&arguments.file)?;
-    let Written::Fmi2(description) = &fmu.description().written else {
-        let problem = FmuProblem::Description("is of FMI 3.0; this command shows FMI 2.0".to_owned());
-        return Err(Error::fmu(fmu.path(), problem));
-    };
-    if arguments.json {
-        output::json(&report(&fmu, description));
+    let archive = Archive::open(&arguments.file)?;
+    let refused = |problem: FmuProblem| Error::fmu(&arguments.file, problem);
+    let text = archive.model_description().map_err(refused)?;
+    let document = Document::parse(&text).map_err(|e| refused(FmuProblem::Description(e.to_string())))?;
+    let root = document.root_element();
+    if root.attribute("fmiVersion").is_some_and(|version| version.starts_with("3.")) {
+        if !root.has_tag_name("fmiModelDescription") {
+            let problem =
+                format!("the root element is {}; must be fmiModelDescription", root.tag_name().name());
+            return Err(refused(FmuProblem::Description(problem)));
+        }
+        let located = Located::read(&document);
+        let terminals = fmi3::terminals(&archive);
+        let problems = fmi3::problems(&located);
+        let version = root.attribute("fmiVersion").unwrap_or_default();
+        let report = Report { problems: &problems, ..fmi3::report(&archive, version, &located, &terminals) };
+        show(arguments, &report, fmi3::facts(&located.description, version, &report));
     } else {
-        output::result(&text(&fmu, description));
-    }
-    for problem in &fmu.description().problems {
-        output::note(&format!("note: modelDescription.xml: {problem}"));
+        let fmu = Fmu::of(archive)?;
+        let Written::Fmi2(description) = &fmu.description().written else {
+            return Err(refused(FmuProblem::Description("is of no version that can be shown".to_owned())));
+        };
+        let report = Report { problems: &fmu.description().problems, ..fmi2::report(&fmu, description) };
+        show(arguments, &report, fmi2::facts(description));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn report<'a>(fmu: &'a Fmu, d: &'a Description) -> Report<'a> {
-    let can = &d.co_simulation;
-    Report {
-        file: fmu.path().display().to_string(),
-        model_name: &d.model_name,
-        guid: &d.guid,
-        model_identifier: &d.co_simulation.model_identifier,
-        description: given(&d.description),
-        author: given(&d.author),
-        version: given(&d.version),
-        generation_tool: given(&d.generation_tool),
-        generation_time: d.generation_date_and_time.as_deref(),
-        platforms: fmu.platforms(),
-        capabilities: Capabilities {
-            can_handle_variable_communication_step_size: can.can_handle_variable_step,
-            can_interpolate_inputs: can.can_interpolate_inputs,
-            can_get_and_set_fmu_state: can.can_get_and_set_state,
-            can_serialize_fmu_state: can.can_serialize_state,
-            provides_directional_derivative: can.provides_directional_derivative,
-            can_be_instantiated_only_once_per_process: can.can_be_instantiated_only_once_per_process,
-            needs_execution_tool: can.needs_execution_tool,
-        },
-        default_experiment: d.default_experiment.map(|e| {
-            let DefaultExperiment { start_time, stop_time, step_size, tolerance } = e;
-            Experiment { start_time, stop_time, step_size, tolerance }
-        }),
-        variables: d.variables.iter().zip(&d.starts).map(|(v, start)| variable_report(d, v, start)).collect(),
-        dependencies: d
-            .outputs
-            .iter()
-            .map(|output| DependencyReport {
-                output: &d.variables[output.variable].name,
-                on: output.dependencies.is_some().then(|| dependency_names(d, output)),
-            })
-            .collect(),
-        problems: &d.problems,
+fn show(arguments: &Arguments, report: &Report<'_>, facts: Facts) {
+    if arguments.json {
+        output::json(report);
+    } else {
+        output::result(&text(report, facts));
+    }
+    for problem in report.problems {
+        output::note(&format!("note: modelDescription.xml: {problem}"));
     }
 }
 
@@ -148,46 +147,37 @@ fn given(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
 }
 
-fn variable_report<'a>(d: &'a Description, v: &'a Variable, start: &'a Option<String>) -> VariableReport<'a> {
-    let (min, max) = v.kind.range();
-    VariableReport {
-        name: &v.name,
-        value_reference: v.value_reference,
-        r#type: v.kind.scalar_type().as_str(),
-        causality: v.causality.as_str(),
-        variability: v.variability.as_str(),
-        unit: v.kind.unit(),
-        start: start.as_deref(),
-        min,
-        max,
-        description: given(&v.description),
-        items: d.items(v).iter().map(|item| (item.name.as_str(), item.value)).collect(),
-    }
+fn experiment(of: Option<DefaultExperiment>) -> Option<Experiment> {
+    of.map(|of| {
+        let DefaultExperiment { start_time, stop_time, step_size, tolerance } = of;
+        Experiment { start_time, stop_time, step_size, tolerance }
+    })
 }
 
-fn dependency_names<'a>(d: &'a Description, output: &Output) -> Vec<&'a str> {
-    d.direct_inputs(output).into_iter().map(|i| d.variables[i].name.as_str()).collect()
-}
-
-fn text(fmu: &Fmu, d: &Description) -> String {
-    let mut facts = vec![
-        ("model", d.model_name.clone()),
-        ("description", d.description.clone()),
-        ("guid", d.guid.clone()),
-        ("identifier", d.co_simulation.model_identifier.clone()),
-        ("version", d.version.clone()),
-        ("author", d.author.clone()),
+/// The facts that both versions have, around those of one version, which come after the description.
+fn text(report: &Report<'_>, own: Facts) -> String {
+    let text = |text: Option<&str>| text.unwrap_or_default().to_owned();
+    let mut facts = vec![("model", report.model_name.to_owned()), ("description", text(report.description))];
+    let (capabilities, names): (Facts, Facts) =
+        own.into_iter().partition(|(name, _)| name.starts_with("can"));
+    facts.extend(names);
+    facts.extend([
+        ("version", text(report.version)),
+        ("author", text(report.author)),
         (
             "tool",
-            join(" of ", [given(&d.generation_tool).map(str::to_owned), d.generation_date_and_time.clone()]),
+            join(
+                " of ",
+                [report.generation_tool, report.generation_time].map(|part| part.map(str::to_owned)),
+            ),
         ),
         (
             "platforms",
-            if fmu.platforms().is_empty() { "none".to_owned() } else { fmu.platforms().join(", ") },
+            if report.platforms.is_empty() { "none".to_owned() } else { report.platforms.join(", ") },
         ),
-        ("can", capabilities(&d.co_simulation)),
-    ];
-    if let Some(e) = d.default_experiment {
+    ]);
+    facts.extend(capabilities);
+    if let Some(e) = report.default_experiment {
         let part = |name: &str, value: Option<f64>, unit: &str| value.map(|v| format!("{name} {v}{unit}"));
         let parts = [
             part("start", e.start_time, " s"),
@@ -199,46 +189,44 @@ fn text(fmu: &Fmu, d: &Description) -> String {
     }
     let facts: Vec<String> =
         facts.into_iter().filter(|(_, v)| !v.is_empty()).map(|(k, v)| format!("{k:<12}{v}")).collect();
-    format!("{}\n\n{}\n\n{}", facts.join("\n"), variables(d), dependencies(d))
+    let terminals =
+        report.terminals.iter().flatten().map(|terminal| format!("\n{terminal}")).collect::<String>();
+    let terminals = if terminals.is_empty() { terminals } else { format!("\n{terminals}") };
+    format!("{}\n\n{}\n\n{}{terminals}", facts.join("\n"), variables(report), dependencies(report))
 }
 
 fn join<const N: usize>(separator: &str, parts: [Option<String>; N]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(separator)
 }
 
-fn capabilities(c: &CoSimulation) -> String {
-    let named = [
-        (c.can_handle_variable_step, "take steps of any length"),
-        (c.can_interpolate_inputs, "interpolate inputs"),
-        (c.can_get_and_set_state, "save and restore its state"),
-        (c.can_serialize_state, "serialise its state"),
-        (c.provides_directional_derivative, "give directional derivatives"),
-        (c.can_be_instantiated_only_once_per_process, "only be instantiated once per process"),
-        (c.needs_execution_tool, "only run with its tool"),
-    ];
-    named.into_iter().filter(|(yes, _)| *yes).map(|(_, text)| text).collect::<Vec<_>>().join(", ")
+/// The words of the flags that are set.
+fn flags(named: &[(bool, &str)]) -> String {
+    named.iter().filter(|(yes, _)| *yes).map(|(_, text)| *text).collect::<Vec<_>>().join(", ")
 }
 
-fn variables(d: &Description) -> String {
+fn variables(report: &Report<'_>) -> String {
     let header = ["name", "vr", "type", "causality", "unit", "start", "min", "max", "description"];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
-    for (v, start) in d.variables.iter().zip(&d.starts) {
-        let mut description = v.description.clone();
-        let items = d.items(v);
-        if !items.is_empty() {
-            let items: Vec<_> = items.iter().map(|i| format!("{} {}", i.value, i.name)).collect();
-            description = format!("{description} [{}]", items.join(", "));
+    for v in &report.variables {
+        let mut description = Cow::Borrowed(v.description.unwrap_or_default());
+        if !v.items.is_empty() {
+            let items: Vec<_> = v.items.iter().map(|(name, value)| format!("{value} {name}")).collect();
+            description = format!("{description} [{}]", items.join(", ")).into();
         }
-        let (min, max) = v.kind.range();
+        if !v.aliases.is_empty() {
+            description = format!("{description} (also {})", v.aliases.join(", ")).into();
+        }
+        let sizes: Vec<_> = v.dimensions.iter().map(ToString::to_string).collect();
+        let sizes = if sizes.is_empty() { String::new() } else { format!("[{}]", sizes.join(", ")) };
         rows.push(vec![
-            v.name.clone(),
+            v.name.to_owned(),
             v.value_reference.to_string(),
-            v.kind.scalar_type().as_str().to_owned(),
-            v.causality.as_str().to_owned(),
-            v.kind.unit().unwrap_or_default().to_owned(),
-            start.clone().unwrap_or_default(),
-            min.map(output::number).unwrap_or_default(),
-            max.map(output::number).unwrap_or_default(),
+            format!("{}{sizes}", v.r#type),
+            v.causality.to_owned(),
+            v.unit.unwrap_or_default().to_owned(),
+            v.start.unwrap_or_default().to_owned(),
+            v.min.map(output::number).unwrap_or_default(),
+            v.max.map(output::number).unwrap_or_default(),
             description.trim().to_owned(),
         ]);
     }
@@ -246,19 +234,17 @@ fn variables(d: &Description) -> String {
 }
 
 /// The dependencies, a line for each set of inputs with the outputs that depend on exactly these.
-fn dependencies(d: &Description) -> String {
+fn dependencies(report: &Report<'_>) -> String {
     let mut lines: Vec<(String, Vec<&str>)> = Vec::new();
-    for output in &d.outputs {
-        let names = dependency_names(d, output);
-        let on = match &output.dependencies {
+    for DependencyReport { output, on } in &report.dependencies {
+        let on = match on {
             None => "depend on every input (the FMU does not say)".to_owned(),
-            Some(_) if names.is_empty() => "depend on no input directly".to_owned(),
-            Some(_) => format!("depend directly on {}", names.join(", ")),
+            Some(names) if names.is_empty() => "depend on no input directly".to_owned(),
+            Some(names) => format!("depend directly on {}", names.join(", ")),
         };
-        let name = d.variables[output.variable].name.as_str();
         match lines.iter_mut().find(|(other, _)| *other == on) {
-            Some((_, outputs)) => outputs.push(name),
-            None => lines.push((on, vec![name])),
+            Some((_, outputs)) => outputs.push(output),
+            None => lines.push((on, vec![output])),
         }
     }
     if lines.is_empty() {

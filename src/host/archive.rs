@@ -126,18 +126,28 @@ impl Archive {
         self.directory.path().join(entry)
     }
 
-    /// The text of `modelDescription.xml`, as far as it is safe to parse. A byte order mark stays; ISO-8859-1 is read where
+    /// The text of `modelDescription.xml`, as [`xml`](Self::xml) reads it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`xml`](Self::xml).
+    pub fn model_description(&self) -> Result<String, FmuProblem> {
+        self.xml(MODEL_DESCRIPTION)
+    }
+
+    /// The text of an entry with XML, as far as it is safe to parse. A byte order mark stays; ISO-8859-1 is read where
     /// the text says so.
     ///
     /// # Errors
     ///
     /// It is missing, too large, not UTF-8, or more deeply nested or wider than
     /// `bounds.rs` allows.
-    pub fn model_description(&self) -> Result<String, FmuProblem> {
+    pub fn xml(&self, entry: &str) -> Result<String, FmuProblem> {
         let missing = |e: io::Error| FmuProblem::Description(format!("cannot be read: {e}"));
-        let path = self.path(MODEL_DESCRIPTION);
+        let path = self.path(entry);
         let size = std::fs::metadata(&path).map_err(missing)?.len();
-        limit("modelDescription.xml has", size, "bytes", MAX_DESCRIPTION_BYTES)?;
+        let what = if entry == MODEL_DESCRIPTION { "modelDescription.xml has" } else { "an XML file has" };
+        limit(what, size, "bytes", MAX_DESCRIPTION_BYTES)?;
         let bytes = std::fs::read(&path).map_err(missing)?;
         let is_latin = declared_encoding(&bytes).is_some_and(is_latin);
         let text = if is_latin {

@@ -58,11 +58,20 @@ impl Fmu {
     /// The file cannot be read, is not a sound archive, or its description is missing, malformed,
     /// not of FMI 2.0 or 3.0, or without a co-simulation interface that can be run.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let archive = Archive::open(path)?;
+        Self::of(Archive::open(path)?)
+    }
+
+    /// Reads the FMU of an archive that is unpacked.
+    ///
+    /// # Errors
+    ///
+    /// Its description is missing, malformed, not of FMI 2.0 or 3.0, or without a co-simulation interface that can be
+    /// run.
+    pub fn of(archive: Archive) -> Result<Self, Error> {
         let description = archive
             .model_description()
             .and_then(|text| Description::parse(&text))
-            .map_err(|problem| Error::fmu(path, problem))?;
+            .map_err(|problem| Error::fmu(archive.source(), problem))?;
         let description = Rc::new(description);
         Ok(Self { description, library: OnceCell::new(), abandoned: Cell::new(false), archive })
     }
@@ -135,7 +144,13 @@ impl Fmu {
 
     /// The text of a file in its `resources/`; `None` where there is no such text.
     pub fn resource(&self, name: &str) -> Option<String> {
-        std::fs::read_to_string(self.archive.path(&format!("resources/{name}"))).ok()
+        self.text(&format!("resources/{name}"))
+    }
+
+    /// The text of an entry; `None` where there is no such text.
+    pub fn text(&self, entry: &str) -> Option<String> {
+        let is_there = self.archive.entries().iter().any(|other| other == entry);
+        is_there.then(|| std::fs::read_to_string(self.archive.path(entry)).ok())?
     }
 }
 

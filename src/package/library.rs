@@ -8,7 +8,7 @@ use punctual_fmu::configuration::FmiVersion;
 use punctual_fmu::product::MARK;
 
 use crate::error::Error;
-use crate::host::PLATFORM;
+use crate::host::{PLATFORM, Version};
 use crate::validate::layout::ending;
 use crate::validate::symbols;
 
@@ -16,7 +16,7 @@ use crate::validate::symbols;
 pub const VARIABLE: &str = "PUNCTUAL_FMU_LIBRARY";
 
 /// A shared library that goes into an FMU.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Library {
     /// Its folder below `binaries/`, such as `linux64`.
     pub platform: &'static str,
@@ -28,7 +28,7 @@ impl Library {
     /// Its names in the archive of an FMU of the version `fmi`: one for each processor that it is for.
     pub fn entries(&self, identifier: &str, fmi: FmiVersion) -> Vec<String> {
         // Each platform that a file can be for has an ending.
-        let ending = ending(self.platform).unwrap_or(DLL_SUFFIX);
+        let ending = ending(Version::Fmi2, self.platform).unwrap_or(DLL_SUFFIX);
         let folders = match fmi {
             FmiVersion::Two => vec![self.platform],
             FmiVersion::Three => symbols::tuples(self.platform, &self.bytes),

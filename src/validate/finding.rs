@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use punctual_modeldescription::{self as description, Located, Severity, Violation, brief};
+use punctual_modeldescription::{self as description, Severity};
 use serde::{Deserialize, Serialize};
 
 /// The place of a finding.
@@ -75,9 +75,15 @@ const BEFORE: &[Rule] = &[
         Error,
         "there is a library, or source code, for some platform, named as modelIdentifier says",
     ),
+    ("archive.companion", Error, "FMI 3.0: what files of the archive need beside them is there"),
+    ("archive.index", Warning, "FMI 3.0: documentation/ begins with index.html"),
     ("archive.platform", Warning, "there is a library for this platform"),
     ("archive.top-folder", Warning, "everything lies where the standard has a place for it"),
-    ("xml.readable", Error, "modelDescription.xml is there, UTF-8, well-formed, and needs no document type"),
+    (
+        "xml.readable",
+        Error,
+        "modelDescription.xml is there; it and other XML is UTF-8, well-formed, and needs no document type",
+    ),
     ("xml.encoding", Warning, "modelDescription.xml is in UTF-8, not ISO-8859-1, without a byte order mark"),
     ("schema.element", Error, "elements are those of the schema, in its order and number"),
     ("schema.attribute", Error, "attributes are those of the schema; the required ones are there"),
@@ -89,8 +95,8 @@ const BEFORE: &[Rule] = &[
 /// The rules on libraries and the behaviour of instances.
 const AFTER: &[Rule] = &[
     ("symbols.readable", Error, "libraries are of the format and processor of their folder"),
-    ("symbols.missing", Error, "libraries export every function of FMI 2.0 co-simulation"),
-    ("trial.load", Error, "the library can be loaded, and an FMI 2.0 importer can read the description"),
+    ("symbols.missing", Error, "libraries export every function of FMI 2.0 co-simulation, or of FMI 3.0"),
+    ("trial.load", Error, "the library can be loaded, and an importer can read the description"),
     ("trial.version", Error, "fmi2GetVersion answers 2.0 and fmi2GetTypesPlatform default"),
     ("trial.call", Error, "every call of the trial succeeds"),
     ("trial.crash", Error, "the FMU does not crash, hang or end the process"),
@@ -110,6 +116,11 @@ const AFTER: &[Rule] = &[
         Warning,
         "derivatives agree with differences, and adjoint with directional ones (FMI 3.0)",
     ),
+    (
+        "trial.references",
+        Error,
+        "with --references: outputs are the results that the FMU carries (FMI-LS-REF)",
+    ),
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
 
@@ -126,7 +137,7 @@ pub(super) fn severity(rule: &str) -> Severity {
 /// Most findings kept of one rule: the thousandth variable without a start value teaches nothing.
 const KEPT_OF_A_RULE: usize = 20;
 
-/// A place in the model description.
+/// A place in the file that is read.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mark {
     /// Bytes from the beginning of the text.
@@ -135,45 +146,36 @@ pub(super) struct Mark {
     pub(super) variable: Option<String>,
 }
 
-/// The entry that marks are in.
+/// The entry with the model description.
 pub(super) const DESCRIPTION: &str = "modelDescription.xml";
 
 /// Findings while they are collected.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// The beginnings of the lines of the model description, in bytes.
+    /// The entry that is read, in which marks stand.
+    file: String,
+    /// The beginnings of its lines, in bytes.
     lines: Vec<usize>,
     list: Vec<Finding>,
     left_out: Vec<(String, usize)>,
 }
 
 impl Findings {
-    /// Takes the text of the model description, in which marks stand.
-    pub(super) fn read(&mut self, text: &str) {
+    /// Takes the text of an entry, in which marks stand from now on.
+    pub(super) fn read(&mut self, file: &str, text: &str) {
+        file.clone_into(&mut self.file);
         let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         self.lines = std::iter::once(0).chain(breaks.map(|(at, _)| at + 1)).collect();
     }
 
-    /// Adds a finding of a rule in the model description.
+    /// Adds a finding of a rule in the entry that is read.
     pub(super) fn add(&mut self, rule: &str, mark: Mark, message: impl Into<String>) {
         let line = self.lines.partition_point(|begin| *begin <= mark.at);
         let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(0);
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let position = Some((number(line), number(mark.at - begin + 1)));
-        self.place(rule, Place { file: DESCRIPTION.to_owned(), position, variable: mark.variable }, message);
-    }
-
-    /// Adds what breaks a rule on the description.
-    pub(super) fn violation(&mut self, model: &Located, violation: Violation) {
-        let Violation { rule, place, message } = violation;
-        let variable = match place {
-            description::Place::Variable(v) | description::Place::Start(v) => {
-                let named = !model.is_unread(description::Place::Variable(v), "name");
-                named.then(|| brief(&model.description.variables[v].name))
-            }
-            _ => None,
-        };
-        self.add(rule, Mark { at: model.position(place), variable }, message);
+        let file = self.file.clone();
+        self.place(rule, Place { file, position, variable: mark.variable }, message);
     }
 
     /// Adds a finding of a rule.

@@ -1,11 +1,11 @@
-//! Rules on the entries of the archive (FMI 2.0.4, section 2.3).
+//! Rules on the entries of the archive (FMI 2.0.4, section 2.3; FMI 3.0.2, section 2.5.1).
 
-use punctual_modeldescription::Located;
-
+use super::companions::BUILD;
 use super::finding::Findings;
-use crate::host::{Archive, PLATFORM};
+use super::model::Model;
+use crate::host::{Archive, Version};
 
-/// Entries allowed at the top of the archive.
+/// Entries allowed at the top of the archive of FMI 2.0.
 const TOP: [&str; 8] = [
     "modelDescription.xml",
     "model.png",
@@ -17,8 +17,19 @@ const TOP: [&str; 8] = [
     "licenses",
 ];
 
-/// The ending of libraries in a folder of `binaries/`, by the beginning of its name.
-pub(super) const ENDINGS: [(&str, &str); 5] = [
+/// The same for FMI 3.0.
+const TOP_OF_FMI3: [&str; 7] = [
+    "modelDescription.xml",
+    "documentation",
+    "terminalsAndIcons",
+    "sources",
+    "binaries",
+    "resources",
+    "extra",
+];
+
+/// The ending of libraries in a folder of `binaries/` of FMI 2.0, by the beginning of its name.
+const ENDINGS: [(&str, &str); 5] = [
     ("win", ".dll"),
     ("aarch64-windows", ".dll"),
     ("linux", ".so"),
@@ -26,59 +37,123 @@ pub(super) const ENDINGS: [(&str, &str); 5] = [
     ("darwin", ".dylib"),
 ];
 
+/// The same for FMI 3.0, by the system in its name.
+const ENDINGS_OF_FMI3: [(&str, &str); 3] = [("windows", ".dll"), ("linux", ".so"), ("darwin", ".dylib")];
+
+/// The processors in names of folders of FMI 3.0.
+const ARCHITECTURES: [&str; 4] = ["aarch32", "aarch64", "x86", "x86_64"];
+
+/// What must be there beside others: a path or the beginning of one, and the entries of which one is needed, in FMI
+/// 3.0. All but the last have the rule `archive.companion`.
+const COMPANIONS: [(&str, &[&str]); 5] = [
+    ("sources/", &[BUILD]),
+    (
+        "documentation/licenses/",
+        &[
+            "documentation/licenses/license.txt",
+            "documentation/licenses/license.html",
+            "documentation/licenses/license.spdx",
+        ],
+    ),
+    ("documentation/diagram.svg", &["documentation/diagram.png"]),
+    ("terminalsAndIcons/icon.svg", &["terminalsAndIcons/icon.png"]),
+    ("documentation/", &["documentation/index.html"]),
+];
+
 /// The ending of libraries for a platform, where it is one that the standard names.
-pub(crate) fn ending(platform: &str) -> Option<&'static str> {
-    ENDINGS.iter().find(|(head, _)| platform.starts_with(head)).map(|(_, ending)| *ending)
+pub(crate) fn ending(version: Version, platform: &str) -> Option<&'static str> {
+    match version {
+        Version::Fmi2 => {
+            ENDINGS.iter().find(|(head, _)| platform.starts_with(head)).map(|(_, ending)| *ending)
+        }
+        Version::Fmi3 => {
+            let (architecture, system) = platform.split_once('-')?;
+            let known = ENDINGS_OF_FMI3.iter().find(|(name, _)| *name == system);
+            known.filter(|_| ARCHITECTURES.contains(&architecture)).map(|(_, ending)| *ending)
+        }
+    }
 }
 
-pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
+pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
     // Entries at the top.
+    let version = model.version();
+    let allowed: &[&str] = match version {
+        Version::Fmi2 => &TOP,
+        Version::Fmi3 => &TOP_OF_FMI3,
+    };
     let mut odd: Vec<&str> = archive.entries().iter().filter_map(|entry| entry.split('/').next()).collect();
-    odd.retain(|top| !TOP.contains(top));
+    odd.retain(|top| !allowed.contains(top));
     odd.sort_unstable();
     odd.dedup();
     for top in odd {
-        let message = format!("{top:?} at the top of the archive; the standard has {}", TOP.join(", "));
+        let message = format!("{top:?} at the top of the archive; the standard has {}", allowed.join(", "));
         findings.archive("archive.top-folder", top, message);
     }
+    if version == Version::Fmi3 {
+        companions(archive, findings);
+    }
     // The library of each platform.
-    let Some(identifier) = model.model_identifier() else { return };
+    let identifiers = model.identifiers();
+    let Some(first) = identifiers.first() else { return };
     let mut libraries = 0;
     for platform in archive.platforms() {
-        let Some(ending) = ending(platform) else { continue };
-        let wanted = format!("binaries/{platform}/{identifier}{ending}");
-        if archive.entries().contains(&wanted) {
-            libraries += 1;
-            continue;
+        let Some(ending) = ending(version, platform) else { continue };
+        for identifier in &identifiers {
+            let wanted = format!("binaries/{platform}/{identifier}{ending}");
+            if archive.entries().contains(&wanted) {
+                libraries += 1;
+                continue;
+            }
+            let folder = format!("binaries/{platform}/");
+            let present: Vec<_> = archive
+                .entries()
+                .iter()
+                .filter(|e| e.starts_with(&folder) && !e.ends_with('/'))
+                .take(8)
+                .cloned()
+                .collect();
+            let message = format!(
+                "there is no {wanted}, which modelIdentifier = {identifier:?} asks for; there is {}",
+                present.join(", ")
+            );
+            findings.archive("archive.binary", &folder, message);
         }
-        let folder = format!("binaries/{platform}/");
-        let present: Vec<_> = archive
-            .entries()
-            .iter()
-            .filter(|e| e.starts_with(&folder) && !e.ends_with('/'))
-            .take(8)
-            .cloned()
-            .collect();
-        let message = format!(
-            "there is no {wanted}, which modelIdentifier = {identifier:?} asks for; there is {}",
-            present.join(", ")
-        );
-        findings.archive("archive.binary", &folder, message);
     }
     // Something to run, and a library for this platform.
-    let sources = !model.description.co_simulation.source_files.is_empty()
+    let own = version.platform();
+    let sources = model.names_sources()
         || archive.entries().iter().any(|entry| entry.starts_with("sources/") && !entry.ends_with('/'));
     if libraries == 0 && !sources && !findings.any("archive.binary") {
         let message = format!(
             "there is no library under binaries/ and no source code, so nothing can be run; expected for this platform: \
-             binaries/{PLATFORM}/{identifier}{}",
+             binaries/{own}/{first}{}",
             std::env::consts::DLL_SUFFIX
         );
         findings.archive("archive.binary", "", message);
-    } else if !archive.platforms().iter().any(|platform| platform == PLATFORM) {
+    } else if !archive.platforms().iter().any(|platform| platform == own) {
         let present =
             if archive.platforms().is_empty() { "none".into() } else { archive.platforms().join(", ") };
-        let message = format!("there is no library for this platform, {PLATFORM}; there is: {present}");
+        let message = format!("there is no library for this platform, {own}; there is: {present}");
         findings.archive("archive.platform", "binaries/", message);
+    }
+}
+
+/// Checks what must be there beside other entries.
+fn companions(archive: &Archive, findings: &mut Findings) {
+    let entries = archive.entries();
+    for (c, (given, needed)) in COMPANIONS.iter().enumerate() {
+        let is_given = |entry: &&String| {
+            if given.ends_with('/') {
+                entry.starts_with(given) && !entry.ends_with('/')
+            } else {
+                entry == given
+            }
+        };
+        let missing = !entries.iter().any(|entry| needed.contains(&entry.as_str()));
+        if let Some(entry) = entries.iter().find(is_given).filter(|_| missing) {
+            let rule = if c + 1 == COMPANIONS.len() { "archive.index" } else { "archive.companion" };
+            let message = format!("there is {entry}, but no {}", needed.join(" or "));
+            findings.archive(rule, given, message);
+        }
     }
 }

@@ -1,19 +1,23 @@
-//! Defects of an FMI 2.0 co-simulation FMU, ours or another's, as a list of findings. Each module asks one kind
-//! of question and uses only those above it:
+//! Defects of an FMU of FMI 2.0 co-simulation or of FMI 3.0, ours or another's, as a list of findings. Each module asks
+//! one kind of question and uses only those above it:
 //!
 //! | module | asks |
 //! |---|---|
 //! | `finding` | how a finding is told |
-//! | `schema` | what the XML schema says: elements, attributes, types of values |
+//! | `schema` | what the XML schemas say: elements, attributes, types of values |
+//! | `model` | what the description of either version says |
 //! | `layout` | which files the archive must and may hold |
+//! | `companions` | terminals and build descriptions of FMI 3.0 |
 //! | `symbols` | whether the libraries export what they must, without loading them |
 //! | `trial` | whether an instance does what it should, in a child process |
 //!
 //! The rules of the standard on a description beyond the schema are those of `punctual_modeldescription`, for the
 //! same model as where a description is written.
 
+mod companions;
 mod finding;
 pub(crate) mod layout;
+mod model;
 mod schema;
 pub(crate) mod symbols;
 pub mod trial;
@@ -25,9 +29,9 @@ pub use finding::{Finding, Place, rules};
 pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
-use crate::host::{Archive, Version};
-use finding::Findings;
-use punctual_modeldescription::Located;
+use crate::host::{Archive, Description};
+use finding::{DESCRIPTION, Findings};
+use model::Model;
 
 /// Findings on one FMU.
 #[derive(Clone, Debug, Default)]
@@ -46,12 +50,12 @@ impl Report {
 }
 
 /// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of the FMU is
-/// run.
+/// run. `references` compares with the results that the FMU carries, within this share of the largest number.
 ///
 /// # Errors
 ///
 /// The file cannot be read, or the trial's process cannot be started. Any defect of the FMU is a finding.
-pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
+pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
     let archive = match Archive::open(path) {
@@ -66,25 +70,31 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let text = match archive.model_description() {
         Ok(text) => text,
         Err(problem) => {
-            findings.archive(rule(&problem), "modelDescription.xml", problem.to_string());
+            findings.archive(rule(&problem), DESCRIPTION, problem.to_string());
             skipped.push("everything else: there is no description to go by".to_owned());
             return Ok(Report { findings: findings.finish(), skipped });
         }
     };
-    let Some(document) = schema::parse(&text, &mut findings) else {
+    let Some(document) = schema::parse(DESCRIPTION, &text, &mut findings) else {
         skipped.push("everything else: the description is not well-formed".to_owned());
         return Ok(Report { findings: findings.finish(), skipped });
     };
-    schema::check(&document, &mut findings);
-    let model = Located::read(&document);
-    model.check(&mut |violation| findings.violation(&model, violation));
+    let model = Model::read(&document);
+    schema::check(&document, model.schema(), &mut findings);
+    model.check(&mut findings);
     layout::check(&archive, &model, &mut findings);
+    if let Model::Fmi3(model) = &model {
+        companions::check(&archive, &model.description, &mut findings);
+    }
     symbols::check(&archive, &model, &mut findings);
-    let needs_tool = model.description.co_simulation.needs_execution_tool;
-    match (limit, trial::reason_to_skip(&archive, Version::Fmi2, needs_tool, &findings)) {
+    let reason = trial::reason_to_skip(&archive, model.version(), model.needs_tool(), &findings);
+    let reason =
+        reason.or_else(|| (!model.has_co_simulation()).then(|| "there is no co-simulation".to_owned()));
+    let reason = reason.or_else(|| Description::parse(&text).ok()?.obstacle());
+    match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
-        (Some(limit), None) => trial::run(path, limit, &mut findings)?,
+        (Some(limit), None) => trial::run(path, limit, references, &mut findings)?,
     }
     Ok(Report { findings: findings.finish(), skipped })
 }

@@ -1,16 +1,16 @@
-//! Checks that libraries export the functions that FMI 2.0 co-simulation needs. It reads their files, so that
-//! nothing of them runs, and those of other platforms can be checked too.
+//! Checks that libraries export the functions that FMI 2.0 co-simulation needs, or all of FMI 3.0. It reads their files,
+//! so that nothing of them runs, and those of other platforms can be checked too.
 
 use std::collections::HashSet;
 
 use object::read::NameOrOrdinal;
 use object::{Architecture, BinaryFormat, Object, ObjectSymbol};
-use punctual_fmu::fmi2::FUNCTIONS;
-use punctual_modeldescription::Located;
+use punctual_fmu::{fmi2, fmi3};
 
 use super::finding::Findings;
 use super::layout::ending;
-use crate::host::Archive;
+use super::model::Model;
+use crate::host::{Archive, Version};
 
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
@@ -27,27 +27,52 @@ const PROCESSORS: [(&str, &[Architecture]); 8] = [
     ("darwin32", &[Architecture::I386]),
 ];
 
+/// The same by the names that FMI 3.0 adds.
+const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
+    ("x86_64-linux", &[Architecture::X86_64]),
+    ("x86-linux", &[Architecture::I386]),
+    ("aarch32-linux", &[Architecture::Arm]),
+    ("x86_64-windows", &[Architecture::X86_64]),
+    ("x86-windows", &[Architecture::I386]),
+    ("x86_64-darwin", &[Architecture::X86_64]),
+    ("aarch64-darwin", &[Architecture::Aarch64]),
+];
+
+/// The functions that a library of a version must export, and what they are those of.
+fn functions(version: Version) -> (&'static [&'static str], &'static str) {
+    match version {
+        Version::Fmi2 => (fmi2::FUNCTIONS, "FMI 2.0 co-simulation"),
+        Version::Fmi3 => (fmi3::FUNCTIONS, "FMI 3.0"),
+    }
+}
+
 /// The format of libraries for a platform, which may be one that the standard does not name.
 fn format(platform: &str) -> BinaryFormat {
     match platform {
         p if p.starts_with("win") || p.ends_with("-windows") => BinaryFormat::Pe,
-        p if p.starts_with("darwin") => BinaryFormat::MachO,
+        p if is_darwin(p) => BinaryFormat::MachO,
         _ => BinaryFormat::Elf,
     }
 }
 
-pub(super) fn check(archive: &Archive, model: &Located, findings: &mut Findings) {
-    let Some(identifier) = model.model_identifier() else { return };
+fn is_darwin(platform: &str) -> bool {
+    platform.starts_with("darwin") || platform.ends_with("-darwin")
+}
+
+pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
+    let version = model.version();
     for platform in archive.platforms() {
-        let Some(ending) = ending(platform) else { continue };
-        let entry = format!("binaries/{platform}/{identifier}{ending}");
-        if archive.entries().contains(&entry) {
-            library(archive, platform, &entry, findings);
+        let Some(ending) = ending(version, platform) else { continue };
+        for identifier in model.identifiers() {
+            let entry = format!("binaries/{platform}/{identifier}{ending}");
+            if archive.entries().contains(&entry) {
+                library(archive, version, platform, &entry, findings);
+            }
         }
     }
 }
 
-fn library(archive: &Archive, platform: &str, entry: &str, findings: &mut Findings) {
+fn library(archive: &Archive, version: Version, platform: &str, entry: &str, findings: &mut Findings) {
     let path = archive.path(entry);
     let bytes = match std::fs::metadata(&path) {
         Ok(metadata) if metadata.len() > MAX_LIBRARY_BYTES => {
@@ -63,13 +88,14 @@ fn library(archive: &Archive, platform: &str, entry: &str, findings: &mut Findin
     match told {
         Err(message) => findings.archive("symbols.readable", entry, message),
         Ok(exported) => {
+            let (functions, of) = functions(version);
             let missing: Vec<&str> =
-                FUNCTIONS.iter().copied().filter(|function| !exported.contains(*function)).collect();
+                functions.iter().copied().filter(|function| !exported.contains(*function)).collect();
             if !missing.is_empty() {
                 let message = format!(
-                    "does not export {} of the {} functions of FMI 2.0 co-simulation: {}",
+                    "does not export {} of the {} functions of {of}: {}",
                     missing.len(),
-                    FUNCTIONS.len(),
+                    functions.len(),
                     missing.join(", ")
                 );
                 findings.archive("symbols.missing", entry, message);
@@ -80,7 +106,7 @@ fn library(archive: &Archive, platform: &str, entry: &str, findings: &mut Findin
 
 /// The names that a library exports, if it is one for the platform; else its defect.
 fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
-    if is_fat(bytes) && platform.starts_with("darwin") {
+    if is_fat(bytes) && is_darwin(platform) {
         return fat_exports(bytes);
     }
     let file = parse(bytes)?;
@@ -89,7 +115,7 @@ fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
         return Err(format!("has the format {:?}; {platform} has {format:?}", file.format()));
     }
     let found = file.architecture();
-    let known = PROCESSORS.iter().find(|(name, _)| *name == platform);
+    let known = PROCESSORS.iter().chain(&PROCESSORS_OF_FMI3).find(|(name, _)| *name == platform);
     if let Some((_, wanted)) = known.filter(|(_, wanted)| !wanted.contains(&found)) {
         return Err(format!("is for the processor {found:?}; {platform} has {:?}", wanted[0]));
     }
@@ -117,7 +143,7 @@ pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
         name
     };
     let exported = exports(bytes, name)?;
-    match FUNCTIONS.iter().find(|function| !exported.contains(**function)) {
+    match fmi2::FUNCTIONS.iter().find(|function| !exported.contains(**function)) {
         Some(missing) => Err(format!("does not export {missing}, so it is not the library of an FMU")),
         None => Ok(name),
     }

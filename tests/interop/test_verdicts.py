@@ -75,15 +75,23 @@ def library(tmp_path_factory):
     return product
 
 
-def verdicts(folder, library, old, new, method=zipfile.ZIP_STORED):
-    xml = (FIXTURES / "misbehaving.xml").read_text()
+def judged(folder, fixture, library, entry, old, new, method=zipfile.ZIP_STORED, more=None):
+    """Both verdicts on an FMU with the description of the fixture, in which a text is replaced once, and more files."""
+    xml = (FIXTURES / fixture).read_text()
     assert old in xml
     fmu = folder / "x.fmu"
     with zipfile.ZipFile(fmu, "w", method) as archive:
         archive.writestr("modelDescription.xml", xml.replace(old, new, 1))
-        archive.write(library, "binaries/linux64/misbehaving.so")
+        archive.write(library, entry)
+        for name, file in (more or {}).items():
+            archive.write(file, name)
     done = punctual("validate", fmu, "--json", "--no-trial", check=False)
     return json.loads(done.stdout), validate_fmu(str(fmu))
+
+
+def verdicts(folder, library, old, new, method=zipfile.ZIP_STORED):
+    entry = "binaries/linux64/misbehaving.so"
+    return judged(folder, "misbehaving.xml", library, entry, old, new, method)
 
 
 @pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")

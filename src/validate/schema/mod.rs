@@ -1,4 +1,4 @@
-//! The XML schema of FMI 2.0, as one table ([`table`]) and one pass over the document.
+//! The XML schemas of FMI 2.0 and 3.0, as tables ([`table`]) and one pass over the document.
 
 mod table;
 mod types;
@@ -6,16 +6,18 @@ mod types;
 use punctual_modeldescription::brief;
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::finding::{DESCRIPTION, Findings, Mark, Place};
+use super::finding::{Findings, Mark, Place};
 use crate::host::{declared_encoding, is_latin};
-use table::{Content, ELEMENTS, Element, Times, Use};
+use punctual_modeldescription::fmi3::DataType;
+pub(super) use table::{BUILD, FMI2, FMI3, Schema, TERMINALS};
+use table::{Content, Element, Times, Use};
 
 /// The attributes that every element may have: those of the schema language itself.
 const SCHEMA_INSTANCE: &str = "http://www.w3.org/2001/XMLSchema-instance";
 
-/// Parses the text; a text that is not well-formed is a finding.
-pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Document<'a>> {
-    findings.read(text);
+/// Parses the text of a file of the archive; a text that is not well-formed is a finding.
+pub(super) fn parse<'a>(file: &str, text: &'a str, findings: &mut Findings) -> Option<Document<'a>> {
+    findings.read(file, text);
     // No document type is allowed. The number of nodes has no limit here, since the text was checked for it
     // before.
     let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
@@ -26,7 +28,7 @@ pub(super) fn parse<'a>(text: &'a str, findings: &mut Findings) -> Option<Docume
         }
         Err(error) => {
             let at = error.pos();
-            let place = Place { file: DESCRIPTION.into(), position: Some((at.row, at.col)), variable: None };
+            let place = Place { file: file.to_owned(), position: Some((at.row, at.col)), variable: None };
             let words = error.to_string();
             let words = words.rsplit_once(" at ").map_or(words.as_str(), |(words, _)| words);
             findings.place("xml.readable", place, format!("is not well-formed XML: {words}"));
@@ -61,23 +63,30 @@ fn place(node: Node<'_, '_>) -> Mark {
 
 fn mark(node: Node<'_, '_>, at: usize) -> Mark {
     // A variable and its type are at most this deep.
-    let inside = node.ancestors().take(2).find(|n| n.has_tag_name("ScalarVariable"));
+    let inside = node.ancestors().take(2).find(is_variable);
     Mark { at, variable: inside.and_then(|n| n.attribute("name")).map(brief) }
 }
 
+/// Whether a node is a variable of either version.
+fn is_variable(node: &Node<'_, '_>) -> bool {
+    let of_fmi3 = |list: Node<'_, '_>| list.has_tag_name("ModelVariables");
+    node.has_tag_name("ScalarVariable")
+        || node.parent().is_some_and(of_fmi3) && DataType::ALL.iter().any(|of| node.has_tag_name(of.as_str()))
+}
+
 /// Checks the whole document.
-pub(super) fn check(document: &Document<'_>, findings: &mut Findings) {
+pub(super) fn check(document: &Document<'_>, schema: &Schema, findings: &mut Findings) {
     let root = document.root_element();
-    if root.tag_name().name() != "fmiModelDescription" || root.tag_name().namespace().is_some() {
-        let message = format!("the root element is {}; must be fmiModelDescription", root.tag_name().name());
+    if root.tag_name().name() != schema.root || root.tag_name().namespace().is_some() {
+        let message = format!("the root element is {}; must be {}", root.tag_name().name(), schema.root);
         findings.add("schema.element", place(root), message);
         return;
     }
-    let exchanges = root.children().any(|child| child.has_tag_name("ModelExchange"));
+    let exchanges = !schema.of_exchange || root.children().any(|child| child.has_tag_name("ModelExchange"));
     // A list replaces recursion, since the file decides the depth.
-    let mut open = vec![(root, "fmiModelDescription")];
+    let mut open = vec![(root, schema.root)];
     while let Some((node, kind)) = open.pop() {
-        let Some(element) = ELEMENTS.iter().find(|element| element.kind == kind) else { continue };
+        let Some(element) = schema.elements.iter().find(|element| element.kind == kind) else { continue };
         attributes(node, element, findings);
         if !exchanges {
             of_exchange(node, findings);
@@ -109,9 +118,12 @@ fn attributes(node: Node<'_, '_>, element: &Element, findings: &mut Findings) {
         if attribute.namespace() == Some(SCHEMA_INSTANCE) {
             continue;
         }
-        let known = element.attributes.iter().find(|a| a.name == attribute.name());
+        let known = element.attributes().find(|a| a.name == attribute.name());
         let Some(known) = known.filter(|_| attribute.namespace().is_none()) else {
-            let names: Vec<_> = element.attributes.iter().map(|a| a.name).collect();
+            if element.open {
+                continue;
+            }
+            let names: Vec<_> = element.attributes().map(|a| a.name).collect();
             let allowed = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             let message = format!("{name} has an attribute {}; allowed: {allowed}", attribute.name());
             findings.add("schema.attribute", mark(node, attribute.range().start), message);
@@ -123,7 +135,7 @@ fn attributes(node: Node<'_, '_>, element: &Element, findings: &mut Findings) {
             findings.add("schema.value", mark(node, attribute.range().start), message);
         }
     }
-    for required in element.attributes.iter().filter(|a| a.required == Use::Required) {
+    for required in element.attributes().filter(|a| a.required == Use::Required) {
         if node.attribute(required.name).is_none() {
             let message = format!("{name} has no attribute {}, which it must have", required.name);
             findings.add("schema.attribute", place(node), message);
@@ -177,14 +189,16 @@ fn children<'a, 'i>(
         }
         open.push((child, rule.kind));
     }
-    // Exactly one of a choice, and every child that must be there.
-    let choosing = rules.iter().filter(|rule| rule.times == Times::Choice).map(|rule| rule.name);
-    let chosen: usize =
-        rules.iter().zip(&counts).filter(|(rule, _)| rule.times == Times::Choice).map(|(_, n)| *n).sum();
-    let names: Vec<_> = choosing.collect();
-    if !names.is_empty() && chosen != 1 {
-        let message = format!("{name} has {chosen} of {}; must have exactly one", names.join(", "));
-        findings.add("schema.element", place(node), message);
+    // Exactly one of a choice, at least one of a mix, and every child that must be there.
+    for (times, wanted) in [(Times::Choice, "exactly one"), (Times::Mix, "at least one")] {
+        let of = rules.iter().zip(&counts).filter(|(rule, _)| rule.times == times);
+        let chosen: usize = of.clone().map(|(_, n)| *n).sum();
+        let names: Vec<_> = of.map(|(rule, _)| rule.name).collect();
+        let enough = chosen == 1 || times == Times::Mix && chosen > 1;
+        if !names.is_empty() && !enough {
+            let message = format!("{name} has {chosen} of {}; must have {wanted}", names.join(", "));
+            findings.add("schema.element", place(node), message);
+        }
     }
     for (rule, count) in rules.iter().zip(counts) {
         if count == 0 && matches!(rule.times, Times::One | Times::Some) {

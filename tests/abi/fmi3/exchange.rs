@@ -100,9 +100,12 @@ fn step(slave: &Slave, t: f64, x: &[f64], h: f64) -> Vec<f64> {
     next
 }
 
+/// The step of both: times are exact, and shorter than any inner step.
+const H: f64 = 0.000_976_562_5;
+
 #[test]
 fn the_same_method_outside_gives_the_same_bits() {
-    for (configuration, h) in [(PLANT, 0.000_976_562_5), (PENDULUM, 0.001)] {
+    for configuration in [PLANT, PENDULUM] {
         for arrays in [true, false] {
             let fmu = Fmu::of_fmi3(configuration, arrays);
             let inside = Slave::ready(&fmu);
@@ -115,7 +118,7 @@ fn the_same_method_outside_gives_the_same_bits() {
             outside.ok((API.get_continuous_states)(outside.instance, x.as_mut_ptr(), n));
             let count = fmu.product.layout.inputs;
             for k in 0..40 {
-                let t = f64::from(k) * h;
+                let (t, h) = (f64::from(k) * H, H);
                 let values: Vec<f64> = (0..count).map(|i| 0.3 * f64::from(k) - i as f64).collect();
                 (inside.set_inputs(&values), outside.set_inputs(&values));
                 inside.step(t, h);
