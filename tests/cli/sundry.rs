@@ -3,6 +3,7 @@
 
 use crate::misbehaving::{self, description, sundry, write_sundry};
 use crate::table::Table;
+use crate::validating::listed;
 use crate::workshop::{Done, Workshop};
 
 /// One FMU of FMI 3.0 feeds another, which has this defect and these macros.
@@ -264,4 +265,99 @@ fn what_cannot_be_run_is_refused_in_plain_words() {
         1,
         "b (b.fmu): modelDescription.xml: the size of u is neither a number nor that of another variable",
     );
+}
+
+/// The findings of `punctual validate` on the FMU with this defect.
+fn tried(defect: &str, macros: &[&str], options: &[&str]) -> (i32, Vec<String>) {
+    let workshop = Workshop::new();
+    write_sundry(&workshop, "x.fmu", sundry(defect, &[]), macros);
+    listed(&workshop, options)
+}
+
+#[test]
+fn a_trial_finds_what_a_sound_fmu_does_not_do() {
+    assert_eq!(tried("none", &[], &[]), (0, vec![]));
+    let step = "trial: fmi3DoStep of trial (x.fmu) at t = 0.2 s";
+    for (defect, expected) in [
+        (
+            "crash-in-step",
+            "error trial.crash trial: in fmi3DoStep at t = 0.2 s the FMU crashed with signal 11",
+        ),
+        (
+            "crash-in-exit",
+            "error trial.crash trial: in fmi3ExitInitializationMode at t = 0 s the FMU crashed",
+        ),
+        (
+            "exit-in-step",
+            "error trial.crash trial: in fmi3DoStep at t = 0.2 s the FMU ended the whole process",
+        ),
+        (
+            "error-in-step",
+            &*format!("error trial.call {step} returned fmi3Error\n  [fmi3Error, logStatusError] 100% wrong"),
+        ),
+        ("fatal-in-step", &*format!("error trial.call {step} returned fmi3Fatal")),
+        ("discard-in-step", &*format!("warning trial.discard {step} returned fmi3Discard")),
+        ("early-in-step", "error trial.call trial: fmi3DoStep of trial (x.fmu) at t = 0.3 s came back early"),
+        (
+            "event-in-step",
+            "error trial.call trial: fmi3DoStep of trial (x.fmu) at t = 0.3 s asked for event mode",
+        ),
+        ("warning-in-step", "warning trial.warning trial: 23 calls returned fmi3Warning"),
+        (
+            "no-instance",
+            "error trial.call trial: fmi3InstantiateCoSimulation of trial (x.fmu) returned no instance",
+        ),
+        ("one-instance", "warning trial.instances trial: a second instance beside trial fails"),
+        (
+            "wrong-start",
+            "warning trial.start trial m[1,1]: is 7 after initialisation; the description says start = 1",
+        ),
+        ("no-reset", "warning trial.reset trial y[1]: is 10 at the end of a second run after fmi3Reset"),
+        ("null-string", "warning trial.text trial in_string: fmi3GetString gave NULL; must give a text"),
+        ("wrong-derivative", "warning trial.derivative trial z: its directional derivative by u[1] is 2.5"),
+        ("wrong-adjoint", "warning trial.derivative trial z: its adjoint derivative by u[1] gives"),
+    ] {
+        let (_, found) = tried(defect, &[], &[]);
+        assert!(found.first().is_some_and(|first| first.starts_with(expected)), "{defect}: {found:#?}");
+    }
+    let (_, found) = tried("hang-in-step", &[], &["--time-limit", "1.5"]);
+    assert_eq!(
+        found,
+        ["error trial.crash trial: in fmi3DoStep at t = 0.2 s the FMU did not come back within 1.5 s"]
+    );
+    let (_, found) = tried("none", &["VERSION=\"3.9\""], &[]);
+    assert_eq!(found, ["error trial.version trial: fmi3GetVersion answered \"3.9\"; must be \"3.0\""]);
+}
+
+/// A state that is not whole shows where the inputs move it: in a step that is made again.
+#[test]
+fn a_trial_takes_steps_back() {
+    for (defect, expected) in
+        [("state-forgets", "after it was set back"), ("bytes-forget", "after its state went through bytes")]
+    {
+        let workshop = Workshop::new();
+        let moving = [("start=\"0 0\"", "start=\"1 1\"")];
+        write_sundry(&workshop, "x.fmu", sundry(defect, &moving), &["MOVING"]);
+        let (_, found) = listed(&workshop, &[]);
+        let told = found
+            .iter()
+            .any(|f| f.starts_with("warning trial.state trial y[1]: is ") && f.contains(expected));
+        assert!(told, "{defect}: {found:#?}");
+    }
+}
+
+#[test]
+fn a_trial_needs_what_it_can_run() {
+    let workshop = Workshop::new();
+    let clock =
+        "<Clock name=\"tick\" valueReference=\"99\" causality=\"input\" intervalVariability=\"triggered\"/>";
+    let edits = [
+        ("  </ModelVariables>", &*format!("{clock}</ModelVariables>")),
+        ("providesAdjointDerivatives=\"true\"", "providesAdjointDerivatives=\"true\" hasEventMode=\"true\""),
+    ];
+    write_sundry(&workshop, "x.fmu", sundry("none", &edits), &[]);
+    let done = workshop.punctual(["validate", "x.fmu"]);
+    let skipped =
+        "note: not examined: the trial: it has clocks (tick), which need an importer with event mode";
+    assert!(done.code == 0 && done.stderr.starts_with(skipped), "{done:#?}");
 }
