@@ -313,7 +313,7 @@ fn a_trial_finds_what_a_sound_fmu_does_not_do() {
             "warning trial.start trial m[1,1]: is 7 after initialisation; the description says start = 1",
         ),
         ("no-reset", "warning trial.reset trial y[1]: is 10 at the end of a second run after fmi3Reset"),
-        ("null-string", "warning trial.text trial in_string: fmi3GetString gave NULL; must give a text"),
+        ("null-string", "warning trial.text trial out_string: fmi3GetString gave NULL; must give a text"),
         ("wrong-derivative", "warning trial.derivative trial z: its directional derivative by u[1] is 2.5"),
         ("wrong-adjoint", "warning trial.derivative trial z: its adjoint derivative by u[1] gives"),
     ] {
