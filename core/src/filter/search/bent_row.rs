@@ -22,10 +22,15 @@ use crate::qp::{Outcome, Row, RowSet, Solution, Solver, Workspace};
 use crate::{MAX_INPUTS, elementary};
 
 /// The least square of the part of a step aside, as a part of the step's, for it to show how the row bends aside.
-const ASIDE_OF_STEP: f64 = 0.1;
+const ASIDE_OF_STEP: f64 = 0.05;
+/// A step over the product of the two before it with the turn of the normal per distance, at most: three to four times what
+/// vehicles show, over a third of what counts as met.
+const SECANT: f64 = 30.0;
 /// The shortest step, as a part of the input, that shows a bend beyond round-off.
 const TELLING: f64 = 1e-7;
-/// Steps of Newton's method for λ. It converges quadratically.
+/// The last change of λ in Newton's method, as a part of it: the next one would be its square.
+const ROOT: f64 = 1e-6;
+/// Steps of Newton's method for λ.
 const MULTIPLIER_STEPS: usize = 6;
 
 type Matrix<const M: usize> = [[f64; M]; M];
@@ -96,7 +101,7 @@ impl<const M: usize> Bent<M> {
             let value = self.value + product(&self.normal, &step) + 0.5 * product(&step, &turn);
             let change = -value / product(&there, &factors.solve(there));
             lambda += change;
-            if change.abs() <= SKIPPED * SKIPPED * MET * lambda.abs() {
+            if change.abs() <= ROOT * lambda.abs() {
                 let moved = factors.solve(there);
                 return Some((core::array::from_fn(|i| step[i] + change * moved[i]), lambda));
             }
@@ -200,18 +205,27 @@ impl PeriodProblem<'_> {
         let mut row = Bent { value: from.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
+        let (mut way, mut turned) = ([0.0; M], [0.0; M]);
         let (mut bends_aside, mut rounds) = (false, 0);
-        let lambda = loop {
+        let (lambda, turn) = loop {
             let here = self.weighted(requirement, &u, at.ahead)?;
             let before = core::mem::replace(&mut row.normal, *here.normal.first_chunk()?);
             row.value = here.value;
-            row.learn(&step, &core::array::from_fn(|i| row.normal[i] - before[i]));
+            let change = core::array::from_fn(|i| row.normal[i] - before[i]);
             let back: [f64; M] = core::array::from_fn(|i| u_ref[i] - u[i]);
-            // Does the step show how the row bends aside of the way from u_ref?
-            let (square, along) = (product(&step, &step), product(&step, &back));
-            let aside = square - along * along / product(&back, &back);
-            bends_aside |=
-                aside >= ASIDE_OF_STEP * square && largest(&step) >= TELLING * largest(&u).max(1.0);
+            if rounds == 0 {
+                (way, turned) = (step, change);
+            } else {
+                // The part of the step aside of the way from u_ref, with the part of the turn that is its own.
+                let along = product(&step, &way) / product(&way, &way);
+                let aside = core::array::from_fn(|i| step[i] - along * way[i]);
+                let tells = largest(&step) >= TELLING * largest(&u).max(1.0);
+                if tells && product(&aside, &aside) >= ASIDE_OF_STEP * product(&step, &step) {
+                    row.learn(&aside, &core::array::from_fn(|i| change[i] - along * turned[i]));
+                    bends_aside = true;
+                }
+            }
+            row.learn(&step, &change);
             let lambda;
             (step, lambda) = row.nearest(&back)?;
             let target: [f64; M] = core::array::from_fn(|i| u[i] + step[i]);
@@ -221,9 +235,16 @@ impl PeriodProblem<'_> {
             }
             at.rows[chosen] = Row::linear(&row.normal, row.value, &u);
             let (shortened, size) = (largest(&step) / length, largest(&u).max(largest(&target)).max(1.0));
+            let before_length = length;
             (u, length) = (target, largest(&step));
-            if length == 0.0 || rounds > 0 && shortened * length <= SKIPPED * MET * size {
-                break lambda;
+            // Methods of secants: a step is as the product of the two before it, where they have shown how the row bends.
+            let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
+            let next = match bends_aside {
+                true => SECANT * turn * length * before_length / elementary::sqrt(product(&back, &back)),
+                false => shortened.max(turn) * length / SKIPPED,
+            };
+            if length == 0.0 || rounds > 0 && next <= MET * size {
+                break (lambda, turn);
             }
             rounds += 1;
             if shortened > CONVERGING || rounds == CORRECTIONS {
@@ -237,15 +258,14 @@ impl PeriodProblem<'_> {
         let missed = (from.value + lambda * square).abs() / (lambda * square);
         let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
         let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
-        let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
         let ratio = ratio.max(bend).max(turn);
         // Not-a-number is no number at most.
         if !matches!(ratio, 0.0..=CONVERGING) {
             return None;
         }
         let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
-        let known = self.u_ref.iter().chain(last.into_iter().flatten());
-        let limit = known.fold(1.0, |s: f64, v| s.max(v.abs()));
+        let limit = last.map_or(0.0, |last| last.iter().fold(0.0, |s: f64, v| s.max(v.abs())));
+        let limit = limit.max(largest(u_ref)).max(1.0);
         if distance > (FAR * limit).min(self.correction_limit) {
             return None;
         }
