@@ -1,12 +1,14 @@
-//! Two importers that are not ours, `fmi` and `fmi-rs`, couple a filter with a plant. Every output of both must
-//! equal that recorded by `punctual run`, bit for bit, at every communication point.
+//! Two importers that are not ours, `fmi` and `fmi-rs`, couple a filter with a plant, by FMI 2.0 and 3.0. Every output of
+//! both must equal that recorded by `punctual run`, bit for bit, at every communication point.
 //!
-//! `punctual-importers FOLDER STEP`, where FOLDER holds filter.fmu, plant.fmu and recorded.csv; see `run`.
+//! `punctual-importers FOLDER STEP`, where FOLDER holds recorded.csv, filter.fmu and plant.fmu, and the same for FMI 3.0
+//! in its folder fmi3; see `run`.
 #![forbid(unsafe_code)]
 
 mod recording;
 mod with_fmi;
 mod with_fmi_rs;
+mod with_fmi_rs3;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -127,6 +129,7 @@ fn main() {
     let counts = [
         ("fmi", compare::<with_fmi::Slave>(folder, h, &recording)),
         ("fmi-rs", compare::<with_fmi_rs::Slave>(folder, h, &recording)),
+        ("fmi-rs, FMI 3.0", compare::<with_fmi_rs3::Slave>(&folder.join("fmi3"), h, &recording)),
     ];
     for (importer, count) in counts {
         println!("ok {importer}: {count} values at {} points, every bit as recorded", recording.rows());
