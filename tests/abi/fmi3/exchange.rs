@@ -120,7 +120,8 @@ fn the_same_method_outside_gives_the_same_bits() {
             for k in 0..40 {
                 let (t, h) = (f64::from(k) * H, H);
                 let values: Vec<f64> = (0..count).map(|i| 0.3 * f64::from(k) - i as f64).collect();
-                (inside.set_inputs(&values), outside.set_inputs(&values));
+                inside.set_inputs(&values);
+                outside.set_inputs(&values);
                 inside.step(t, h);
                 x = step(&outside, t, &x, h);
                 assert_eq!(outside.snapshot(), inside.snapshot(), "step {k} of {configuration}");
@@ -135,10 +136,13 @@ fn the_same_method_outside_gives_the_same_bits() {
     }
 }
 
+/// A function with its call in the table.
+type Function = (&'static str, Call, fn(&Slave) -> c_int);
+
 #[test]
 fn every_function_in_every_mode() {
     let fmu = Fmu::of_fmi3(PLANT, true);
-    let functions: [(&str, Call, fn(&Slave) -> c_int); 9] = [
+    let functions: [Function; 9] = [
         ("fmi3EnterEventMode", Call::EnterEventMode, |s| (API.enter_event_mode)(s.instance)),
         ("fmi3UpdateDiscreteStates", Call::UpdateDiscreteStates, update),
         ("fmi3EnterContinuousTimeMode", Call::EnterContinuousTimeMode, |s| {
