@@ -254,10 +254,11 @@ impl Trial {
                 break;
             }
         }
+        // Before derivatives are compared with differences: inputs that are set again belong to the present time.
+        let last = self.outputs(slave, variables)?;
         if !set {
             self.derivatives(slave, description)?;
         }
-        let last = self.outputs(slave, variables)?;
         slave.terminate()?;
         Ok(last)
     }

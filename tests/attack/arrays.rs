@@ -224,14 +224,14 @@ fn references(slave: &Slave, bytes: &mut Bytes) -> (Vec<u32>, usize) {
             item.reference()
         })
         .collect();
-    let count = if bytes.byte() % 16 == 0 { count ^ 1 } else { count };
+    let count = if bytes.byte().is_multiple_of(16) { count ^ 1 } else { count };
     (references, count)
 }
 
 fn values(slave: &mut Slave, bytes: &mut Bytes) {
     let (references, count) = references(slave, bytes);
     let (c, n) = (slave.instance, references.len());
-    let r = if bytes.byte() % 32 == 0 { null() } else { references.as_ptr() };
+    let r = if bytes.byte().is_multiple_of(32) { null() } else { references.as_ptr() };
     let mut floats: Vec<f64> =
         (0..count).map(|_| if bytes.below(4) == 0 { bytes.number() } else { bytes.moderate() }).collect();
     let (mut ints, mut longs, mut flags) = (vec![3; count], vec![3; count], vec![2; count]);
@@ -313,7 +313,7 @@ fn state(slave: &mut Slave, bytes: &mut Bytes) {
 /// Calls of model exchange, on instances of either interface.
 fn exchange(slave: &mut Slave, bytes: &mut Bytes) {
     let (c, n) = (slave.instance, slave.fmu.product.layout.states);
-    let n = if bytes.byte() % 16 == 0 { n + 1 } else { n };
+    let n = if bytes.byte().is_multiple_of(16) { n + 1 } else { n };
     let mut x: Vec<f64> =
         (0..n).map(|_| if bytes.below(8) == 0 { bytes.number() } else { bytes.moderate() }).collect();
     let (p, mut flag, mut time, mut count) = (x.as_mut_ptr(), 7, 0.5, 0);

@@ -120,7 +120,8 @@ fn the_same_method_outside_gives_the_same_bits() {
             for k in 0..40 {
                 let (t, h) = (f64::from(k) * H, H);
                 let values: Vec<f64> = (0..count).map(|i| 0.3 * f64::from(k) - i as f64).collect();
-                (inside.set_inputs(&values), outside.set_inputs(&values));
+                inside.set_inputs(&values);
+                outside.set_inputs(&values);
                 inside.step(t, h);
                 x = step(&outside, t, &x, h);
                 assert_eq!(outside.snapshot(), inside.snapshot(), "step {k} of {configuration}");
@@ -135,10 +136,13 @@ fn the_same_method_outside_gives_the_same_bits() {
     }
 }
 
+/// A function with its call in the table.
+type Function = (&'static str, Call, fn(&Slave) -> c_int);
+
 #[test]
 fn every_function_in_every_mode() {
     let fmu = Fmu::of_fmi3(PLANT, true);
-    let functions: [(&str, Call, fn(&Slave) -> c_int); 9] = [
+    let functions: [Function; 9] = [
         ("fmi3EnterEventMode", Call::EnterEventMode, |s| (API.enter_event_mode)(s.instance)),
         ("fmi3UpdateDiscreteStates", Call::UpdateDiscreteStates, update),
         ("fmi3EnterContinuousTimeMode", Call::EnterContinuousTimeMode, |s| {
@@ -287,6 +291,11 @@ fn derivatives_of_the_rates() {
         slave.ok((API.get_adjoint_derivative)(slave.instance, u, 3, k, 2, s, 5, f, 3));
         assert_eq!(found, *wanted);
     }
+    // A seed that is no number is told by the name of the rate.
+    let (s, mut found) = ([0.0, f64::NAN, 0.0, 0.0, 0.0], [7.5; 3]);
+    let (s, f) = (s.as_ptr(), found.as_mut_ptr());
+    let status = (API.get_adjoint_derivative)(slave.instance, u, 3, k, 2, s, 5, f, 3);
+    assert!(slave.refused(status).contains("the seed of der(x) is NaN"));
     // At the start a state is the parameter it begins with.
     let slave = into_mode(&fmu, Mode::INITIALIZATION);
     let (x, x0) = (fmu.item("x").reference(), fmu.item("x0").reference());

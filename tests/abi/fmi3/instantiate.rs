@@ -104,7 +104,8 @@ fn functions_of_the_other_version() {
         message,
         "fmi3Terminate: the instance is one of FMI 2.0, which has no functions that begin with fmi3"
     );
-    (old.step(0.0, 0.1), new.step(0.0, 0.1));
+    old.step(0.0, 0.1);
+    new.step(0.0, 0.1);
     // And a version makes no instance of the other's FMU.
     let message = refusal(&Said::of(&two));
     let wanted = "the FMU is one of FMI 2.0, which has no instance of FMI 3.0";

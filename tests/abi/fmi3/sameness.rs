@@ -40,11 +40,13 @@ fn whole_runs_are_equal_bit_for_bit() {
                 old.set_inputs(&values);
                 new.set_inputs(&values);
                 if k == 30 && configuration == FILTER {
-                    (old.set_flag("rearm", true), new.set_flag("rearm", true));
+                    old.set_flag("rearm", true);
+                    new.set_flag("rearm", true);
                 }
                 // An output is read before the step, and after it.
                 assert_eq!(new.snapshot(), old.snapshot(), "before step {k} of {configuration}");
-                (old.step(t, 0.05), new.step(t, 0.05));
+                old.step(t, 0.05);
+                new.step(t, 0.05);
                 assert_eq!(new.snapshot(), old.snapshot(), "after step {k} of {configuration}");
                 assert_eq!(new.get("time"), [old.time()]);
             }
