@@ -74,7 +74,8 @@ impl References {
             let text = fmu.text(&format!("{FOLDER}/{source}"));
             let text =
                 text.ok_or_else(|| problem(format!("{MANIFEST} names {source}, which is not there")))?;
-            Table::parse(&text).map(Some).map_err(|e| problem(format!("{source}: {e}")))
+            let table = Table::parse(&text, |name| is_number(fmu, name));
+            table.map(Some).map_err(|e| problem(format!("{source}: {e}")))
         };
         let results =
             table("result")?.ok_or_else(|| problem(format!("{MANIFEST} names no results as text/csv")))?;
@@ -206,6 +207,13 @@ fn moved(array: &[Variable], k: usize) -> Vec<f64> {
 /// A column as the FMU has it: type, value reference and number of values.
 type Column = (DataType, u32, usize);
 
+/// Whether a column is, as far as the FMU knows it, one of numbers.
+fn is_number(fmu: &Fmu, name: &str) -> bool {
+    let description = fmu.description();
+    let at = description.index_of(name).or_else(|| description.array(name).map(|array| array.first));
+    at.and_then(|at| description.variables.get(at)).is_none_or(Variable::is_number)
+}
+
 fn columns(fmu: &Fmu, names: &[String]) -> Result<Vec<Column>, Error> {
     let description = fmu.description();
     let find = |name: &String| {
@@ -286,20 +294,22 @@ impl Table {
         text
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
+    /// Reads a table. Columns that are no numbers, but texts or bytes, are left out.
+    fn parse(text: &str, is_number: impl Fn(&str) -> bool) -> Result<Self, String> {
         let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
         let head = fields(lines.next().ok_or("is empty")?.1);
-        let names: Vec<String> = head.into_iter().skip(1).collect();
-        let mut table = Self { names, ..Self::default() };
+        let width = head.len();
+        let kept: Vec<bool> = head.iter().enumerate().map(|(c, name)| c == 0 || is_number(name)).collect();
+        let names = head.into_iter().zip(&kept).skip(1).filter(|(_, kept)| **kept).map(|(name, _)| name);
+        let mut table = Self { names: names.collect(), ..Self::default() };
         for (number, line) in lines {
             let number = number + 1;
             let cells = fields(line);
-            if cells.len() != table.names.len() + 1 {
-                let (found, wanted) = (cells.len(), table.names.len() + 1);
-                return Err(format!("line {number} has {found} fields; must have {wanted}"));
+            if cells.len() != width {
+                return Err(format!("line {number} has {} fields; must have {width}", cells.len()));
             }
             let mut numbers = Vec::new();
-            for cell in &cells {
+            for (cell, _) in cells.iter().zip(&kept).filter(|(_, kept)| **kept) {
                 let values: Result<Vec<f64>, _> = cell.split_whitespace().map(value).collect();
                 numbers.push(values.map_err(|word| format!("line {number}: {word:?} is no number"))?);
             }
@@ -358,7 +368,9 @@ mod tests {
             times: vec![0.0, 0.1],
             rows: vec![vec![vec![1.0, -0.0], vec![f64::INFINITY]], vec![vec![0.1 + 0.2, 1e-300], vec![5.0]]],
         };
-        assert_eq!(Table::parse(&table.text()).unwrap(), table);
+        assert_eq!(Table::parse(&table.text(), |_| true).unwrap(), table);
+        let without = Table::parse(&table.text(), |name| name == "u").unwrap();
+        assert_eq!((without.names, without.rows[1].len()), (vec!["u".to_owned()], 1));
     }
 
     #[test]
@@ -371,7 +383,7 @@ mod tests {
             ("time,y\n,1", "line 2 has no time"),
             ("time,y\n0,1 2\n1,1", "line 3 has other numbers of values than the first"),
         ] {
-            assert_eq!(Table::parse(text).unwrap_err(), expected);
+            assert_eq!(Table::parse(text, |_| true).unwrap_err(), expected);
         }
     }
 }

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use super::finding::{Finding, Findings, Place, severity};
-use crate::error::Error;
+use crate::error::{Error, FmuProblem};
 use crate::host::{
     Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
@@ -138,6 +138,7 @@ pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<()
             Some(_) => "trial.call",
             // A call that was done, but not as the standard says.
             None if error.as_fmu_problem().is_none() => "trial.call",
+            None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
             None => "trial.load",
         };
         trial.tell(rule, None, &error.to_string());
@@ -254,10 +255,11 @@ impl Trial {
                 break;
             }
         }
+        let last = self.outputs(slave, variables)?;
+        // After the last look, since inputs move for it.
         if !set {
             self.derivatives(slave, description)?;
         }
-        let last = self.outputs(slave, variables)?;
         slave.terminate()?;
         Ok(last)
     }
