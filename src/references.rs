@@ -214,19 +214,28 @@ fn is_number(fmu: &Fmu, name: &str) -> bool {
     at.and_then(|at| description.variables.get(at)).is_none_or(Variable::is_number)
 }
 
-fn columns(fmu: &Fmu, names: &[String]) -> Result<Vec<Column>, Error> {
+/// The columns of a table, which must be as wide as the variables.
+fn columns(fmu: &Fmu, table: &Table) -> Result<Vec<Column>, Error> {
     let description = fmu.description();
-    let find = |name: &String| {
+    let find = |(c, name): (usize, &String)| {
+        let problem = |text: String| Error::fmu(fmu.path(), FmuProblem::References(text));
         let array = description.array(name).map(|array| array.first);
         let at = description.index_of(name).or(array).filter(|at| description.variables[*at].is_number());
         let Some(at) = at else {
-            let text = format!("there is no variable {name:?} that is a number");
-            return Err(Error::fmu(fmu.path(), FmuProblem::References(text)));
+            return Err(problem(format!("there is no variable {name:?} that is a number")));
         };
         let variable = &description.variables[at];
+        let width = table.rows.first().map(|row| row[c].len());
+        if width.is_some_and(|width| width != variable.count) {
+            let width = width.unwrap_or_default();
+            return Err(problem(format!(
+                "{name} has {width} numbers in a row; must have {}",
+                variable.count
+            )));
+        }
         Ok((variable.of, variable.value_reference, variable.count))
     };
-    names.iter().map(find).collect()
+    table.names.iter().enumerate().map(find).collect()
 }
 
 /// Runs the FMU over the times of `wanted`, with these inputs, and hands each row of its columns to `row`.
@@ -236,8 +245,8 @@ fn run(
     wanted: &Table,
     mut row: impl FnMut(Vec<Vec<f64>>),
 ) -> Result<(), Error> {
-    let outputs = columns(fmu, &wanted.names)?;
-    let given = columns(fmu, inputs.map_or(&[], |table| &table.names))?;
+    let outputs = columns(fmu, wanted)?;
+    let given = inputs.map(|table| columns(fmu, table)).transpose()?.unwrap_or_default();
     let mut slave = fmu.instantiate(fmu.description(), INSTANCE)?;
     let (Some(&start), Some(&stop)) = (wanted.times.first(), wanted.times.last()) else { return Ok(()) };
     slave.setup_experiment(start, stop)?;
@@ -315,6 +324,9 @@ impl Table {
             }
             let time = numbers.remove(0);
             let [time] = time[..] else { return Err(format!("line {number} has no time")) };
+            if !time.is_finite() {
+                return Err(format!("line {number}: the time is {time}; must be finite"));
+            }
             if table.times.last().is_some_and(|last| *last >= time) {
                 return Err(format!("line {number}: the time {time} is not after the one before"));
             }
@@ -381,6 +393,7 @@ mod tests {
             ("time,y\n0,one", "line 2: \"one\" is no number"),
             ("time,y\n0,1\n0,1", "line 3: the time 0 is not after the one before"),
             ("time,y\n,1", "line 2 has no time"),
+            ("time,y\nnan,1", "line 2: the time is NaN; must be finite"),
             ("time,y\n0,1 2\n1,1", "line 3 has other numbers of values than the first"),
         ] {
             assert_eq!(Table::parse(text, |_| true).unwrap_err(), expected);

@@ -390,6 +390,7 @@ fn results_that_an_fmu_carries_are_compared() {
     assert_eq!(referred(&other, &["--tolerance", "0.02"]), [""; 0]);
     for (results, expected) in [
         ("time,none\n0,1\n", "x.fmu: its references: there is no variable \"none\" that is a number"),
+        ("time,y\n0,1\n", "x.fmu: its references: y has 1 numbers in a row; must have 2"),
         ("time,z\n0\n", "x.fmu: its references: out.csv: line 2 has 1 fields; must have 2"),
     ] {
         assert_eq!(referred(results, &[]), [format!("error trial.references trial: {expected}")]);
