@@ -255,8 +255,8 @@ impl Trial {
                 break;
             }
         }
+        // Before derivatives are compared with differences: inputs that are set again belong to the present time.
         let last = self.outputs(slave, variables)?;
-        // After the last look, since inputs move for it.
         if !set {
             self.derivatives(slave, description)?;
         }

@@ -154,8 +154,16 @@ impl Instance {
     /// Checks that each number of a seed of the variables `indices` is finite.
     fn check_seed(&self, mut indices: impl Iterator<Item = usize>, seed: &[f64]) -> Result<(), Failure> {
         let Some(i) = seed.iter().position(|v| !v.is_finite()) else { return Ok(()) };
-        let name = indices.nth(i).map_or("", |index| &self.product.variables[index].name);
+        let name = indices.nth(i).map_or("", |index| self.scalar_name(index));
         Err(format!("the seed of {name} is {}, must be finite", seed[i]))
+    }
+
+    /// The name of the scalar `index`; of one beyond the table that of its variable.
+    fn scalar_name(&self, index: usize) -> &str {
+        match self.product.variables.get(index) {
+            Some(variable) => &variable.name,
+            None => &self.product.item_of(index).name,
+        }
     }
 
     /// Differentiates along the direction that is there.
@@ -191,11 +199,7 @@ impl Instance {
         match indices.find(|&i| !self.derivative[1][i].is_finite()) {
             None => Ok(()),
             Some(i) => {
-                let name = match self.product.variables.get(i) {
-                    Some(variable) => &variable.name,
-                    None => &self.product.item_of(i).name,
-                };
-                let value = self.derivative[1][i];
+                let (name, value) = (self.scalar_name(i), self.derivative[1][i]);
                 Err(format!("the derivative of {name} is {value}, must be finite"))
             }
         }

@@ -189,17 +189,21 @@ fn wrong_lengths_and_wrong_variables() {
 /// Where there is no derivative the run may go on: discarded, not an error.
 #[test]
 fn no_derivative_at_this_sample() {
-    let fmu = Fmu::of_fmi3(FILTER, true);
+    // Errors of the measurement have no derivative, as docs/fmu.md says.
+    let fmu = Fmu::of_fmi3(&format!("measurement_errors = {{ x_p = 0.1 }}\n{FILTER}"), true);
     let slave = Slave::ready(&fmu);
     let [x, u] = ["x", "u"].map(|name| fmu.item(name).reference());
-    slave.set_inputs(&[f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    slave.ok((API.set_debug_logging)(slave.instance, 1, 0, std::ptr::null()));
+    slave.set_inputs(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let both: [(Derivative, &[f64], usize); 2] =
         [(API.get_directional_derivative, &[1.0; 4], 2), (API.get_adjoint_derivative, &[1.0; 2], 4)];
     for (function, seed, length) in both {
         let (status, out) = asked(&slave, function, (&[u], &[x]), seed, length);
         assert_eq!(status, crate::api::DISCARD, "{:?}", slave.log.entries());
         assert!(out.iter().all(|v| *v == 7.5), "{out:?}");
+        let (status, category, message) = slave.log.entries().pop().unwrap();
+        assert_eq!((status, category.as_str()), (crate::api::DISCARD, "logStatusWarning"));
+        assert!(message.contains("no derivative at this sample"), "{message}");
     }
-    slave.set_inputs(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     slave.step(0.0, 0.1);
 }

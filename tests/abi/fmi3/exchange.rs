@@ -287,6 +287,11 @@ fn derivatives_of_the_rates() {
         slave.ok((API.get_adjoint_derivative)(slave.instance, u, 3, k, 2, s, 5, f, 3));
         assert_eq!(found, *wanted);
     }
+    // A seed that is no number is told by the name of the rate.
+    let (s, mut found) = ([0.0, f64::NAN, 0.0, 0.0, 0.0], [7.5; 3]);
+    let (s, f) = (s.as_ptr(), found.as_mut_ptr());
+    let status = (API.get_adjoint_derivative)(slave.instance, u, 3, k, 2, s, 5, f, 3);
+    assert!(slave.refused(status).contains("the seed of der(x) is NaN"));
     // At the start a state is the parameter it begins with.
     let slave = into_mode(&fmu, Mode::INITIALIZATION);
     let (x, x0) = (fmu.item("x").reference(), fmu.item("x0").reference());
