@@ -184,10 +184,10 @@ impl ParameterSet {
 }
 
 fn named(path: &str, name: &str) -> Result<(), Error> {
-    if name.is_empty() {
-        return Err(Error::invalid(path, "\"\"", "a text that is not empty"));
+    if name.is_empty() || forbidden_character(name).is_some() {
+        return Err(Error::invalid(path, format!("{name:?}"), "a non-empty text that XML can carry"));
     }
-    carried(path, name)
+    Ok(())
 }
 
 fn carried(path: &str, text: &str) -> Result<(), Error> {
