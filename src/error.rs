@@ -79,6 +79,8 @@ pub enum FmuProblem {
     Description(String),
     /// It offers no co-simulation interface.
     NoCoSimulation,
+    /// The references that it carries cannot be read; with the reason.
+    References(String),
     /// Its model identifier is not a C identifier, so it names no library.
     ModelIdentifier(String),
     /// No shared library for this platform.
@@ -125,6 +127,7 @@ impl fmt::Display for FmuProblem {
             }
             Self::Description(reason) => write!(f, "modelDescription.xml: {reason}"),
             Self::NoCoSimulation => f.write_str("has no co-simulation interface (no CoSimulation element)"),
+            Self::References(reason) => write!(f, "its references: {reason}"),
             Self::ModelIdentifier(name) => write!(f, "modelIdentifier {name:?} is not a C identifier"),
             Self::NoBinary { wanted, present } if present.is_empty() => {
                 write!(f, "holds no binary at all, so none for {wanted}")

@@ -1,4 +1,4 @@
-//! The library behind the `punctual` command line: a host for FMI 2.0 co-simulation FMUs, the
+//! The library behind the `punctual` command line: a host for co-simulation FMUs of FMI 2.0 and 3.0, the
 //! engine that couples them, recordings and pictures. `main.rs` only parses arguments.
 //!
 //! Each module uses only modules above it (`error` only names the statuses of `host`):
@@ -9,8 +9,9 @@
 //! host                 one FMU: archive, description, library, instance
 //! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
-//! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! recording            the rows of a run; CSV
+//! references           inputs and results that an FMU carries, for tools to check themselves
+//! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! outlines             the edges of safe sets in a plane
 //! coupling             several FMUs: system file, order, fixed-step master
 //! plot                 pictures of series; knows no FMU
@@ -41,6 +42,7 @@ pub mod page;
 pub mod pictures;
 pub mod plot;
 pub mod recording;
+pub mod references;
 pub mod report;
 pub mod reproduce;
 pub mod text;

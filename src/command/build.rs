@@ -27,6 +27,10 @@ pub struct Arguments {
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
+    /// Have the FMU carry inputs and the results that it gives here, by which a tool can check itself (FMI-LS-REF);
+    /// `punctual validate --references` does so
+    #[arg(long)]
+    references: bool,
 }
 
 /// The versions of FMI to build for.
@@ -71,7 +75,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
         let beside = several && fmi == FmiVersion::Three;
         let output = if beside { beside_it(&arguments.output) } else { arguments.output.clone() };
-        build(configuration, &arguments.libraries, &output)?;
+        build(configuration, &arguments.libraries, &output, arguments.references)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -84,8 +88,13 @@ fn beside_it(file: &Path) -> PathBuf {
     file.with_file_name(name)
 }
 
-fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<(), Error> {
-    let fmu = package::build(configuration, libraries, file)?;
+fn build(
+    configuration: Configuration,
+    libraries: &[PathBuf],
+    file: &Path,
+    references: bool,
+) -> Result<(), Error> {
+    let fmu = package::build(configuration, libraries, file, references)?;
     let description = fmu.description();
     let platform = description.version().platform();
     if !fmu.platforms().iter().any(|found| found == platform) {
@@ -124,6 +133,10 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
     if !arguments.libraries.is_empty() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
+    }
+    if arguments.references {
+        let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
+        return Err(Error::configuration("--references", message));
     }
     if arguments.fmi.is_some() || arguments.scalars {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";

@@ -48,13 +48,14 @@ pub(super) struct Network {
 /// Resolves `system` against the descriptions of its components' FMUs, one for each, in order.
 pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<Network, Error> {
     let resolver = Resolver { system, descriptions };
-    let links = resolver.links()?;
+    // First, since the sizes of arrays follow from them.
     let of_component = |c: usize| {
         let component = &system.components()[c];
         let unknown = |name: &str| resolver.missing(c, name);
         starts::resolve(c, component, descriptions[c], unknown)
     };
     let starts = (0..descriptions.len()).map(of_component).collect::<Result<_, _>>()?;
+    let links = resolver.links()?;
     let recorded = resolver.recorded(&links)?;
     resolver.check_pictures(&recorded)?;
     let (direct, delayed, notes) = resolver.order(&links);

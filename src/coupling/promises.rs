@@ -244,7 +244,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
             is_output.then_some(Port { component, variable })
         };
         let Some(status) = output("status") else { continue };
-        let is_state = |port: &Port| description.variables[port.variable].name.starts_with(STATE);
+        let is_state = |port: &Port| is_of(&description.variables[port.variable].name, STATE);
         let connected = links.iter().map(|link| link.to).filter(|port| port.component == component);
         let mut states: Vec<_> = connected.filter(is_state).collect();
         for variable in &description.variables {
@@ -278,11 +278,16 @@ fn is_filter(description: &Description) -> bool {
     promises && description.index_of("status").is_some()
 }
 
-/// The beginning of the names of the measured states of a filter.
-const STATE: &str = "x.";
+/// The measured states of a filter.
+const STATE: &str = "x";
 
-/// The beginning of the names of the wanted inputs of a filter.
-const WANTED: &str = "u_ref.";
+/// The wanted inputs of a filter.
+const WANTED: &str = "u_ref";
+
+/// Whether a variable is one of those called `all`: as `x.v`, or as an element of an array, `x[2]`.
+fn is_of(name: &str, all: &str) -> bool {
+    name.strip_prefix(all).is_some_and(|rest| rest.starts_with(['.', '[']))
+}
 
 /// The Real inputs of `component` that have neither a connection nor a start value in the system file.
 fn loose<'a>(
@@ -323,7 +328,7 @@ pub fn check_fed(
     for (component, description) in descriptions.iter().enumerate() {
         let mut loose = loose(system, component, description, links);
         let filter = is_filter(description);
-        loose.retain(|(port, name)| !(given.contains(port) || filter && name.starts_with(WANTED)));
+        loose.retain(|(port, name)| !(given.contains(port) || filter && is_of(name, WANTED)));
         let Some((_, first)) = loose.first() else { continue };
         let names: Vec<_> = loose.iter().take(NAMES).map(|(_, name)| *name).collect();
         let more = match loose.len() - names.len() {
@@ -346,7 +351,7 @@ pub fn check_fed(
 pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
     let mut notes = Vec::new();
     for (component, description) in descriptions.iter().enumerate().filter(|(_, d)| is_filter(d)) {
-        let wanted = |name: &str| name.starts_with(WANTED);
+        let wanted = |name: &str| is_of(name, WANTED);
         let inputs = description.variables.iter().filter(|v| v.causality == Causality::Input);
         let count = inputs.filter(|v| wanted(&v.name)).count();
         let loose = loose(system, component, description, links);

@@ -144,7 +144,13 @@ impl Fmu {
 
     /// The text of a file in its `resources/`; `None` where there is no such text.
     pub fn resource(&self, name: &str) -> Option<String> {
-        std::fs::read_to_string(self.archive.path(&format!("resources/{name}"))).ok()
+        self.text(&format!("resources/{name}"))
+    }
+
+    /// The text of an entry; `None` where there is no such text.
+    pub fn text(&self, entry: &str) -> Option<String> {
+        let is_there = self.archive.entries().iter().any(|other| other == entry);
+        is_there.then(|| std::fs::read_to_string(self.archive.path(entry)).ok())?
     }
 }
 

@@ -16,7 +16,7 @@ use crate::validate::symbols;
 pub const VARIABLE: &str = "PUNCTUAL_FMU_LIBRARY";
 
 /// A shared library that goes into an FMU.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Library {
     /// Its folder below `binaries/`, such as `linux64`.
     pub platform: &'static str,

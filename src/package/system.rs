@@ -57,7 +57,7 @@ fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>), Error> {
     let configuration = super::read_configuration(path)?;
     let folder = tempfile::tempdir().map_err(|e| Error::io("make a folder in", &std::env::temp_dir(), e))?;
     let file = folder.path().join("made.fmu");
-    Ok((super::build(configuration, &[], &file)?, read(&file)?))
+    Ok((super::build(configuration, &[], &file, false)?, read(&file)?))
 }
 
 /// The FMUs of a system, each file once.

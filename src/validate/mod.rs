@@ -29,7 +29,7 @@ pub use finding::{Finding, Place, rules};
 pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
-use crate::host::Archive;
+use crate::host::{Archive, Description};
 use finding::{DESCRIPTION, Findings};
 use model::Model;
 
@@ -50,12 +50,12 @@ impl Report {
 }
 
 /// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of the FMU is
-/// run.
+/// run. `references` compares with the results that the FMU carries, within this share of the largest number.
 ///
 /// # Errors
 ///
 /// The file cannot be read, or the trial's process cannot be started. Any defect of the FMU is a finding.
-pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
+pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
     let archive = match Archive::open(path) {
@@ -90,10 +90,11 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let reason = trial::reason_to_skip(&archive, model.version(), model.needs_tool(), &findings);
     let reason =
         reason.or_else(|| (!model.has_co_simulation()).then(|| "there is no co-simulation".to_owned()));
+    let reason = reason.or_else(|| Description::parse(&text).ok()?.obstacle());
     match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
-        (Some(limit), None) => trial::run(path, limit, &mut findings)?,
+        (Some(limit), None) => trial::run(path, limit, references, &mut findings)?,
     }
     Ok(Report { findings: findings.finish(), skipped })
 }

@@ -2,6 +2,7 @@
 //! there, so that its crash, hang or `exit()` is a finding.
 
 use std::collections::HashSet;
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use crate::host::{
     Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
 use crate::isolation::{self, Child, End, Voice};
+use crate::references::{Difference, References};
 
 /// The name of the trial's instance.
 const INSTANCE: &str = "trial";
@@ -69,10 +71,17 @@ pub(super) fn reason_to_skip(
     needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
-/// Tries the FMU in a child process, at most for `limit`.
-pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Result<(), Error> {
+/// Tries the FMU in a child process, at most for `limit`, and compares with its `references` within this share.
+pub(super) fn run(
+    path: &Path,
+    limit: Duration,
+    references: Option<f64>,
+    findings: &mut Findings,
+) -> Result<(), Error> {
     let child = Child::new()?;
-    let words = ["trial".into(), "--".into(), path.into(), child.folder().into()];
+    let mut words: Vec<OsString> = vec!["trial".into()];
+    words.extend(references.into_iter().flat_map(|share| ["--references".into(), share.to_string().into()]));
+    words.extend(["--".into(), path.into(), child.folder().into()]);
     let end = child.run(words, Voice::Silent, Some(limit))?;
     // Findings that the child wrote before its end. A line cut off by a crash is no finding.
     let told = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
@@ -109,17 +118,21 @@ fn findings_file(folder: &Path) -> PathBuf {
     folder.join("findings.jsonl")
 }
 
-/// Tries the FMU at `path` in this process. Its findings go into files in `folder`, at once.
+/// Tries the FMU at `path` in this process, and compares with its `references` within this share. Its findings go into files in `folder`, at once.
 ///
 /// # Errors
 ///
 /// The folder cannot be written to.
-pub fn perform(path: &Path, folder: &Path) -> Result<(), Error> {
+pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<(), Error> {
     isolation::settle(folder)?;
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
     let mut trial = Trial { file, told: HashSet::new() };
-    if let Err(error) = trial.all(path) {
+    let tried = trial.all(path).and_then(|fmu| match references {
+        Some(tolerance) => trial.references(&fmu, tolerance),
+        None => Ok(()),
+    });
+    if let Err(error) = tried {
         let rule = match error.as_call() {
             Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
             Some(_) => "trial.call",
@@ -151,7 +164,7 @@ impl Trial {
         let _ = serde_json::to_string(&finding).map(|line| self.file.write_all((line + "\n").as_bytes()));
     }
 
-    fn all(&mut self, path: &Path) -> Result<(), Error> {
+    fn all(&mut self, path: &Path) -> Result<Rc<Fmu>, Error> {
         let fmu = Rc::new(Fmu::open(path)?);
         let description = Rc::clone(fmu.description());
         let wanted: &[&str] = match description.version() {
@@ -189,6 +202,26 @@ impl Trial {
         }
         if !description.only_once {
             self.two_instances(&fmu, slave, plan);
+        }
+        Ok(fmu)
+    }
+
+    /// Compares with the results that the FMU carries.
+    fn references(&mut self, fmu: &Rc<Fmu>, tolerance: f64) -> Result<(), Error> {
+        let Some(references) = References::of(fmu)? else {
+            self.tell(
+                "trial.references",
+                None,
+                "the FMU carries no references, so there is nothing to compare with",
+            );
+            return Ok(());
+        };
+        for Difference { name, time, value, reference } in references.compare(fmu, tolerance)? {
+            let text = format!(
+                "is {value} at t = {} s, where its reference is {reference}; allowed is a share of {tolerance}",
+                crate::error::brief_time(time)
+            );
+            self.tell("trial.references", Some(&name), &text);
         }
         Ok(())
     }

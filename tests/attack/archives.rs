@@ -114,7 +114,7 @@ fn archives_with_edits() {
             }
         }
         std::fs::write(&path, archive).expect("a writable folder");
-        let report = validate(&path, None).expect("a report");
+        let report = validate(&path, None, None).expect("a report");
         let errors = report.count(Severity::Error);
         assert!(report.findings.iter().all(|f| !f.to_string().is_empty()));
         match Fmu::open(&path) {

@@ -29,6 +29,7 @@ mod pages;
 mod plugins;
 mod reproducing;
 mod running;
+mod sundry;
 mod surviving;
 mod table;
 mod trying;

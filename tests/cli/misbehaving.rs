@@ -1,4 +1,5 @@
-//! The FMU of `tests/fixtures/misbehaving.c`: sound but for one defect, which its GUID names.
+//! The FMUs of `tests/fixtures/misbehaving.c` and, of FMI 3.0, `sundry.c`: sound but for one defect, which the GUID or
+//! the instantiation token names.
 
 use std::collections::HashMap;
 use std::fs;
@@ -7,7 +8,7 @@ use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
 use punctual::host::PLATFORM;
-use punctual_modeldescription::Archive;
+use punctual_modeldescription::{Archive, fmi3};
 
 use crate::workshop::Workshop;
 
@@ -17,8 +18,18 @@ fn fixture(name: &str) -> PathBuf {
 
 /// The model description, with edits; each must touch something.
 pub(crate) fn description(defect: &str, edits: &[(&str, &str)]) -> String {
-    let mut xml = fs::read_to_string(fixture("misbehaving.xml")).expect("the fixture");
-    for (from, to) in [("guid=\"none\"", &*format!("guid=\"{defect}\""))].iter().chain(edits) {
+    edited("misbehaving.xml", &[&[("guid=\"none\"", &*format!("guid=\"{defect}\""))], edits].concat())
+}
+
+/// The model description of the FMU of FMI 3.0, with edits.
+pub(crate) fn sundry(defect: &str, edits: &[(&str, &str)]) -> String {
+    let token = format!("instantiationToken=\"{defect}\"");
+    edited("sundry.xml", &[&[("instantiationToken=\"none\"", &*token)], edits].concat())
+}
+
+fn edited(name: &str, edits: &[(&str, &str)]) -> String {
+    let mut xml = fs::read_to_string(fixture(name)).expect("the fixture");
+    for (from, to) in edits {
         assert!(xml.contains(from), "{from:?} in {xml}");
         xml = xml.replacen(from, to, 1);
     }
@@ -29,19 +40,24 @@ static COMPILED: Mutex<Option<HashMap<Vec<String>, Vec<u8>>>> = Mutex::new(None)
 
 /// The shared library, compiled with these macros by the system's C compiler, once.
 pub(crate) fn library(macros: &[&str]) -> Vec<u8> {
-    let key: Vec<String> = macros.iter().map(|name| format!("-D{name}")).collect();
-    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
-    let compiled = compiled.get_or_insert_default();
-    compiled.entry(key.clone()).or_insert_with(|| compile(&key)).clone()
+    compiled("misbehaving.c", macros)
 }
 
-fn compile(macros: &[String]) -> Vec<u8> {
+fn compiled(source: &str, macros: &[&str]) -> Vec<u8> {
+    let key: Vec<String> =
+        [source.to_owned()].into_iter().chain(macros.iter().map(|name| format!("-D{name}"))).collect();
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    let compiled = compiled.get_or_insert_default();
+    compiled.entry(key.clone()).or_insert_with(|| compile(source, &key[1..])).clone()
+}
+
+fn compile(source: &str, macros: &[String]) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let product = folder.path().join("library");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut command = Command::new(&compiler);
     command.args(["-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]).args(macros);
-    command.arg(fixture("misbehaving.c")).arg("-o").arg(&product).arg("-lm");
+    command.arg(fixture(source)).arg("-o").arg(&product).arg("-lm");
     let done = command.output().unwrap_or_else(|e| {
         panic!("these tests need a C compiler, and {compiler} (or what CC names) cannot be started: {e}")
     });
@@ -51,9 +67,18 @@ fn compile(macros: &[String]) -> Vec<u8> {
 
 /// Writes the FMU with this description and library.
 pub(crate) fn write(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, library: &[u8]) {
+    put(workshop, name, xml, &format!("{PLATFORM}/misbehaving"), library);
+}
+
+/// Writes the FMU of FMI 3.0 with this description, its library compiled with these macros.
+pub(crate) fn write_sundry(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, macros: &[&str]) {
+    put(workshop, name, xml, &format!("{}/sundry", fmi3::PLATFORM), &compiled("sundry.c", macros));
+}
+
+fn put(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, place: &str, library: &[u8]) {
     let mut archive = Archive::new();
     archive.add("modelDescription.xml", xml).expect("an entry");
     let suffix = std::env::consts::DLL_SUFFIX;
-    archive.add(&format!("binaries/{PLATFORM}/misbehaving{suffix}"), library).expect("an entry");
+    archive.add(&format!("binaries/{place}{suffix}"), library).expect("an entry");
     workshop.write(name, archive.to_bytes().expect("an archive"));
 }

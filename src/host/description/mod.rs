@@ -187,6 +187,10 @@ impl Description {
         if version.starts_with("3.") {
             return Self::of_fmi3(Arc::new(Fmi3Description::read(&document)?), &BTreeMap::new());
         }
+        if !version.is_empty() && !version.starts_with("2.") {
+            let text = format!("fmiVersion is {version:?}; this program runs FMUs of 2.0 and 3.0");
+            return Err(FmuProblem::Description(text));
+        }
         Fmi2Description::read(&document).map(|written| Self::of_fmi2(Arc::new(written)))
     }
 
