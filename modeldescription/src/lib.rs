@@ -1,4 +1,4 @@
-//! Model descriptions of FMI 2.0 co-simulation and of FMI 3.0 ([`fmi3`]) from typed variables, SSP 1.0 system
+//! Model descriptions of FMI 2.0 co-simulation and of FMI 3.0 ([`fmi3`]) from typed variables, SSP system
 //! structures, and reproducible `.fmu` and `.ssp` archives.
 //!
 //! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
@@ -24,7 +24,7 @@
 //! | `read`, `notes` | the file, read, with the positions of its parts |
 //! | `names` | characters and forms of a text, a C identifier and a structured name |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
-//! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and their rules |
+//! | `system_structure` | several FMUs as one SSP 1.0 or 2.0 system: its files, and their rules |
 //! | `archive` | the zip file |
 //!
 //! # Example
@@ -107,7 +107,7 @@ pub use read::Located;
 pub use rules::{Place, RULES, Severity, UnknownList, Violation, brief};
 pub use structure::{ModelStructure, Unknown};
 pub use system_structure::{
-    Connector, ParameterSet, ParameterValue, SystemComponent, SystemConnection, SystemStructure,
+    Connector, ParameterSet, ParameterValue, SspVersion, SystemComponent, SystemConnection, SystemStructure,
 };
 pub use unit::{BaseUnit, DisplayUnit, Unit};
 pub use variable::{
