@@ -249,7 +249,8 @@ impl Participant for Instance {
             return Err(self.handle.broken("fmi3DoStep", how));
         }
         let asked = time + step;
-        if self.off.is_none() && !((reached - asked).abs() <= ON_TIME * step) {
+        let is_on_time = (reached - asked).abs() <= ON_TIME * step;
+        if self.off.is_none() && !is_on_time {
             self.off = Some((asked, reached));
         }
         Ok(())
