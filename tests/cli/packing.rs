@@ -156,3 +156,69 @@ fn what_is_no_system_of_fmus() {
     let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp"]);
     done.fails_like(1, "plant (plant.fmu): not a readable FMU archive: ", &[]);
 }
+
+const ARRAYS: &str = r#"
+[experiment]
+stop_time = 1.0
+step = 0.5
+
+[[component]]
+name = "filter"
+fmu = "filter.fmu"
+start = { u_ref = [0.5, 0.25] }
+
+[[component]]
+name = "plant"
+fmu = "plant.fmu"
+
+[[connection]]
+from = "filter.u"
+to = "plant.u"
+
+[[connection]]
+from = "plant.x"
+to = "filter.x"
+"#;
+
+/// Arrays of FMI 3.0 have a place in SSP 2.0 only, and as a whole only.
+#[test]
+fn arrays_are_packed_by_version_two() {
+    let workshop = Workshop::with_library();
+    for name in ["filter", "plant"] {
+        let file = examples().join(format!("unicycle-{name}.toml"));
+        workshop.write(&format!("{name}.toml"), fs::read(file).expect("an example"));
+        let (from, to) = (format!("{name}.toml"), format!("{name}.fmu"));
+        workshop.punctual(["build", &from, "--fmi", "3", "-o", &to]).success();
+    }
+    workshop.write("my.toml", ARRAYS);
+    let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp"]);
+    done.fails_like(
+        2,
+        "my.toml: component[0]: ",
+        &["is an array, for which SSP 1.0 has no place", "`--ssp 2`"],
+    );
+    let said = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]).success();
+    assert_eq!(said, "my.ssp: 2 components from 2 FMUs, 2 connections, 1 start values\n");
+    let ssd = entry(&workshop, "my.ssp", "SystemStructure.ssd");
+    for part in [
+        r#"version="2.0" name="my""#,
+        "<ssd:Connector name=\"u\" kind=\"output\">\n            <ssc:Real/>\n            <ssc:Dimension size=\"2\"/>",
+        r#"startElement="filter" startConnector="u" endElement="plant" endConnector="u""#,
+        r#"startElement="plant" startConnector="x" endElement="filter" endConnector="x""#,
+    ] {
+        assert!(ssd.contains(part), "{part} is not in\n{ssd}");
+    }
+    assert!(!ssd.contains("\"u[1]\""), "{ssd}");
+    let ssv = entry(&workshop, "my.ssp", "resources/start_values.ssv");
+    assert!(ssv.contains(r#"<ssv:Real value="0.5 0.25"/>"#), "{ssv}");
+    // An element alone has no place.
+    workshop.write("my.toml", ARRAYS.replace("u_ref = [0.5, 0.25]", "\"u_ref[1]\" = 0.5"));
+    let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]);
+    done.fails_like(2, "my.toml: component[0].start.\"u_ref[1]\": ", &["is an element of u_ref"]);
+    let halves = ARRAYS.replace("filter.u\"", "filter.u[1]\"").replace("plant.u\"", "plant.u[1]\"");
+    workshop.write("my.toml", halves);
+    let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]);
+    done.fails(2, "my.toml: connect: filter.u and plant.u are connected in parts; SSP connects arrays of the same sizes as a whole");
+    let done = workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--ssp", "2"]);
+    done.fails(2, "--ssp: is for an .ssp file, which is made from a system file");
+}
