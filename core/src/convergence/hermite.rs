@@ -21,11 +21,11 @@ use crate::MAX_RELATIVE_DEGREE;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Hermite;
 
-impl Profile for Hermite {
-    /// Entries above n are 0.
+impl Hermite {
+    /// [`Profile::evaluate`] for n = `N`.
     #[inline(always)]
-    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
-        let n = anchor.len();
+    fn of_degree<const N: usize>(anchor: &[f64; N], deadline: f64, elapsed: f64) -> Derivatives {
+        let n = N;
         let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
         if elapsed >= deadline {
             return r;
@@ -61,6 +61,24 @@ impl Profile for Hermite {
             r[k] *= scale;
         }
         r
+    }
+}
+
+impl Profile for Hermite {
+    /// Entries above n are 0.
+    #[inline(always)]
+    fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
+        const { assert!(MAX_RELATIVE_DEGREE == 8, "the degrees below") };
+        // With n known to the compiler the short loops unroll.
+        macro_rules! by_degree {
+            ($($n:literal),*) => {
+                match anchor.len() {
+                    $($n => anchor.first_chunk::<$n>().map(|a| Self::of_degree(a, deadline, elapsed)),)*
+                    _ => None,
+                }
+            };
+        }
+        by_degree!(1, 2, 3, 4, 5, 6, 7, 8).unwrap_or([0.0; MAX_RELATIVE_DEGREE + 1])
     }
 
     /// Linear in the anchor.

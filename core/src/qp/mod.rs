@@ -139,6 +139,16 @@ impl Bounds {
         value.max(self.min[i]).min(self.max[i])
     }
 
+    /// [`Self::contain`], unrolled.
+    #[inline(always)]
+    pub(crate) fn contain_all<const M: usize>(&self, u: &[f64; M]) -> bool {
+        let mut all = true;
+        for i in 0..M {
+            all &= (self.min[i] <= u[i]) & (u[i] <= self.max[i]);
+        }
+        all
+    }
+
     /// Whether every component of `u` lies within its bounds.
     pub fn contain(&self, u: &[f64]) -> bool {
         u.iter().enumerate().all(|(i, v)| self.min[i] <= *v && *v <= self.max[i])

@@ -7,7 +7,7 @@
 
 use core::array::from_fn;
 
-use super::{Bounds, Enforcement, MAX_INPUTS, Problem, ROUND_OFF, Row};
+use super::{Enforcement, MAX_INPUTS, Problem, ROUND_OFF, Row};
 
 /// Squared lengths and slacks in this range can neither overflow nor lose digits on the way.
 const SIZES: core::ops::Range<f64> = 1e-150..1e150;
@@ -39,7 +39,7 @@ pub(super) fn solve(p: &Problem, u: &mut [f64]) -> Option<Answer> {
 
 fn solve_for<const M: usize>(p: &Problem, u: &mut [f64]) -> Option<Answer> {
     let u_ref: &[f64; M] = p.u_ref.first_chunk()?;
-    if !within(p.bounds, u_ref) {
+    if !p.bounds.contain_all(u_ref) {
         return None;
     }
     // Find the row furthest from u_ref: its distance² as a fraction, by slack and ‖a‖².
@@ -79,7 +79,7 @@ fn solve_for<const M: usize>(p: &Problem, u: &mut [f64]) -> Option<Answer> {
     let holds = slack_at(row, &on_row)
         >= -ROUND_OFF * (row.floor.abs() + sum::<M>(|i| (row.normal[i] * on_row[i]).abs()));
     let near = multiplier * multiplier * length <= p.correction_limit * p.correction_limit;
-    if !(holds && near && within(p.bounds, &on_row)) {
+    if !(holds && near && p.bounds.contain_all(&on_row)) {
         return None;
     }
     for (k, row) in p.rows.iter().enumerate() {
@@ -105,14 +105,4 @@ fn sum<const M: usize>(term: impl Fn(usize) -> f64) -> f64 {
 #[inline(always)]
 fn slack_at<const M: usize>(row: &Row, u: &[f64; M]) -> f64 {
     sum::<M>(|i| row.normal[i] * u[i]) - row.floor
-}
-
-/// [`Bounds::contain`].
-#[inline(always)]
-fn within<const M: usize>(bounds: &Bounds, u: &[f64; M]) -> bool {
-    let mut all = true;
-    for i in 0..M {
-        all &= (bounds.min[i] <= u[i]) & (u[i] <= bounds.max[i]);
-    }
-    all
 }

@@ -190,19 +190,19 @@ impl PeriodProblem<'_> {
     ) -> Option<Solution> {
         let (out, u_ref): (&mut [f64; M], &[f64; M]) = (u.first_chunk_mut()?, self.u_ref.first_chunk()?);
         let (chosen, mut u) = self.furthest(u_ref)?;
-        if !self.soft().is_empty() || !self.bounds.contain(u_ref) || !self.bounds.contain(&u) {
+        if !self.soft().is_empty() || !self.bounds.contain_all(u_ref) || !self.bounds.contain_all(&u) {
             return None;
         }
         // Does u_ref violate the row over the period too?
         let requirement = &self.requirements[chosen];
-        let from = self.weighted(requirement, u_ref, at.ahead)?;
-        let normal: [f64; M] = *from.normal.first_chunk()?;
+        let at_reference = self.weighted(requirement, u_ref, at.ahead)?;
+        let normal: [f64; M] = *at_reference.normal.first_chunk()?;
         let moved: f64 = (0..M).map(|i| (normal[i] * u_ref[i]).abs()).sum();
-        if from.value >= -MET * (from.terms + moved) {
+        if at_reference.value >= -MET * (at_reference.terms + moved) {
             return None;
         }
         // From the answer of the pointwise row to that of the row itself.
-        let mut row = Bent { value: from.value, normal, hessian: [[0.0; M]; M] };
+        let mut row = Bent { value: at_reference.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
         let (mut way, mut turned) = ([0.0; M], [0.0; M]);
@@ -230,13 +230,13 @@ impl PeriodProblem<'_> {
             (step, lambda) = row.nearest(&back)?;
             let target: [f64; M] = core::array::from_fn(|i| u[i] + step[i]);
             // Not-a-number is not within bounds.
-            if !self.bounds.contain(&target) || lambda <= 0.0 {
+            if !self.bounds.contain_all(&target) || lambda <= 0.0 {
                 return None;
             }
-            at.rows[chosen] = Row::linear(&row.normal, row.value, &u);
             let (shortened, size) = (largest(&step) / length, largest(&u).max(largest(&target)).max(1.0));
             let before_length = length;
-            (u, length) = (target, largest(&step));
+            let from = core::mem::replace(&mut u, target);
+            length = largest(&step);
             // Methods of secants: a step is as the product of the two before it, where they have shown how the row bends.
             let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
             let next = match bends_aside {
@@ -244,6 +244,7 @@ impl PeriodProblem<'_> {
                 false => shortened.max(turn) * length / SKIPPED,
             };
             if length == 0.0 || rounds > 0 && next <= MET * size {
+                at.rows[chosen] = Row::linear(&row.normal, row.value, &from);
                 break (lambda, turn);
             }
             rounds += 1;
@@ -255,7 +256,7 @@ impl PeriodProblem<'_> {
         };
         // How far the row bends between u_ref and the answer, and how far its normal turns there, as parts of themselves.
         let square = product(&row.normal, &row.normal);
-        let missed = (from.value + lambda * square).abs() / (lambda * square);
+        let missed = (at_reference.value + lambda * square).abs() / (lambda * square);
         let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
         let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
         let ratio = ratio.max(bend).max(turn);
