@@ -1,7 +1,7 @@
 //! Elementary functions of numbers, with the same bits on every operating system and processor.
 //!
 //! The functions of the C library, which `f64::sin` and the like call, differ in the last bits between systems and between
-//! its versions. These come from the crate [`libm`], in Rust, so that a filter, a plant and a barrier give the same
+//! its versions. These are in Rust, sine and cosine here and the others in the crate [`libm`], so that a filter, a plant and a barrier give the same
 //! numbers everywhere. [`Scalar`](crate::scalar::Scalar) takes them for `f64`; take them for plain numbers beside a model,
 //! such as a nominal controller's. Without std they are there all the same. Of 10,000 results each, none was further from the
 //! exact one than 0.94 units in the last place; of `atan2`, `tanh` and `erfc` 1.4, 1.9 and 2.4.
@@ -250,7 +250,7 @@ mod tests {
         for i in 0..200_000 {
             angles.push(powi(10.0, i % 324 - 16) * draw());
             angles.push(powi(10.0, i % 26 - 16) * draw());
-            let eighths = (i % 4096) as f64 * core::f64::consts::FRAC_PI_4;
+            let eighths = f64::from(i % 4096) * core::f64::consts::FRAC_PI_4;
             angles.push(eighths * (1.0 + 1e-3 * powi(10.0, -(i % 14)) * (draw() - 0.5)));
         }
         let (mut others, count) = (0, 4 * angles.len());

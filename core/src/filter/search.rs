@@ -7,7 +7,8 @@
 //! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
 //! evaluated where the search ends.
 //!
-//! Most rows are all but affine, and a few corrections from u_ref find the answer (`correction`). Where they do not, there
+//! Mostly one row is active and all but affine, and its point nearest to u_ref is found at once (`bent_row`). With several, a
+//! few corrections from u_ref find the answer (`correction`). Where they do not, there
 //! are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
 //! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
 //! guess matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn

@@ -332,3 +332,50 @@ impl PeriodProblem<'_> {
 }
 
 const _: () = assert!(MAX_INPUTS >= 3, "a gradient has room for so many inputs");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// r(u) = 1 − (u₁ + 2)² − 3u₂²/2 + u₁u₂: the inside of an ellipse.
+    const HESSIAN: Matrix<2> = [[-2.0, 1.0], [1.0, -3.0]];
+
+    fn inside(u: [f64; 2]) -> Bent<2> {
+        let normal = [-2.0 * (u[0] + 2.0) + u[1], u[0] - 3.0 * u[1]];
+        let value = 1.0 - (u[0] + 2.0).powi(2) - 1.5 * u[1] * u[1] + u[0] * u[1];
+        Bent { value, normal, hessian: HESSIAN }
+    }
+
+    /// The way solves (K), from wherever it begins.
+    #[test]
+    fn the_nearest_point_of_a_bent_row() {
+        let u_ref = [0.1, 0.3];
+        let mut answers = [[-1.1, -0.4], [-0.9, -0.2]].map(|u: [f64; 2]| {
+            let back = [u_ref[0] - u[0], u_ref[1] - u[1]];
+            let (step, lambda) = inside(u).nearest(&back).expect("a bend that is not large");
+            let u = [u[0] + step[0], u[1] + step[1]];
+            let Bent { value, normal, .. } = inside(u);
+            // A dozen operations on numbers of order 1, and λ to the square of the last change.
+            assert!(value.abs() < 1e-11 && lambda > 0.0, "{value}");
+            for i in 0..2 {
+                assert!((u[i] - u_ref[i] - lambda * normal[i]).abs() < 1e-11, "{u:?}");
+            }
+            u
+        });
+        let [a, b] = &mut answers;
+        assert!((a[0] - b[0]).abs() < 1e-11 && (a[1] - b[1]).abs() < 1e-11, "{a:?}, {b:?}");
+    }
+
+    /// Two steps in different directions show all of a constant Hessian, each change as little as it must be.
+    #[test]
+    fn the_hessian_is_learned_from_two_steps() {
+        let exact = inside([0.0; 2]);
+        let mut row = Bent { hessian: [[0.0; 2]; 2], ..inside([0.0; 2]) };
+        for step in [[0.3, 0.4], [-0.4, 0.3]] {
+            row.learn(&step, &exact.turn(&step));
+        }
+        for (found, wanted) in row.hessian.as_flattened().iter().zip(HESSIAN.as_flattened()) {
+            assert!((found - wanted).abs() < 1e-14, "{:?}", row.hessian);
+        }
+    }
+}
