@@ -1,11 +1,11 @@
-//! FMI 2.0 co-simulation model descriptions from typed variables, SSP 1.0 system structures, and
-//! reproducible `.fmu` and `.ssp` archives.
+//! Model descriptions of FMI 2.0 co-simulation and of FMI 3.0 ([`fmi3`]) from typed variables, SSP system
+//! structures, and reproducible `.fmu` and `.ssp` archives.
 //!
 //! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
 //! of what the slave computes, reads no file and no environment variable and prints nothing.
 //!
 //! A [`ModelDescription`] is plain data with public fields: one model for code that writes a description, reads
-//! one or looks for defects in one. [`ModelDescription::to_xml`] checks it against the rules of FMI 2.0.x that an
+//! one or looks for defects in one. [`ModelDescription::to_xml`] checks it against the rules of the standard that an
 //! XML schema cannot express ([`RULES`]), then writes it. With the feature `read`, `Located` takes it from a
 //! file, however broken, with the positions of its parts, and tells which of the same rules it breaks. With the
 //! feature `archive` (on by default), `Archive` collects the files of an FMU and writes them so that the same
@@ -17,13 +17,14 @@
 //! | `unit` | units in terms of SI base units |
 //! | `description` | the whole description, its types, log categories and experiment |
 //! | `structure` | outputs, initial unknowns and their dependencies as variable indices |
-//! | `rules` | the rules of the standard beyond the schema, for descriptions written and read |
+//! | `fmi3` | the same for FMI 3.0, and its terminals |
+//! | `rules` | the rules of both standards beyond the schema, for descriptions written and read |
 //! | `validate` | further conditions on a description that is to be written |
 //! | `xml` | the file, written |
 //! | `read`, `notes` | the file, read, with the positions of its parts |
 //! | `names` | characters and forms of a text, a C identifier and a structured name |
 //! | `xsd`, `calendar`, `words` | values of XML Schema, valid dates, the spellings of enums |
-//! | `system_structure` | several FMUs as one SSP 1.0 system: its files, and their rules |
+//! | `system_structure` | several FMUs as one SSP 1.0 or 2.0 system: its files, and their rules |
 //! | `archive` | the zip file |
 //!
 //! # Example
@@ -68,7 +69,8 @@
 //!
 //! Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4: section 2.2
 //! (description schema), 2.2.7 (variables), 2.2.8 (model structure), 2.2.9 (names), 2.3 (archive),
-//! 4.3.1 (co-simulation capabilities).
+//! 4.3.1 (co-simulation capabilities). The same, version 3.0.2: section 2.4 (description schema), 2.4.9
+//! (terminals), 2.5 (archive), 3.4 and 4.4 (capabilities).
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "archive")]
@@ -105,7 +107,7 @@ pub use read::Located;
 pub use rules::{Place, RULES, Severity, UnknownList, Violation, brief};
 pub use structure::{ModelStructure, Unknown};
 pub use system_structure::{
-    Connector, ParameterSet, ParameterValue, SystemComponent, SystemConnection, SystemStructure,
+    Connector, ParameterSet, ParameterValue, SspVersion, SystemComponent, SystemConnection, SystemStructure,
 };
 pub use unit::{BaseUnit, DisplayUnit, Unit};
 pub use variable::{

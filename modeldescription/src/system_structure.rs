@@ -1,7 +1,8 @@
-//! System Structure and Parameterization 1.0: components, their connectors and connections as
-//! `SystemStructure.ssd`, start values as an `.ssv` parameter set.
+//! System Structure and Parameterization 1.0 and 2.0: components, their connectors and connections as
+//! `SystemStructure.ssd`, start values as an `.ssv` parameter set. Both versions have the same namespaces; 2.0 has arrays.
 
 use crate::names::forbidden_character;
+use crate::words::words;
 use crate::xml::{container, text};
 use crate::xsd::Number;
 use crate::{Causality, DefaultExperiment, Error, SimpleType, VariableKind};
@@ -11,9 +12,23 @@ const SSD: &str = "http://ssp-standard.org/SSP1/SystemStructureDescription";
 const SSC: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
 const SSV: &str = "http://ssp-standard.org/SSP1/SystemStructureParameterValues";
 
+/// A version of SSP.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SspVersion {
+    /// 1.0: scalars only.
+    #[default]
+    One,
+    /// 2.0: arrays too.
+    Two,
+}
+
+words!(SspVersion: One "1.0", Two "2.0");
+
 /// A coupled system, as the file `SystemStructure.ssd` at the root of an `.ssp` archive.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SystemStructure {
+    /// The version to write.
+    pub version: SspVersion,
     /// The name of the system; not empty.
     pub name: String,
     /// Meaning for a human; empty: the attribute is absent.
@@ -54,6 +69,8 @@ pub struct Connector {
     /// Its type, an enumeration with the name of one of the system as its declared type. Start value, range and
     /// unit are not written.
     pub kind: VariableKind,
+    /// The sizes of an array, each at least 1; empty: a scalar. In SSP 2.0 only.
+    pub dimensions: Vec<u64>,
 }
 
 /// A signal from an output to an input: `end = factor · start + offset`, without conversion of units.
@@ -72,6 +89,8 @@ pub struct SystemConnection {
 /// Values by name, as an `.ssv` file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
+    /// The version to write.
+    pub version: SspVersion,
     /// The name of the set; not empty.
     pub name: String,
     /// Names, unique, and values.
@@ -91,6 +110,12 @@ pub enum ParameterValue {
     String(String),
     /// The name of an item of an enumeration.
     Enumeration(String),
+    /// The finite doubles of an array, row by row; at least one. In SSP 2.0 only.
+    Reals(Vec<f64>),
+    /// The 32-bit integers of an array, row by row; at least one. In SSP 2.0 only.
+    Integers(Vec<i32>),
+    /// The truth values of an array, row by row; at least one. In SSP 2.0 only.
+    Booleans(Vec<bool>),
 }
 
 impl SystemStructure {
@@ -120,6 +145,12 @@ impl SystemStructure {
                 if kind(connector.causality).is_none() {
                     let allowed = "input, output, parameter or calculatedParameter";
                     return Err(Error::invalid(path(), connector.causality.as_str(), allowed));
+                }
+                for size in &connector.dimensions {
+                    if self.version == SspVersion::One || *size == 0 {
+                        let allowed = "none in SSP 1.0, at least 1 in SSP 2.0";
+                        return Err(Error::invalid(format!("{}.dimensions", path()), size, allowed));
+                    }
                 }
                 if let VariableKind::Enumeration(of) = &connector.kind
                     && !self.enumerations.iter().any(|e| Some(&e.name) == of.declared_type.as_ref())
@@ -164,17 +195,28 @@ impl ParameterSet {
             if self.parameters[..i].iter().any(|(other, _)| other == name) {
                 return Err(Error::invalid(path, format!("{name:?}"), "a name used once"));
             }
+            let elements = match value {
+                ParameterValue::Reals(list) => Some(list.len()),
+                ParameterValue::Integers(list) => Some(list.len()),
+                ParameterValue::Booleans(list) => Some(list.len()),
+                _ => None,
+            };
+            if let Some(elements) = elements.filter(|n| *n == 0 || self.version == SspVersion::One) {
+                let allowed = "one value in SSP 1.0; at least one element in SSP 2.0";
+                return Err(Error::invalid(path, format!("an array of {elements}"), allowed));
+            }
             match value {
                 ParameterValue::Real(value) => finite(&path, *value)?,
+                ParameterValue::Reals(list) => list.iter().try_for_each(|value| finite(&path, *value))?,
                 ParameterValue::Enumeration(item) => named(&path, item)?,
                 ParameterValue::String(text) => carried(&path, text)?,
-                ParameterValue::Integer(_) | ParameterValue::Boolean(_) => {}
+                _ => {}
             }
         }
         text(&SsvRoot {
             ssv: SSV,
             ssc: SSC,
-            version: "1.0",
+            version: self.version.as_str(),
             name: &self.name,
             parameters: Parameters {
                 parameters: self.parameters.iter().map(|(name, value)| Parameter::new(name, value)).collect(),
@@ -184,10 +226,10 @@ impl ParameterSet {
 }
 
 fn named(path: &str, name: &str) -> Result<(), Error> {
-    if name.is_empty() {
-        return Err(Error::invalid(path, "\"\"", "a text that is not empty"));
+    if name.is_empty() || forbidden_character(name).is_some() {
+        return Err(Error::invalid(path, format!("{name:?}"), "a non-empty text that XML can carry"));
     }
-    carried(path, name)
+    Ok(())
 }
 
 fn carried(path: &str, text: &str) -> Result<(), Error> {
@@ -297,9 +339,10 @@ struct ConnectorElement<'a> {
     #[serde(rename = "@kind")]
     kind: &'static str,
     #[serde(rename = "$value")]
-    of_type: TypeElement<'a>,
+    content: Vec<TypeElement<'a>>,
 }
 
+/// The type of a connector, or after it the size of a dimension.
 #[derive(Serialize)]
 enum TypeElement<'a> {
     #[serde(rename = "ssc:Real")]
@@ -312,6 +355,14 @@ enum TypeElement<'a> {
     String(Empty),
     #[serde(rename = "ssc:Enumeration")]
     Enumeration(Named<'a>),
+    #[serde(rename = "ssc:Dimension")]
+    Dimension(Size),
+}
+
+#[derive(Serialize)]
+struct Size {
+    #[serde(rename = "@size")]
+    size: u64,
 }
 
 #[derive(Serialize)]
@@ -422,6 +473,12 @@ enum ValueElement<'a> {
     String(Valued<&'a str>),
     #[serde(rename = "ssv:Enumeration")]
     Enumeration(Valued<&'a str>),
+    #[serde(rename = "ssv:Real")]
+    Reals(Valued<Vec<Number>>),
+    #[serde(rename = "ssv:Integer")]
+    Integers(Valued<&'a [i32]>),
+    #[serde(rename = "ssv:Boolean")]
+    Booleans(Valued<&'a [bool]>),
 }
 
 #[derive(Serialize)]
@@ -437,6 +494,11 @@ impl<'a> Parameter<'a> {
             ParameterValue::Integer(i) => ValueElement::Integer(Valued { value: *i }),
             ParameterValue::Boolean(b) => ValueElement::Boolean(Valued { value: *b }),
             ParameterValue::String(text) => ValueElement::String(Valued { value: text }),
+            ParameterValue::Reals(list) => {
+                ValueElement::Reals(Valued { value: list.iter().map(|x| Number(*x)).collect() })
+            }
+            ParameterValue::Integers(list) => ValueElement::Integers(Valued { value: list }),
+            ParameterValue::Booleans(list) => ValueElement::Booleans(Valued { value: list }),
             ParameterValue::Enumeration(item) => ValueElement::Enumeration(Valued { value: item }),
         };
         Self { name, value }
@@ -457,7 +519,7 @@ impl<'a> SsdRoot<'a> {
         Self {
             ssd: SSD,
             ssc: SSC,
-            version: "1.0",
+            version: s.version.as_str(),
             name: &s.name,
             description: &s.description,
             generation_tool: &s.generation_tool,
@@ -480,10 +542,8 @@ impl<'a> SsdRoot<'a> {
 
 impl<'a> ComponentElement<'a> {
     fn new(component: &'a SystemComponent) -> Self {
-        let connector = |c: &'a Connector| ConnectorElement {
-            name: &c.name,
-            kind: kind(c.causality).unwrap_or_default(),
-            of_type: match &c.kind {
+        let content = |c: &'a Connector| {
+            let of_type = match &c.kind {
                 VariableKind::Real(_) => TypeElement::Real(Empty {}),
                 VariableKind::Integer(_) => TypeElement::Integer(Empty {}),
                 VariableKind::Boolean(_) => TypeElement::Boolean(Empty {}),
@@ -491,7 +551,14 @@ impl<'a> ComponentElement<'a> {
                 VariableKind::Enumeration(of) => {
                     TypeElement::Enumeration(Named { name: of.declared_type.as_deref().unwrap_or_default() })
                 }
-            },
+            };
+            let sizes = c.dimensions.iter().map(|&size| TypeElement::Dimension(Size { size }));
+            std::iter::once(of_type).chain(sizes).collect()
+        };
+        let connector = |c: &'a Connector| ConnectorElement {
+            name: &c.name,
+            kind: kind(c.causality).unwrap_or_default(),
+            content: content(c),
         };
         Self {
             name: &component.name,

@@ -189,12 +189,6 @@ const OF_THE_STANDARD: &[Row] = &[
         },
     ),
     (
-        "structure.Outputs[0]: Output: dependenciesKind \"constant\" of \"status\", which is Enumeration; allowed here: dependent",
-        |d| {
-            d.structure.outputs[0].dependency_kinds = Some(vec!["constant".into(), "dependent".into()]);
-        },
-    ),
-    (
         "structure.InitialUnknowns[2]: InitialUnknown: dependenciesKind \"fixed\"; allowed here: dependent, constant",
         |d| {
             d.structure.initial_unknowns[2].dependencies = Some(vec![5]);
@@ -280,17 +274,36 @@ fn each_defect_is_refused_in_its_words() {
 }
 
 #[test]
-fn a_derivative_that_is_not_listed_is_a_warning() {
-    let mut description = small3();
-    description.structure.derivatives.clear();
-    description.structure.initial_unknowns.retain(|unknown| unknown.value_reference != 21);
-    let xml = description.to_xml().expect("a warning refuses nothing");
-    let mut found = Vec::new();
-    Located::read(&Document::parse(&xml).expect("well-formed"))
-        .check(&mut |v| found.push((v.rule, v.message)));
-    let message = "ContinuousStateDerivative does not list \"der(y)\" (value reference 21)".to_owned();
-    assert!(found.contains(&("structure.states", message)), "{found:?}");
-    assert!(RULES.iter().any(|row| row.0 == "structure.states" && row.1 == Severity::Warning));
+fn warnings_refuse_nothing() {
+    let rows: [(&str, Row); 2] = [
+        (
+            "structure.states",
+            ("ContinuousStateDerivative does not list \"der(y)\" (value reference 21)", |d| {
+                d.structure.derivatives.clear();
+                d.structure.initial_unknowns.retain(|unknown| unknown.value_reference != 21);
+            }),
+        ),
+        (
+            "structure.kinds",
+            (
+                "Output: dependenciesKind \"constant\" of \"status\", which is Enumeration; allowed here: dependent",
+                |d| {
+                    d.structure.outputs[0].dependency_kinds =
+                        Some(vec!["constant".into(), "dependent".into()]);
+                },
+            ),
+        ),
+    ];
+    for (rule, (message, break_it)) in rows {
+        let mut description = small3();
+        break_it(&mut description);
+        let xml = description.to_xml().expect("a warning refuses nothing");
+        let mut found = Vec::new();
+        let document = Document::parse(&xml).expect("well-formed");
+        Located::read(&document).check(&mut |v| found.push((v.rule, v.message)));
+        assert!(found.contains(&(rule, message.to_owned())), "{found:?}");
+        assert!(RULES.iter().any(|row| row.0 == rule && row.1 == Severity::Warning));
+    }
 }
 
 #[test]

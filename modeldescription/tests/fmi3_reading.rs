@@ -124,6 +124,23 @@ fn what_cannot_be_read_is_noted() {
 }
 
 #[test]
+fn lists_that_are_there_but_empty_hold_nothing() {
+    let xml = small3().to_xml().expect("valid");
+    for (from, to, rule) in [
+        ("<Start value=\"0FA0\"/>", "<Start/>", "variable.start"),
+        ("start=\"255\"", "start=\" \"", ""),
+        ("name=\"rearm\"", "name=\"rearm\" clocks=\"\"", "variable.clock"),
+    ] {
+        let mut rules = Vec::new();
+        let broken = xml.replacen(from, to, 1);
+        assert_ne!(broken, xml, "{from}");
+        read(&broken).check(&mut |violation| rules.push(violation.rule));
+        rules.retain(|rule| *rule != "structure.unsaid");
+        assert_eq!(rules.concat(), rule, "{to}");
+    }
+}
+
+#[test]
 fn positions_are_those_of_the_text() {
     let xml = small3().to_xml().expect("valid");
     let located = read(&xml);

@@ -1,12 +1,12 @@
-//! SSP 1.0: the files of a small system, and one defect at a time.
+//! SSP 1.0 and 2.0: the files of a small system, and one defect at a time.
 
 use punctual_modeldescription::{
-    Causality, Connector, EnumerationItem, ParameterSet, ParameterValue, Real, SimpleType, SystemComponent,
-    SystemConnection, SystemStructure, VariableKind,
+    Causality, Connector, EnumerationItem, ParameterSet, ParameterValue, Real, SimpleType, SspVersion,
+    SystemComponent, SystemConnection, SystemStructure, VariableKind,
 };
 
 fn connector(name: &str, causality: Causality, kind: VariableKind) -> Connector {
-    Connector { name: name.into(), causality, kind }
+    Connector { name: name.into(), causality, kind, dimensions: Vec::new() }
 }
 
 fn real() -> VariableKind {
@@ -99,7 +99,8 @@ fn values_of_every_type() {
         ("a.on".to_owned(), ParameterValue::Boolean(true)),
         ("a.s".to_owned(), ParameterValue::Enumeration("good".into())),
     ];
-    let text = ParameterSet { name: "start".into(), parameters }.to_xml().expect("valid");
+    let text =
+        ParameterSet { name: "start".into(), parameters, ..ParameterSet::default() }.to_xml().expect("valid");
     for part in [
         r#"<ssv:Real value="0.1"/>"#,
         r#"<ssv:Integer value="-3"/>"#,
@@ -132,10 +133,48 @@ fn each_defect_is_told_with_its_place() {
     ] {
         assert_eq!(refused(edit), message);
     }
-    let set = |parameters| ParameterSet { name: "start".into(), parameters }.to_xml().expect_err("a defect");
+    let set = |parameters| {
+        ParameterSet { name: "start".into(), parameters, ..ParameterSet::default() }
+            .to_xml()
+            .expect_err("a defect")
+    };
     let twice =
         vec![("a".to_owned(), ParameterValue::Integer(1)), ("a".to_owned(), ParameterValue::Integer(2))];
     assert_eq!(set(twice).to_string(), "parameters[\"a\"] is \"a\"; allowed: a name used once");
     let infinite = vec![("a".to_owned(), ParameterValue::Real(f64::INFINITY))];
     assert_eq!(set(infinite).to_string(), "parameters[\"a\"] is inf; allowed: a finite number");
+}
+
+#[test]
+fn arrays_are_for_version_two() {
+    let mut system = system();
+    for (component, connector) in [(0, 0), (1, 0)] {
+        system.components[component].connectors[connector].dimensions = vec![2, 3];
+    }
+    let refused =
+        "components[0].connectors[\"y\"].dimensions is 2; allowed: none in SSP 1.0, at least 1 in SSP 2.0";
+    assert_eq!(system.to_xml().expect_err("an array").to_string(), refused);
+    system.version = SspVersion::Two;
+    let text = system.to_xml().expect("valid");
+    let connector = "<ssd:Connector name=\"y\" kind=\"output\">\n            <ssc:Real/>\n            \
+                     <ssc:Dimension size=\"2\"/>\n            <ssc:Dimension size=\"3\"/>\n          </ssd:Connector>";
+    assert!(text.contains("version=\"2.0\" name=\"pair\"") && text.contains(connector), "{text}");
+    let parameters = vec![
+        ("a.x".to_owned(), ParameterValue::Reals(vec![0.1, -2.0])),
+        ("a.n".to_owned(), ParameterValue::Integers(vec![-3, 4])),
+        ("a.on".to_owned(), ParameterValue::Booleans(vec![true, false])),
+    ];
+    let mut set = ParameterSet { name: "start".into(), parameters, ..ParameterSet::default() };
+    let refused = "parameters[\"a.x\"] is an array of 2; allowed: one value in SSP 1.0; at least one element in SSP 2.0";
+    assert_eq!(set.to_xml().expect_err("an array").to_string(), refused);
+    set.version = SspVersion::Two;
+    let text = set.to_xml().expect("valid");
+    for part in [
+        r#"version="2.0" name="start""#,
+        r#"<ssv:Real value="0.1 -2.0"/>"#,
+        r#"<ssv:Integer value="-3 4"/>"#,
+        r#"<ssv:Boolean value="true false"/>"#,
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
 }

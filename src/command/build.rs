@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use punctual_fmu::configuration::{Configuration, FmiVersion};
+use punctual_modeldescription::SspVersion;
 
 use crate::error::Error;
 use crate::{output, package};
@@ -24,6 +25,9 @@ pub struct Arguments {
     /// configuration, or 2]
     #[arg(long, value_name = "VERSION")]
     fmi: Option<Versions>,
+    /// The version of SSP of an .ssp file: 1, for scalars, or 2, which has arrays [default: 1]
+    #[arg(long, value_name = "VERSION")]
+    ssp: Option<Ssp>,
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
@@ -31,6 +35,17 @@ pub struct Arguments {
     /// `punctual validate --references` does so
     #[arg(long)]
     references: bool,
+}
+
+/// The versions of SSP to pack for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Ssp {
+    /// SSP 1.0
+    #[value(name = "1")]
+    One,
+    /// SSP 2.0
+    #[value(name = "2")]
+    Two,
 }
 
 /// The versions of FMI to build for.
@@ -57,6 +72,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.configuration;
     if arguments.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp")) {
         return pack(arguments, file);
+    }
+    if arguments.ssp.is_some() {
+        let message = "is for an .ssp file, which is made from a system file";
+        return Err(Error::configuration("--ssp", message));
     }
     let configuration = package::read_configuration(file)?;
     let experiment = *configuration.experiment();
@@ -147,7 +166,11 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         let message = format!("is {:?}; an .ssp file is made from a system file", configuration.kind());
         return Err(Error::configuration("kind", message).in_file(file));
     }
-    let packed = package::system::pack(file, &arguments.output)?;
+    let version = match arguments.ssp {
+        None | Some(Ssp::One) => SspVersion::One,
+        Some(Ssp::Two) => SspVersion::Two,
+    };
+    let packed = package::system::pack(file, &arguments.output, version)?;
     output::result(&format!(
         "{}: {} components from {} FMUs, {} connections, {} start values",
         arguments.output.display(),

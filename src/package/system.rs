@@ -1,5 +1,5 @@
 //! From a system file to an `.ssp` package: its FMUs, connections and start values as System Structure and
-//! Parameterization 1.0, for other masters. Nothing is run; the same files give the same bytes.
+//! Parameterization 1.0 or 2.0, for other masters. Arrays are for 2.0, and are connected and set as a whole there. Nothing is run; the same files give the same bytes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::rc::Rc;
 
 use punctual_modeldescription::{
     Archive, Causality, Connector, DefaultExperiment, EnumerationItem, Integer, ParameterSet, ParameterValue,
-    Plain, Real, SimpleType, SystemComponent, SystemConnection, SystemStructure, VariableKind,
+    Plain, Real, SimpleType, SspVersion, SystemComponent, SystemConnection, SystemStructure, VariableKind,
 };
 
 use crate::coupling::{self, Link, Port, StartValue, System};
@@ -32,17 +32,17 @@ pub struct Packed {
     pub start_values: usize,
 }
 
-/// Writes the package of the system at `path` to `file`.
+/// Writes the package of the system at `path` to `file`, in this version of SSP.
 ///
 /// # Errors
 ///
-/// A system file that cannot be used, an FMU that is not there or cannot be used, a file that cannot be
-/// written.
-pub fn pack(path: &Path, file: &Path) -> Result<Packed, Error> {
+/// A system file that cannot be used, an FMU that is not there or cannot be used, an array that the version has no
+/// place for, a file that cannot be written.
+pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Error> {
     let system = System::read(path)?;
     let base = path.parent().unwrap_or(Path::new(""));
     let name = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy());
-    let (archive, packed) = archive(&system, &name, base).map_err(|e| e.in_file(path))?;
+    let (archive, packed) = archive(&system, &name, base, version).map_err(|e| e.in_file(path))?;
     let bytes = archive.to_bytes().map_err(|e| super::broken(&e))?;
     whole::write(file, bytes)?;
     Ok(packed)
@@ -116,30 +116,43 @@ impl Store {
     }
 }
 
-fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed), Error> {
+fn archive(
+    system: &System,
+    name: &str,
+    base: &Path,
+    version: SspVersion,
+) -> Result<(Archive, Packed), Error> {
     // Read the FMUs, and resolve the connections.
     let store = Store::open(system, base)?;
     let sized = |(c, component)| coupling::Model::from(Rc::clone(&store.of(c).0)).sized(component);
     let models = system.components().iter().enumerate().map(sized).collect::<Result<Vec<_>, _>>()?;
     let descriptions: Vec<&Description> = models.iter().map(coupling::Model::description).collect();
     let links = coupling::links(system, &descriptions)?;
-    let parameters = start_values(system, &descriptions)?;
-    refuse_arrays(system, &descriptions, &links, &parameters)?;
+    if version == SspVersion::One {
+        refuse_arrays(system, &descriptions, &links)?;
+    }
+    let parameters = start_values(system, &descriptions, version)?;
+    let connections = connections(system, &descriptions, &links)?;
     let starts = &parameters;
     let experiment = system.experiment();
     let mut enumerations = Enumerations::default();
     let components = system.components().iter().zip(&descriptions).enumerate();
     let components = components
         .map(|(c, (component, description))| {
+            // An array counts by its first element; SSP 1.0 shows none.
             let shown = |v: &usize| {
                 let variable = &description.variables[*v];
-                let port = Port { component: c, variable: *v };
+                let array = array_of(description, *v);
+                if array.is_some_and(|array| version == SspVersion::One || *v != array.first) {
+                    return false;
+                }
                 // An input that is neither connected nor set keeps the start value of its FMU, so it is no
                 // connector. Some masters write zero to every input that is one.
-                let is_scalar = !description.is_element(*v);
-                let is_input = variable.causality == Causality::Input;
-                is_scalar && !is_input
-                    || starts.iter().any(|(name, _)| *name == format!("{}.{}", component.name, variable.name))
+                let name =
+                    format!("{}.{}", component.name, array.map_or(&variable.name, |array| &array.name));
+                let port = Port { component: c, variable: *v };
+                variable.causality != Causality::Input
+                    || starts.iter().any(|(given, _)| *given == name)
                     || links.iter().any(|link| link.to == port)
             };
             let connectors = (0..description.variables.len()).filter(shown);
@@ -152,24 +165,15 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
             }
         })
         .collect();
-    // Name the ends of the connections, and write the structure.
-    let end = |port: Port| {
-        let variable = &descriptions[port.component].variables[port.variable];
-        (system.components()[port.component].name.clone(), variable.name.clone())
-    };
-    let connection = |link: &Link| SystemConnection {
-        start: end(link.from),
-        end: end(link.to),
-        factor: link.factor,
-        offset: link.offset,
-    };
+    // Write the structure.
     let structure = SystemStructure {
+        version,
         name: name.to_owned(),
         description: format!("coupled with a communication step of {} s", experiment.step),
         generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
         start_values: (!parameters.is_empty()).then(|| START_VALUES.to_owned()),
         components,
-        connections: links.iter().map(connection).collect(),
+        connections,
         enumerations: enumerations.0,
         default_experiment: Some(DefaultExperiment {
             start_time: Some(experiment.start_time),
@@ -180,7 +184,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
     let packed = Packed {
         components: structure.components.len(),
         fmus: store.fmus.len(),
-        connections: links.len(),
+        connections: structure.connections.len(),
         start_values: parameters.len(),
     };
     // Pack.
@@ -188,7 +192,7 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
     let mut archive = Archive::new().with_timestamp(super::timestamp()?);
     archive.add("SystemStructure.ssd", structure.to_xml().map_err(broken)?).map_err(broken)?;
     if !parameters.is_empty() {
-        let set = ParameterSet { name: "start_values".to_owned(), parameters };
+        let set = ParameterSet { version, name: "start_values".to_owned(), parameters };
         archive.add(START_VALUES, set.to_xml().map_err(broken)?).map_err(broken)?;
     }
     for (_, place, bytes) in store.fmus {
@@ -197,30 +201,81 @@ fn archive(system: &System, name: &str, base: &Path) -> Result<(Archive, Packed)
     Ok((archive, packed))
 }
 
+/// The array that a scalar is an element of.
+fn array_of(description: &Description, variable: usize) -> Option<&Array> {
+    description.arrays.iter().find(|array| (array.first..array.first + array.count).contains(&variable))
+}
+
 /// SSP 1.0 knows no arrays, so none can be connected or given a value.
-fn refuse_arrays(
-    system: &System,
-    descriptions: &[&Description],
-    links: &[Link],
-    starts: &[(String, ParameterValue)],
-) -> Result<(), Error> {
+fn refuse_arrays(system: &System, descriptions: &[&Description], links: &[Link]) -> Result<(), Error> {
     for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
+        let given: Vec<usize> =
+            component.start.keys().filter_map(|name| first_of(description, name)).collect();
         let used = |v: usize| {
             let port = Port { component: c, variable: v };
-            let name = format!("{}.{}", component.name, description.variables[v].name);
-            links.iter().any(|link| link.from == port || link.to == port)
-                || starts.iter().any(|(given, _)| *given == name)
+            links.iter().any(|link| link.from == port || link.to == port) || given.contains(&v)
         };
         let elements = |array: &Array| array.first..array.first + array.count;
         if let Some(array) = description.arrays.iter().find(|array| elements(array).any(used)) {
             let message = format!(
-                "{} of {} ({}) is an array, for which SSP 1.0 has no place; `punctual run` couples it",
+                "{} of {} ({}) is an array, for which SSP 1.0 has no place; `--ssp 2` has, and `punctual run` couples it",
                 array.name, component.name, component.fmu
             );
             return Err(Error::configuration(format!("component[{c}]"), message));
         }
     }
     Ok(())
+}
+
+/// The connections, of arrays as a whole.
+///
+/// # Errors
+///
+/// An array of which only some elements are connected, or with other elements than their own: SSP has no place for that.
+fn connections(
+    system: &System,
+    descriptions: &[&Description],
+    links: &[Link],
+) -> Result<Vec<SystemConnection>, Error> {
+    let array = |port: Port| array_of(descriptions[port.component], port.variable);
+    let end = |port: Port| {
+        let variable = &descriptions[port.component].variables[port.variable];
+        let name = array(port).map_or(&variable.name, |array| &array.name);
+        (system.components()[port.component].name.clone(), name.clone())
+    };
+    let mut connections = Vec::new();
+    for link in links {
+        let is_first = match (array(link.from), array(link.to)) {
+            (None, None) => true,
+            (Some(from), Some(to)) if from.sizes == to.sizes => {
+                let is_alike = |i: usize| {
+                    links.iter().any(|other| {
+                        other.from == Port { component: link.from.component, variable: from.first + i }
+                            && other.to == Port { component: link.to.component, variable: to.first + i }
+                            && (other.factor, other.offset) == (link.factor, link.offset)
+                    })
+                };
+                if !(0..to.count).all(is_alike) {
+                    return Err(in_parts(&end(link.from), &end(link.to)));
+                }
+                link.to.variable == to.first
+            }
+            _ => return Err(in_parts(&end(link.from), &end(link.to))),
+        };
+        if is_first {
+            let (start, end) = (end(link.from), end(link.to));
+            connections.push(SystemConnection { start, end, factor: link.factor, offset: link.offset });
+        }
+    }
+    Ok(connections)
+}
+
+fn in_parts(from: &(String, String), to: &(String, String)) -> Error {
+    let message = format!(
+        "{}.{} and {}.{} are connected in parts; SSP connects arrays of the same sizes as a whole",
+        from.0, from.1, to.0, to.1
+    );
+    Error::configuration("connect", message)
 }
 
 /// The enumerations of all components, each once. Where two share a name but not the items, the later one is
@@ -243,7 +298,7 @@ impl Enumerations {
     }
 }
 
-/// The connector of a variable, if it can have one.
+/// The connector of a variable, or of the array that it is the first element of, if there can be one.
 fn connector(
     component: &str,
     description: &Description,
@@ -251,6 +306,7 @@ fn connector(
     enumerations: &mut Enumerations,
 ) -> Option<Connector> {
     use Causality::{CalculatedParameter, Input, Output, Parameter};
+    let array = array_of(description, variable);
     let variable = &description.variables[variable];
     if !matches!(variable.causality, Input | Output | Parameter | CalculatedParameter) {
         return None;
@@ -266,7 +322,10 @@ fn connector(
         Family::Other if variable.of == DataType::String => VariableKind::String(Plain::default()),
         Family::Other => return None,
     };
-    Some(Connector { name: variable.name.clone(), causality: variable.causality, kind })
+    let name = array.map_or(&variable.name, |array| &array.name).clone();
+    let sizes = array.map(|array| array.sizes.as_slice()).unwrap_or_default();
+    let dimensions = sizes.iter().filter_map(|&size| u64::try_from(size).ok()).collect();
+    Some(Connector { name, causality: variable.causality, kind, dimensions })
 }
 
 /// The items of an enumeration, if the format can hold all of them. It has no place for their meaning.
@@ -279,33 +338,67 @@ fn items(variable: &Variable) -> Option<Vec<EnumerationItem>> {
     items.filter(|items| !items.is_empty())
 }
 
+/// The position of a variable, or of the first element of an array, by its name.
+fn first_of(description: &Description, name: &str) -> Option<usize> {
+    description.index_of(name).or_else(|| Some(description.array(name)?.first))
+}
+
 /// The start values by `component.variable`; `coupling` has checked names, types and ranges.
 ///
 /// # Errors
 ///
-/// A whole number that the format cannot hold.
+/// A whole number that the format cannot hold, an element of an array, an array of texts or enumerations.
 fn start_values(
     system: &System,
     descriptions: &[&Description],
+    version: SspVersion,
 ) -> Result<Vec<(String, ParameterValue)>, Error> {
     let mut values = Vec::new();
     for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
         for (name, value) in &component.start {
-            let first = match (description.index_of(name), description.array(name)) {
-                (Some(variable), _) => variable,
-                (None, Some(array)) => array.first,
-                (None, None) => continue,
-            };
+            let Some(first) = first_of(description, name) else { continue };
+            let refused =
+                |message: String| Error::configuration(format!("component[{c}].start.{name:?}"), message);
+            let mut of_name = Vec::new();
             for (variable, value) in description.variables[first..].iter().zip(value.flat()) {
-                let value = parameter(variable, value).ok_or_else(|| {
-                    let message = "is a whole number beyond 32 bits, for which SSP 1.0 has no place";
-                    Error::configuration(format!("component[{c}].start.{name:?}"), message)
-                })?;
-                values.push((format!("{}.{}", component.name, variable.name), value));
+                of_name.push(parameter(variable, value).ok_or_else(|| {
+                    let version = version.as_str();
+                    refused(format!(
+                        "is a whole number beyond 32 bits, for which SSP {version} has no place here"
+                    ))
+                })?);
+            }
+            let named = |name: &str| format!("{}.{name}", component.name);
+            match array_of(description, first) {
+                Some(array) if array.count == of_name.len() => {
+                    let value = list(of_name).ok_or_else(|| {
+                        refused("is an array of neither numbers nor truth values, which has no start value in SSP".to_owned())
+                    })?;
+                    values.push((named(&array.name), value));
+                }
+                Some(array) => {
+                    let message =
+                        format!("is an element of {}; in SSP an array is given as a whole", array.name);
+                    return Err(refused(message));
+                }
+                None => values.extend(
+                    of_name.into_iter().map(|value| (named(&description.variables[first].name), value)),
+                ),
             }
         }
     }
     Ok(values)
+}
+
+/// The value of an array of numbers or truth values.
+fn list(values: Vec<ParameterValue>) -> Option<ParameterValue> {
+    use ParameterValue::{Boolean, Booleans, Integer, Integers, Real, Reals};
+    let reals = values.iter().map(|value| if let Real(x) = value { Some(*x) } else { None });
+    let integers = values.iter().map(|value| if let Integer(i) = value { Some(*i) } else { None });
+    let booleans = values.iter().map(|value| if let Boolean(b) = value { Some(*b) } else { None });
+    (reals.collect::<Option<_>>().map(Reals))
+        .or_else(|| integers.collect::<Option<_>>().map(Integers))
+        .or_else(|| booleans.collect::<Option<_>>().map(Booleans))
 }
 
 /// The value of a variable in the format; `None` where it has no place for it.

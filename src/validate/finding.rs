@@ -76,7 +76,11 @@ const BEFORE: &[Rule] = &[
         "there is a library, or source code, for some platform, named as modelIdentifier says",
     ),
     ("archive.companion", Error, "FMI 3.0: what files of the archive need beside them is there"),
-    ("archive.index", Warning, "FMI 3.0: documentation/ begins with index.html"),
+    (
+        "archive.index",
+        Warning,
+        "FMI 3.0: documentation/ has its index.html, sources/ its buildDescription.xml",
+    ),
     ("archive.platform", Warning, "there is a library for this platform"),
     ("archive.top-folder", Warning, "everything lies where the standard has a place for it"),
     (

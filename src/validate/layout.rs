@@ -43,11 +43,11 @@ const ENDINGS_OF_FMI3: [(&str, &str); 3] = [("windows", ".dll"), ("linux", ".so"
 /// The processors in names of folders of FMI 3.0.
 const ARCHITECTURES: [&str; 4] = ["aarch32", "aarch64", "x86", "x86_64"];
 
-/// What must be there beside others: a path or the beginning of one, and the entries of which one is needed, in FMI
-/// 3.0. All but the last have the rule `archive.companion`.
-const COMPANIONS: [(&str, &[&str]); 5] = [
-    ("sources/", &[BUILD]),
+/// What must be there beside others in FMI 3.0: the rule, a path or the beginning of one, and the entries of which one is
+/// needed.
+const COMPANIONS: [(&str, &str, &[&str]); 5] = [
     (
+        "archive.companion",
         "documentation/licenses/",
         &[
             "documentation/licenses/license.txt",
@@ -55,9 +55,11 @@ const COMPANIONS: [(&str, &[&str]); 5] = [
             "documentation/licenses/license.spdx",
         ],
     ),
-    ("documentation/diagram.svg", &["documentation/diagram.png"]),
-    ("terminalsAndIcons/icon.svg", &["terminalsAndIcons/icon.png"]),
-    ("documentation/", &["documentation/index.html"]),
+    ("archive.companion", "documentation/diagram.svg", &["documentation/diagram.png"]),
+    ("archive.companion", "terminalsAndIcons/icon.svg", &["terminalsAndIcons/icon.png"]),
+    ("archive.index", "documentation/", &["documentation/index.html"]),
+    // Tools put sources beside their libraries to be read, not built.
+    ("archive.index", "sources/", &[BUILD]),
 ];
 
 /// The ending of libraries for a platform, where it is one that the standard names.
@@ -121,8 +123,11 @@ pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
     }
     // Something to run, and a library for this platform.
     let own = version.platform();
-    let sources = model.names_sources()
-        || archive.entries().iter().any(|entry| entry.starts_with("sources/") && !entry.ends_with('/'));
+    let is_source = |entry: &String| match version {
+        Version::Fmi2 => entry.starts_with("sources/") && !entry.ends_with('/'),
+        Version::Fmi3 => entry == BUILD,
+    };
+    let sources = model.names_sources() || archive.entries().iter().any(is_source);
     if libraries == 0 && !sources && !findings.any("archive.binary") {
         let message = format!(
             "there is no library under binaries/ and no source code, so nothing can be run; expected for this platform: \
@@ -141,17 +146,16 @@ pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
 /// Checks what must be there beside other entries.
 fn companions(archive: &Archive, findings: &mut Findings) {
     let entries = archive.entries();
-    for (c, (given, needed)) in COMPANIONS.iter().enumerate() {
+    for (rule, given, needed) in COMPANIONS {
         let is_given = |entry: &&String| {
             if given.ends_with('/') {
                 entry.starts_with(given) && !entry.ends_with('/')
             } else {
-                entry == given
+                *entry == given
             }
         };
         let missing = !entries.iter().any(|entry| needed.contains(&entry.as_str()));
         if let Some(entry) = entries.iter().find(is_given).filter(|_| missing) {
-            let rule = if c + 1 == COMPANIONS.len() { "archive.index" } else { "archive.companion" };
             let message = format!("there is {entry}, but no {}", needed.join(" or "));
             findings.archive(rule, given, message);
         }

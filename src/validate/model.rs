@@ -1,6 +1,6 @@
 //! The model description of either version, as the other modules ask for it.
 
-use punctual_modeldescription::{self as description, Located, Violation, brief, fmi3};
+use punctual_modeldescription::{self as description, Located, Violation, brief, fmi3, is_c_identifier};
 use roxmltree::Document;
 
 use super::finding::{Findings, Mark};
@@ -70,7 +70,8 @@ impl Model {
                 let mut names: Vec<&str> = Vec::new();
                 for (_, interface) in model.description.interfaces() {
                     let name = interface.model_identifier.as_str();
-                    if !name.is_empty() && !names.contains(&name) {
+                    // What is no identifier is told as such.
+                    if is_c_identifier(name) && !names.contains(&name) {
                         names.push(name);
                     }
                 }

@@ -1,15 +1,19 @@
 """`punctual validate` and FMPy come to the same verdict on descriptions of FMI 3.0 broken one way each."""
 
+import json
 import os
 import re
 import subprocess
+import sys
 import sysconfig
 from pathlib import Path
 
 import fmpy
 import pytest
+from fmpy.validation import validate_fmu
 from lxml import etree
 
+from conftest import punctual
 from test_verdicts import FIXTURES, judged
 
 pytestmark = pytest.mark.skipif(
@@ -77,6 +81,9 @@ BROKEN = {
     "a parameter without start": (' start="-3"', ""),
     "a structural parameter that is constant": ('causality="structuralParameter"', 'causality="structuralParameter" variability="constant"'),
     "a text without start": ('<Start value="a b"/>', ""),
+    "a start without value": ('<Start value="a b"/>', "<Start/>"),
+    "an empty list of clocks": ('name="rearm"', 'name="rearm" clocks=""'),
+    "a clock that is none": ('name="rearm"', 'name="rearm" clocks="77"'),
     "a calculated variable with start": ('derivative="4"', 'derivative="4" start="1"'),
     "an illegal combination": ('causality="input" unit', 'causality="input" variability="fixed" unit'),
     "an illegal initial": ('variability="tunable"', 'variability="tunable" initial="calculated"'),
@@ -107,7 +114,7 @@ OURS_ALONE = {
     "interface.flags": (' canGetAndSetFMUState="true"', ""),
     # 2.4.4: the factors of units; an inverse display unit has no offset.
     "unit.factor": ('factor="1000"/>', 'factor="1000" inverse="true" offset="1"/>'),
-    "unit.unique": ('<Unit name="s"/>', '<Unit name="m"/>'),
+    "unit.unique": ('<Unit name="s"/>', '<Unit name="s"/><Unit name="s"/>'),
     # 2.4.5: names and values of items differ; declaredType has the type of the variable.
     "type.items": ('value="1"/>', 'value="0"/>'),
     "type.defined": ('name="count"', 'name="count" declaredType="Length"'),
@@ -119,16 +126,36 @@ OURS_ALONE = {
     # 2.4.7.5: one start value, or as many as elements.
     "variable.length": ('start="1 2 3"', 'start="1 2"'),
     "variable.range": ('start="-3" min="-9"', 'start="-3" min="-2"'),
-    "variable.enumeration": ('declaredType="Mode"', 'declaredType="Mode" initial="exact" start="7"'),
+    "variable.enumeration": (
+        "</ModelVariables>",
+        '<Enumeration name="e" valueReference="70" causality="parameter" declaredType="Mode" start="7"/></ModelVariables>',
+    ),
     "variable.clock": ('name="rearm"', 'name="rearm" intermediateUpdate="true"'),
-    "variable.derivative": ('name="der(x)" valueReference="5" derivative="4"', 'name="der(x)" valueReference="5" derivative="12"'),
+    "variable.derivative": (
+        "</ModelVariables>",
+        '<Float64 name="v" valueReference="70" causality="input" start="0" derivative="9"/></ModelVariables>',
+    ),
     # 2.4.8: lists without duplicates; kinds of what is no number; event indicators.
     "structure.outputs": (OUTPUT, OUTPUT + OUTPUT),
-    "structure.dependencies": (MODE, MODE.replace("dependent dependent", "dependent fixed")),
+    "structure.dependencies": ('valueReference="5" dependencies="2"/>', 'valueReference="5" dependencies="2" dependenciesKind="fixed"/>'),
+    # A warning, since the standard's own Feedthrough has them: factors of what is no floating-point number.
+    "structure.kinds": (MODE, MODE.replace("dependent dependent", "dependent fixed")),
     "structure.event-indicators": ("</ModelStructure>", '<EventIndicator valueReference="12"/></ModelStructure>'),
     "structure.clocked-states": ("    <InitialUnknown", '    <ClockedState valueReference="12"/><InitialUnknown'),
     # A warning: importers see algebraic loops.
     "structure.unsaid": (OUTPUT, '<Output valueReference="4"/>'),
+}
+# Texts and their replacements to which FMPy 0.3.32 objects, and the standard does not.
+THEIRS_ALONE = {
+    # It does not know the element ClockType.
+    "a declared type of a clock": (
+        "  </TypeDefinitions>",
+        '  <ClockType name="Tick" intervalVariability="triggered"/></TypeDefinitions>',
+        "</ModelVariables>",
+        '<Clock name="c" valueReference="50" causality="input" declaredType="Tick" intervalVariability="triggered"/></ModelVariables>',
+    ),
+    # It splits a list at each blank.
+    "two blanks in a list": (MODE, MODE.replace("2 8", "2  8")),
 }
 # No defect for either.
 SOUND = {
@@ -198,6 +225,12 @@ def test_both_accept(tmp_path, library, edit):
     assert ours["errors"] == 0 and theirs == [], (ours, theirs)
 
 
+@pytest.mark.parametrize("edit", THEIRS_ALONE)
+def test_theirs_alone_objects(tmp_path, library, edit):
+    ours, theirs = verdicts(tmp_path, library, *THEIRS_ALONE[edit])
+    assert ours["errors"] == 0 and theirs, (ours, theirs)
+
+
 @pytest.mark.parametrize("rule", OURS_ALONE)
 def test_ours_alone_objects(tmp_path, library, rule):
     ours, theirs = verdicts(tmp_path, library, *OURS_ALONE[rule])
@@ -258,7 +291,7 @@ def test_a_library_that_lacks_functions(tmp_path, library):
     ours, theirs = judged(tmp_path, "description3.xml", library, ENTRY, "", "")
     assert ours["findings"] == [] and theirs == []
     ours, _ = judged(tmp_path, "description3.xml", library, ENTRY.replace("x86_64-linux", "linux64"), "", "")
-    assert [finding["rule"] for finding in ours["findings"]] == ["archive.platform"]
+    assert [finding["rule"] for finding in ours["findings"]] == ["archive.binary"]
     poor = tmp_path / "poor.so"
     source = tmp_path / "poor.c"
     source.write_text("int fmi3GetVersion(void) { return 0; }\n")
@@ -275,7 +308,7 @@ def test_a_library_that_lacks_functions(tmp_path, library):
         ("documentation/page.html", "archive.index"),
         ("documentation/licenses/a.txt", "archive.companion"),
         ("terminalsAndIcons/icon.svg", "archive.companion"),
-        ("sources/all.c", "archive.companion"),
+        ("sources/all.c", "archive.index"),
         ("model.png", "archive.top-folder"),
         ("extra/org.example/data.txt", None),
         ("resources/table.csv", None),
@@ -312,3 +345,40 @@ def test_build_descriptions(tmp_path, library, old, new, both):
     more = {"sources/buildDescription.xml": file, "sources/all.c": file}
     ours, theirs = judged(tmp_path, "description3.xml", library, ENTRY, "", "", more=more)
     assert (ours["errors"] > 0, theirs != []) == (both is not None, both is True), (ours, theirs)
+
+
+SLAVE = """
+from pythonfmu3 import Boolean, Float64, Fmi3Causality, Fmi3Slave, Fmi3Variability, Int32
+
+
+class Foreign(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.time, self.u, self.y, self.k, self.on = 0.0, 1.0, 0.0, 2, True
+        given = {"causality": Fmi3Causality.parameter, "variability": Fmi3Variability.fixed}
+        self.register_variable(Float64("time", causality=Fmi3Causality.independent, variability=Fmi3Variability.continuous))
+        self.register_variable(Float64("u", causality=Fmi3Causality.input, variability=Fmi3Variability.continuous, start=1.0))
+        self.register_variable(Float64("y", causality=Fmi3Causality.output, variability=Fmi3Variability.continuous))
+        self.register_variable(Int32("k", start=2, **given))
+        self.register_variable(Boolean("on", start=True, **given))
+
+    def do_step(self, time, step):
+        self.y = self.k * self.u if self.on else 0.0
+        return True
+"""
+
+
+def test_an_fmu_of_another_tool(tmp_path):
+    """PythonFMU3's FMU has no error for us nor for FMPy; what we warn of is true."""
+    pytest.importorskip("pythonfmu3")
+    (tmp_path / "foreign.py").write_text(SLAVE)
+    build = [sys.executable, "-m", "pythonfmu3", "build", "-f", "foreign.py", "--no-external-tool"]
+    subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
+    fmu = tmp_path / "Foreign.fmu"
+    ours = json.loads(punctual("validate", fmu, "--json", "--no-trial", check=False).stdout)
+    assert validate_fmu(str(fmu)) == [] and ours["errors"] == 0, ours
+    # Sources without a build description, and an output that says nothing of its dependencies.
+    assert {finding["rule"] for finding in ours["findings"]} == {"archive.index", "structure.unsaid"}
+    shown = json.loads(punctual("inspect", fmu, "--json").stdout)
+    assert [variable["name"] for variable in shown["variables"]] == ["time", "u", "y", "k", "on"]
+    assert [interface["kind"] for interface in shown["interfaces"]] == ["CoSimulation"]

@@ -3,8 +3,8 @@
 
 use super::{
     Alias, Binary, Clock, CoSimulation, DIMENSION, DataType, Dimension, EnumerationItem, Float, Integer,
-    Interface, IntervalVariability, ModelDescription, ModelExchange, ModelStructure, Plain, TypeDefinition,
-    Unknown, Variable, VariableKind,
+    Interface, IntervalVariability, ModelDescription, ModelExchange, ModelStructure, NO_CLOCK, Plain,
+    TypeDefinition, Unknown, Variable, VariableKind,
 };
 use crate::notes::{At, Notes, children};
 use crate::rules::{Check, Place, Violation, fmi3};
@@ -167,7 +167,7 @@ impl Located {
                 if let Some(first) = elements.first() {
                     self.notes.mark(Place::Start(v), first.range().start);
                 }
-                elements.iter().map(|n| n.attribute("value").unwrap_or_default()).collect()
+                elements.iter().filter_map(|n| n.attribute("value")).collect()
             }
             _ => start.as_deref().map(|text| words(text).collect()).unwrap_or_default(),
         };
@@ -194,6 +194,9 @@ impl Located {
             }
         });
         let dimensions = dimensions.collect();
+        if node.attribute("clocks").is_some_and(|text| words(text).next().is_none()) {
+            self.notes.miss(place, NO_CLOCK);
+        }
         let mut at = self.notes.enter(place, node);
         let causality = at.value("causality", Causality::parse).unwrap_or(Causality::Local);
         let variability = at.value("variability", Variability::parse);

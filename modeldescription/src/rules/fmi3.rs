@@ -337,7 +337,11 @@ impl Check<'_> {
         previous: &mut HashMap<u32, String>,
     ) {
         let place = Place::Variable(v);
+        let empty = self.is_unread(place, crate::fmi3::NO_CLOCK);
         let mut complain = |message: String| self.add("variable.clock", place, message);
+        if empty {
+            complain("clocks is empty; must name a Clock, or not be there".to_owned());
+        }
         for reference in &variable.clocks {
             if !references.get(reference).is_some_and(|of| of.kind.data_type() == DataType::Clock) {
                 complain(format!("clocks names {reference}, which is not the value reference of a Clock"));
@@ -454,7 +458,7 @@ impl Check<'_> {
         self.unsaid(Outputs.element(), &listed(Outputs), inputs);
     }
 
-    /// Only floating-point numbers depend by a factor.
+    /// Only floating-point numbers depend by a factor. A warning: the Feedthrough of the Reference FMUs has others.
     fn kinds(&mut self, list: UnknownList, unknowns: &[Unknown], references: &References<'_>) {
         for (u, unknown) in unknowns.iter().enumerate() {
             let Some(variable) = references.get(&unknown.value_reference) else { continue };
@@ -468,7 +472,7 @@ impl Check<'_> {
                     brief(&variable.name),
                     variable.kind.data_type().as_str()
                 );
-                self.add("structure.dependencies", Place::Unknown(list, u), message);
+                self.add("structure.kinds", Place::Unknown(list, u), message);
             }
         }
     }

@@ -94,6 +94,11 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("structure.order", Error, "ModelStructure/InitialUnknowns is sorted by index"),
     ("structure.index", Error, "indices (FMI 3.0: value references) are those of variables"),
     ("structure.dependencies", Error, "dependencies name variables; dependenciesKind has as many words"),
+    (
+        "structure.kinds",
+        Warning,
+        "FMI 3.0: only floating-point numbers depend by a factor (dependenciesKind)",
+    ),
     ("structure.unsaid", Warning, "outputs say what they depend on (without it, on every input)"),
     (
         "terminal.unique",
