@@ -694,10 +694,12 @@ impl Instance {
         Ok(())
     }
 
-    /// Checks that the real number `index` may have the `value`: a parameter within its range, all else any.
+    /// Checks that the real number `index` may have the `value`: a parameter within its range, a state any finite one, and
+    /// an input any.
     fn check_range(&self, index: usize, value: f64) -> Result<(), Failure> {
         match index.checked_sub(self.product.layout.parameters) {
-            None => Ok(()),
+            None if value.is_finite() || index < self.product.layout.outputs => Ok(()),
+            None => Err(format!("{} is {value}, must be finite", self.product.variables[index].name)),
             Some(i) => {
                 let name = &self.product.variables[index].name;
                 self.product.ranges[i].check(name, value).map_err(|e| e.to_string())

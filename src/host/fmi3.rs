@@ -145,7 +145,7 @@ impl Instance {
     }
 
     /// The state that a call gave.
-    fn saved(&self, call: &str, state: fmi3::State) -> Result<Saved, Error> {
+    fn saved(&self, call: &'static str, state: fmi3::State) -> Result<Saved, Error> {
         let state = std::ptr::NonNull::new(state);
         state.map(Saved).ok_or_else(|| self.handle.broken(call, "gave no state, though it returned fmi3OK"))
     }

@@ -136,8 +136,6 @@ pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<()
         let rule = match error.as_call() {
             Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
             Some(_) => "trial.call",
-            // A call that was done, but not as the standard says.
-            None if error.as_fmu_problem().is_none() => "trial.call",
             None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
             None => "trial.load",
         };

@@ -293,6 +293,7 @@ fn each_dependency_is_named_in_one_place() {
                 "src/validate/",
                 "src/host/description/",
                 "src/package/difference.rs",
+                "src/command/inspect.rs",
                 "src/references.rs",
             ],
         ),

@@ -113,12 +113,13 @@ impl Instance {
     /// As there; another number of values than the variables have.
     pub fn set_float64(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
         self.check_runs(Call::Set, ScalarType::Real, references, values.len())?;
-        if references.iter().any(|&reference| reference as usize >= self.product.layout.parameters) {
+        let states = self.mode == Mode::CONTINUOUS && references.iter().any(|&r| self.is_state(r));
+        if states || references.iter().any(|&reference| reference as usize >= self.product.layout.parameters)
+        {
             for (i, &value) in scalars(&self.accesses, references).zip(values) {
                 self.check_range(i, value)?;
             }
         }
-        let states = self.mode == Mode::CONTINUOUS && references.iter().any(|&r| self.is_state(r));
         if states {
             // Those that are not set are in the values too, once they have been computed.
             self.refresh();

@@ -227,6 +227,9 @@ fn states_that_are_none() {
     slave.ok((API.get_continuous_states)(slave.instance, x.as_mut_ptr(), 4));
     assert_eq!(x, [1.0, 2.0, 0.5, 3.0]);
     assert_eq!(slave.get("der(x)")[3], 0.0);
+    let message = slave.refused(slave.set("x", &[1.0, f64::INFINITY, 0.5, 3.0]));
+    assert_eq!(message, "fmi3SetFloat64: x.y_p is inf, must be finite");
+    assert_eq!(slave.get("x"), [1.0, 2.0, 0.5, 3.0]);
     slave.ok((API.enter_event_mode)(slave.instance));
     assert!(slave.refused(slave.set("x", &[1.0; 4])).contains("x is of causality output"));
     // A state of model exchange is none of co-simulation.
