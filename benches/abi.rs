@@ -1,9 +1,10 @@
 //! Cost of the C interface in a step: `cargo bench --bench abi`.
 //!
-//! The same filter, from the same configuration, runs once in process (`SafetyFilter::step`) and once through the
-//! shared library as an importer loads it. Steps are of about 1 ms on the way to the disc, where the row is
+//! The same filter, from the same configuration, runs once in process (`SafetyFilter::step`) and through the
+//! shared library as an importer loads it, once by FMI 2.0 and once by FMI 3.0 with arrays. Steps are of about 1 ms on the way to the disc, where the row is
 //! active. After a thousand of them both go back to their first state, which costs a thousandth of it. "doStep
-//! adds" is the difference of both, measured in turns, so that a busy machine slows both.
+//! adds" is the difference to the filter in process, measured in turns, so that a busy machine slows both. "instantiate"
+//! is a new instance and its end.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
@@ -11,7 +12,7 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use api::API;
+use api::{API, three};
 use criterion::{Criterion, criterion_group, criterion_main};
 use fmu::Fmu;
 use punctual_core::filter::{FilterState, SafetyFilter};
@@ -27,6 +28,9 @@ mod fmu;
 #[path = "../tests/abi/slave.rs"]
 #[allow(dead_code, reason = "a benchmark uses a part")]
 mod slave;
+#[path = "../tests/abi/fmi3/slave.rs"]
+#[allow(dead_code, reason = "a benchmark uses a part")]
+mod slave3;
 mod support;
 
 /// The step size in s, 2⁻¹⁰ so that times are exact, and the number of steps from [`T`] on until both go back.
@@ -85,6 +89,16 @@ impl Plain {
     }
 }
 
+/// The communication point after `k` steps, which is counted on; after all of them `back` goes back to the first.
+fn next(k: &mut u32, back: impl FnOnce()) -> f64 {
+    if *k == STEPS {
+        back();
+        *k = 0;
+    }
+    *k += 1;
+    T + H * f64::from(*k - 1)
+}
+
 /// The filter behind the shared library, and the state it goes back to.
 struct Shared<'a> {
     slave: Slave<'a>,
@@ -108,12 +122,7 @@ impl<'a> Shared<'a> {
 
     /// The next communication point.
     fn time(&mut self) -> f64 {
-        if self.k == STEPS {
-            self.slave.restore(self.start);
-            self.k = 0;
-        }
-        self.k += 1;
-        T + H * f64::from(self.k - 1)
+        next(&mut self.k, || self.slave.restore(self.start))
     }
 
     fn step(&mut self) {
@@ -133,6 +142,64 @@ impl<'a> Shared<'a> {
     }
 }
 
+/// The filter behind the functions of FMI 3.0.
+struct Arrays<'a> {
+    slave: slave3::Slave<'a>,
+    start: api::State,
+    inputs: [f64; 6],
+    /// The references of `x` and `u_ref`, and of `u`.
+    references: ([u32; 2], u32),
+    k: u32,
+}
+
+impl<'a> Arrays<'a> {
+    fn new(fmu: &'a Fmu, u_ref: [f64; 2]) -> Self {
+        let slave = slave3::Slave::ready(fmu);
+        slave.set_inputs(&[0.0; 6]);
+        slave.step(0.0, T - H);
+        let inputs = [X[0], X[1], X[2], X[3], u_ref[0], u_ref[1]];
+        slave.set_inputs(&inputs);
+        slave.step(T - H, H);
+        let [x, u_ref, u] = ["x", "u_ref", "u"].map(|name| fmu.item(name).reference());
+        let start = slave.state();
+        Self { slave, start, inputs, references: ([x, u_ref], u), k: 0 }
+    }
+
+    /// The next communication point.
+    fn time(&mut self) -> f64 {
+        let Self { slave, start, k, .. } = self;
+        next(k, || slave.ok((three::API.set_state)(slave.instance, *start)))
+    }
+
+    fn step(&mut self) {
+        let t = self.time();
+        self.slave.step(black_box(t), H);
+    }
+
+    /// Makes a cycle of an importer: inputs, step, outputs.
+    fn cycle(&mut self) -> [f64; 2] {
+        let t = self.time();
+        let (instance, (inputs, output)) = (self.slave.instance, self.references);
+        let values = black_box(self.inputs.as_ptr());
+        self.slave.ok((three::API.set_float64)(instance, inputs.as_ptr(), 2, values, 6));
+        self.slave.step(t, H);
+        let mut u = [0.0; 2];
+        self.slave.ok((three::API.get_float64)(instance, &raw const output, 1, u.as_mut_ptr(), 2));
+        u
+    }
+}
+
+/// The time that `step` takes longer than `plain`, over `n` steps in turns.
+fn added(n: u64, mut step: impl FnMut(), mut plain: impl FnMut()) -> Duration {
+    let (mut with, mut without) = (Duration::ZERO, Duration::ZERO);
+    for done in (0..n).step_by(TURN as usize) {
+        let turn = TURN.min(n - done);
+        with += timed(turn, &mut step);
+        without += timed(turn, &mut plain);
+    }
+    with.saturating_sub(without)
+}
+
 fn timed(n: u64, mut work: impl FnMut()) -> Duration {
     let start = Instant::now();
     (0..n).for_each(|_| work());
@@ -148,28 +215,29 @@ fn interface(c: &mut Criterion) {
     ];
     for sampling in ["pointwise", "measured"] {
         for (size, bounded, obstacles, u_ref) in sizes {
-            let fmu = Fmu::new(&configuration(sampling, bounded, obstacles));
+            let text = configuration(sampling, bounded, obstacles);
+            let (fmu, of_fmi3) = (Fmu::new(&text), Fmu::of_fmi3(&text, true));
             let (mut plain, mut shared) = (Plain::new(&fmu, u_ref), Shared::new(&fmu, u_ref));
+            let mut arrays = Arrays::new(&of_fmi3, u_ref);
             for _ in 0..=STEPS {
                 plain.step();
-                let bits = [shared.cycle(), plain.u].map(|u| u.map(f64::to_bits));
-                assert_eq!(bits[0], bits[1], "{size}: the library and the filter in process differ");
+                let bits = [shared.cycle(), arrays.cycle(), plain.u].map(|u| u.map(f64::to_bits));
+                assert_eq!(bits, [bits[2]; 3], "{size}: the library and the filter in process differ");
             }
             let mut group = c.benchmark_group(format!("{size}, {sampling}"));
             group.bench_function("in process", |b| b.iter(|| plain.step()));
             group.bench_function("doStep", |b| b.iter(|| shared.step()));
             group.bench_function("set, doStep, get", |b| b.iter(|| shared.cycle()));
+            group.bench_function("fmi3DoStep", |b| b.iter(|| arrays.step()));
+            group.bench_function("set, fmi3DoStep, get", |b| b.iter(|| arrays.cycle()));
             group.bench_function("doStep adds", |b| {
-                b.iter_custom(|n| {
-                    let (mut with, mut without) = (Duration::ZERO, Duration::ZERO);
-                    for done in (0..n).step_by(TURN as usize) {
-                        let turn = TURN.min(n - done);
-                        with += timed(turn, || shared.step());
-                        without += timed(turn, || plain.step());
-                    }
-                    with.saturating_sub(without)
-                });
+                b.iter_custom(|n| added(n, || shared.step(), || plain.step()));
             });
+            group.bench_function("fmi3DoStep adds", |b| {
+                b.iter_custom(|n| added(n, || arrays.step(), || plain.step()));
+            });
+            group.bench_function("instantiate", |b| b.iter(|| drop(Slave::new(&fmu))));
+            group.bench_function("instantiate, FMI 3.0", |b| b.iter(|| drop(slave3::Slave::new(&of_fmi3))));
         }
     }
 }

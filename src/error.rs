@@ -167,8 +167,10 @@ pub struct CallFailure {
     pub path: PathBuf,
     /// The communication point of the call, in seconds; `None` before the experiment is set up.
     pub time: Option<f64>,
-    /// The status that it returned; `None` where it returned a null instance.
+    /// The status that it returned; `None` where it returned a null instance, or what it returned is not at fault.
     pub status: Option<Status>,
+    /// What was wrong although it succeeded, as the end of a sentence.
+    pub fault: Option<String>,
     /// The last log messages of that instance, oldest first.
     pub log: Vec<LogMessage>,
 }
@@ -178,6 +180,10 @@ impl fmt::Display for CallFailure {
         write!(f, "{} of {} ({})", self.call, self.instance, self.path.display())?;
         if let Some(time) = self.time {
             write!(f, " at t = {} s", brief_time(time))?;
+        }
+        if let Some(fault) = &self.fault {
+            write!(f, " {fault}")?;
+            return self.log.iter().try_for_each(|message| write!(f, "\n  {message}"));
         }
         match self.status {
             None => f.write_str(" returned no instance")?,

@@ -74,7 +74,8 @@ impl References {
             let text = fmu.text(&format!("{FOLDER}/{source}"));
             let text =
                 text.ok_or_else(|| problem(format!("{MANIFEST} names {source}, which is not there")))?;
-            Table::parse(&text).map(Some).map_err(|e| problem(format!("{source}: {e}")))
+            let table = Table::parse(&text, |name| is_number(fmu, name));
+            table.map(Some).map_err(|e| problem(format!("{source}: {e}")))
         };
         let results =
             table("result")?.ok_or_else(|| problem(format!("{MANIFEST} names no results as text/csv")))?;
@@ -206,19 +207,35 @@ fn moved(array: &[Variable], k: usize) -> Vec<f64> {
 /// A column as the FMU has it: type, value reference and number of values.
 type Column = (DataType, u32, usize);
 
-fn columns(fmu: &Fmu, names: &[String]) -> Result<Vec<Column>, Error> {
+/// Whether a column is, as far as the FMU knows it, one of numbers.
+fn is_number(fmu: &Fmu, name: &str) -> bool {
     let description = fmu.description();
-    let find = |name: &String| {
+    let at = description.index_of(name).or_else(|| description.array(name).map(|array| array.first));
+    at.and_then(|at| description.variables.get(at)).is_none_or(Variable::is_number)
+}
+
+/// The columns of a table, which must be as wide as the variables.
+fn columns(fmu: &Fmu, table: &Table) -> Result<Vec<Column>, Error> {
+    let description = fmu.description();
+    let find = |(c, name): (usize, &String)| {
+        let problem = |text: String| Error::fmu(fmu.path(), FmuProblem::References(text));
         let array = description.array(name).map(|array| array.first);
         let at = description.index_of(name).or(array).filter(|at| description.variables[*at].is_number());
         let Some(at) = at else {
-            let text = format!("there is no variable {name:?} that is a number");
-            return Err(Error::fmu(fmu.path(), FmuProblem::References(text)));
+            return Err(problem(format!("there is no variable {name:?} that is a number")));
         };
         let variable = &description.variables[at];
+        let width = table.rows.first().map(|row| row[c].len());
+        if width.is_some_and(|width| width != variable.count) {
+            let width = width.unwrap_or_default();
+            return Err(problem(format!(
+                "{name} has {width} numbers in a row; must have {}",
+                variable.count
+            )));
+        }
         Ok((variable.of, variable.value_reference, variable.count))
     };
-    names.iter().map(find).collect()
+    table.names.iter().enumerate().map(find).collect()
 }
 
 /// Runs the FMU over the times of `wanted`, with these inputs, and hands each row of its columns to `row`.
@@ -228,8 +245,8 @@ fn run(
     wanted: &Table,
     mut row: impl FnMut(Vec<Vec<f64>>),
 ) -> Result<(), Error> {
-    let outputs = columns(fmu, &wanted.names)?;
-    let given = columns(fmu, inputs.map_or(&[], |table| &table.names))?;
+    let outputs = columns(fmu, wanted)?;
+    let given = inputs.map(|table| columns(fmu, table)).transpose()?.unwrap_or_default();
     let mut slave = fmu.instantiate(fmu.description(), INSTANCE)?;
     let (Some(&start), Some(&stop)) = (wanted.times.first(), wanted.times.last()) else { return Ok(()) };
     slave.setup_experiment(start, stop)?;
@@ -286,25 +303,30 @@ impl Table {
         text
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
+    /// Reads a table. Columns that are no numbers, but texts or bytes, are left out.
+    fn parse(text: &str, is_number: impl Fn(&str) -> bool) -> Result<Self, String> {
         let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
         let head = fields(lines.next().ok_or("is empty")?.1);
-        let names: Vec<String> = head.into_iter().skip(1).collect();
-        let mut table = Self { names, ..Self::default() };
+        let width = head.len();
+        let kept: Vec<bool> = head.iter().enumerate().map(|(c, name)| c == 0 || is_number(name)).collect();
+        let names = head.into_iter().zip(&kept).skip(1).filter(|(_, kept)| **kept).map(|(name, _)| name);
+        let mut table = Self { names: names.collect(), ..Self::default() };
         for (number, line) in lines {
             let number = number + 1;
             let cells = fields(line);
-            if cells.len() != table.names.len() + 1 {
-                let (found, wanted) = (cells.len(), table.names.len() + 1);
-                return Err(format!("line {number} has {found} fields; must have {wanted}"));
+            if cells.len() != width {
+                return Err(format!("line {number} has {} fields; must have {width}", cells.len()));
             }
             let mut numbers = Vec::new();
-            for cell in &cells {
+            for (cell, _) in cells.iter().zip(&kept).filter(|(_, kept)| **kept) {
                 let values: Result<Vec<f64>, _> = cell.split_whitespace().map(value).collect();
                 numbers.push(values.map_err(|word| format!("line {number}: {word:?} is no number"))?);
             }
             let time = numbers.remove(0);
             let [time] = time[..] else { return Err(format!("line {number} has no time")) };
+            if !time.is_finite() {
+                return Err(format!("line {number}: the time is {time}; must be finite"));
+            }
             if table.times.last().is_some_and(|last| *last >= time) {
                 return Err(format!("line {number}: the time {time} is not after the one before"));
             }
@@ -358,7 +380,9 @@ mod tests {
             times: vec![0.0, 0.1],
             rows: vec![vec![vec![1.0, -0.0], vec![f64::INFINITY]], vec![vec![0.1 + 0.2, 1e-300], vec![5.0]]],
         };
-        assert_eq!(Table::parse(&table.text()).unwrap(), table);
+        assert_eq!(Table::parse(&table.text(), |_| true).unwrap(), table);
+        let without = Table::parse(&table.text(), |name| name == "u").unwrap();
+        assert_eq!((without.names, without.rows[1].len()), (vec!["u".to_owned()], 1));
     }
 
     #[test]
@@ -369,9 +393,10 @@ mod tests {
             ("time,y\n0,one", "line 2: \"one\" is no number"),
             ("time,y\n0,1\n0,1", "line 3: the time 0 is not after the one before"),
             ("time,y\n,1", "line 2 has no time"),
+            ("time,y\nnan,1", "line 2: the time is NaN; must be finite"),
             ("time,y\n0,1 2\n1,1", "line 3 has other numbers of values than the first"),
         ] {
-            assert_eq!(Table::parse(text).unwrap_err(), expected);
+            assert_eq!(Table::parse(text, |_| true).unwrap_err(), expected);
         }
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::elementary;
 use crate::error::{Error, length};
+use crate::jet::Tangent;
 use crate::scalar::Scalar;
 
 /// A plant `ẋ = f(x) + g(x) u` with `NX` states and `NU` inputs.
@@ -274,6 +275,13 @@ pub trait DynPlant: Send {
     ///
     /// A slice of the wrong length.
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error>;
+
+    /// Writes the rate of each state per second at the state `x` and the input `u`, and its change along their direction.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error>;
 }
 
 /// Checks the lengths of a state and an input.
@@ -281,7 +289,7 @@ pub trait DynPlant: Send {
 /// # Errors
 ///
 /// A slice of another length than the one beside it.
-pub fn check_lengths((x, states): (&[f64], usize), (u, inputs): (&[f64], usize)) -> Result<(), Error> {
+pub fn check_lengths<T>((x, states): (&[T], usize), (u, inputs): (&[T], usize)) -> Result<(), Error> {
     length("x", x.len(), states)?;
     length("u", u.len(), inputs)
 }
@@ -306,6 +314,14 @@ where
         check_lengths((x, NX), (u, NU))?;
         let next = rk4_step(&self.0, &SVector::from_column_slice(x), &SVector::from_column_slice(u), dt);
         x.copy_from_slice(next.as_slice());
+        Ok(())
+    }
+
+    fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error> {
+        check_lengths((x, NX), (u, NU))?;
+        length("rates", rates.len(), NX)?;
+        let (x, u) = (SVector::from_column_slice(x), SVector::from_column_slice(u));
+        rates.copy_from_slice(self.0.derivative(&x, &u).as_slice());
         Ok(())
     }
 }

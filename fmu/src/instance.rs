@@ -16,6 +16,7 @@
 mod access;
 mod arrays;
 mod derivative;
+mod exchange;
 
 use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
 
@@ -48,17 +49,28 @@ impl Mode {
     pub const STEP: Self = Self(4);
     /// After `fmi2Terminate`.
     pub const TERMINATED: Self = Self(8);
+    /// At an event, in model exchange.
+    pub const EVENT: Self = Self(16);
+    /// Between events, in model exchange.
+    pub const CONTINUOUS: Self = Self(32);
     /// None of them.
     pub const NONE: Self = Self(0);
     /// All of them.
-    pub const ANY: Self = Self(15);
+    pub const ANY: Self = Self(63);
 
     pub(crate) const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// Each mode by itself.
-    pub const EACH: [Self; 4] = [Self::INSTANTIATED, Self::INITIALIZATION, Self::STEP, Self::TERMINATED];
+    pub const EACH: [Self; 6] = [
+        Self::INSTANTIATED,
+        Self::INITIALIZATION,
+        Self::STEP,
+        Self::TERMINATED,
+        Self::EVENT,
+        Self::CONTINUOUS,
+    ];
 
     /// Whether `self` is among `modes`.
     pub fn is_in(self, modes: Self) -> bool {
@@ -72,6 +84,8 @@ impl Mode {
             Self::INITIALIZATION => "initialization",
             Self::STEP => "step",
             Self::TERMINATED => "terminated",
+            Self::EVENT => "event",
+            Self::CONTINUOUS => "continuous time",
             _ => "several modes",
         }
     }
@@ -96,24 +110,51 @@ pub enum Call {
     DoStep,
     /// `fmi2GetDirectionalDerivative`; `fmi3GetAdjointDerivative` too.
     GetDirectionalDerivative,
+    /// `fmi3EnterEventMode`.
+    EnterEventMode,
+    /// `fmi3UpdateDiscreteStates`.
+    UpdateDiscreteStates,
+    /// `fmi3EnterContinuousTimeMode`.
+    EnterContinuousTimeMode,
+    /// `fmi3SetTime`, `fmi3SetContinuousStates` and `fmi3CompletedIntegratorStep`.
+    Integrate,
+    /// `fmi3GetContinuousStates` and its like.
+    GetContinuousStates,
+}
+
+/// The interface that an instance is used by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// It is stepped.
+    CoSimulation,
+    /// Its importer integrates its states.
+    ModelExchange,
 }
 
 /// The modes in which each call is legal in FMI 2.0 and in FMI 3.0, in the order of [`Call`] (FMI 2.0.4, section 4.2.4,
-/// figure 11; FMI 3.0.2, sections 2.3.2 to 2.3.8 and 4.2.1). They are wider than the standards where importers are:
+/// figure 11; FMI 3.0.2, sections 2.3.2 to 2.3.8, 3.2.1 and 4.2.1). They are wider than the standards where importers are:
 /// values may be read in every mode. Calls that are not here are legal in every mode.
-pub const LEGAL: [(Call, Mode, Mode); 8] = {
+pub const LEGAL: [(Call, Mode, Mode); 13] = {
+    const EXCHANGED: Mode = Mode::EVENT.or(Mode::CONTINUOUS);
     const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP);
     const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED);
+    const STATES: Mode = Mode::INITIALIZATION.or(EXCHANGED).or(Mode::TERMINATED);
     [
-        // FMI 3.0 has the experiment in fmi3EnterInitializationMode.
-        (Call::SetupExperiment, Mode::INSTANTIATED, Mode::NONE),
+        // FMI 3.0 has no such function, but in process there is one for both.
+        (Call::SetupExperiment, Mode::INSTANTIATED, Mode::INSTANTIATED),
         (Call::EnterInitializationMode, Mode::INSTANTIATED, Mode::INSTANTIATED),
         (Call::ExitInitializationMode, Mode::INITIALIZATION, Mode::INITIALIZATION),
-        (Call::Terminate, Mode::STEP, Mode::STEP),
+        (Call::Terminate, Mode::STEP, Mode::STEP.or(EXCHANGED)),
         (Call::Get, Mode::ANY, Mode::ANY),
-        (Call::Set, SETTABLE, SETTABLE),
+        (Call::Set, SETTABLE, SETTABLE.or(EXCHANGED)),
         (Call::DoStep, Mode::STEP, Mode::STEP),
-        (Call::GetDirectionalDerivative, KNOWN, KNOWN),
+        (Call::GetDirectionalDerivative, KNOWN, KNOWN.or(EXCHANGED)),
+        // FMI 2.0 has no model exchange here.
+        (Call::EnterEventMode, Mode::NONE, Mode::CONTINUOUS),
+        (Call::UpdateDiscreteStates, Mode::NONE, Mode::EVENT),
+        (Call::EnterContinuousTimeMode, Mode::NONE, Mode::EVENT),
+        (Call::Integrate, Mode::NONE, Mode::CONTINUOUS),
+        (Call::GetContinuousStates, Mode::NONE, STATES),
     ]
 };
 
@@ -185,13 +226,14 @@ pub struct State {
     pub block: BlockState,
 }
 
-/// One instance of an FMU.
+/// One instance of an FMU, of either version of FMI.
 pub struct Instance {
     product: Product,
     /// Type and causality by value reference: checked at every read and write, in few bytes.
     kinds: Vec<(BaseType, Causality, Variability)>,
     /// The same for FMI 3.0, with the lengths of arrays; empty for FMI 2.0.
     accesses: Vec<Access>,
+    interface: Interface,
     block: Box<dyn Block>,
     /// The state of a new block, which remembers nothing yet.
     start: BlockState,
@@ -240,11 +282,12 @@ impl Instance {
         block.save(&mut start);
         let kinds =
             product.variables.iter().map(|v| (v.kind.base_type(), v.causality, v.variability)).collect();
-        let accesses = product.accesses();
+        let (accesses, rates) = (product.accesses(), product.layout.rates);
         let mut instance = Self {
             product,
             kinds,
             accesses,
+            interface: Interface::CoSimulation,
             block,
             start,
             mode: Mode::INSTANTIATED,
@@ -257,10 +300,32 @@ impl Instance {
             configured: false,
             unbroken: Unbroken::at(0.0),
             mistimed: Mistimed::Never,
-            derivative: std::array::from_fn(|_| vec![0.0; len]),
+            derivative: std::array::from_fn(|_| vec![0.0; len + 1 + rates]),
         };
         instance.start_values();
         Ok(instance)
+    }
+
+    /// The same for model exchange: the importer integrates the states.
+    ///
+    /// # Errors
+    ///
+    /// As of [`Self::new`]; an FMU that has to be stepped.
+    pub fn for_model_exchange(configuration: Configuration, guid: &str) -> Result<Self, Failure> {
+        let instance = Self::new(configuration, guid)?;
+        if instance.product.layout.rates == 0 {
+            let why = match instance.product.configuration {
+                Configuration::Plant(_) => "since a plant with a disturbance has to be stepped",
+                _ => "which plants alone have",
+            };
+            return Err(format!("the FMU has no model exchange, {why}"));
+        }
+        Ok(Self { interface: Interface::ModelExchange, ..instance })
+    }
+
+    /// The interface that it is used by.
+    pub fn interface(&self) -> Interface {
+        self.interface
     }
 
     /// The present mode.
@@ -281,6 +346,11 @@ impl Instance {
     /// The version of FMI that it is an instance of.
     pub fn fmi(&self) -> FmiVersion {
         self.product.configuration.experiment().fmi
+    }
+
+    /// Whether it is past its initialization, so that fixed parameters stay as they are.
+    fn is_running(&self) -> bool {
+        self.mode.is_in(Mode::STEP.or(Mode::EVENT).or(Mode::CONTINUOUS))
     }
 
     /// Whether `call` is legal now.
@@ -347,7 +417,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Takes the parameters over and goes to step mode.
+    /// Takes the parameters over and goes to step mode; in model exchange to event mode.
     ///
     /// # Errors
     ///
@@ -355,7 +425,10 @@ impl Instance {
     pub fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
         self.check(Call::ExitInitializationMode)?;
         self.configure().map_err(|e| e.to_string())?;
-        self.mode = Mode::STEP;
+        self.mode = match self.interface {
+            Interface::CoSimulation => Mode::STEP,
+            Interface::ModelExchange => Mode::EVENT,
+        };
         (self.unbroken, self.mistimed) = (Unbroken::at(self.time), Mistimed::Never);
         self.block.output(self.time, &mut self.values);
         self.fresh = true;
@@ -415,6 +488,7 @@ impl Instance {
             product,
             kinds: _,
             accesses: _,
+            interface: _,
             block,
             start: _,
             mode,
@@ -448,6 +522,16 @@ impl Instance {
             return Err(format!(
                 "the state belongs to the FMU with the GUID {guid:?}, must be {:?}",
                 self.product.guid
+            ));
+        }
+        let foreign = match self.interface {
+            Interface::CoSimulation => Mode::EVENT.or(Mode::CONTINUOUS),
+            Interface::ModelExchange => Mode::STEP,
+        };
+        if mode.is_in(foreign) {
+            return Err(format!(
+                "the state is one in the mode {:?}, which the interface of this instance does not have",
+                mode.name()
             ));
         }
         let parameters = self.product.layout.parameters..self.product.layout.end;
@@ -625,7 +709,7 @@ impl Instance {
     fn taken_over(&mut self, references: &[u32]) {
         self.fresh &= references.is_empty();
         let tuned = references.iter().any(|&reference| reference as usize >= self.product.layout.parameters);
-        if tuned && self.mode == Mode::STEP {
+        if tuned && self.is_running() {
             // The block reads from the values what may change in a run. It matters at once.
             self.block.output(self.time, &mut self.values);
         } else if tuned {
@@ -678,7 +762,7 @@ impl Instance {
     /// Computes the outputs if inputs changed since the last time.
     fn refresh(&mut self) {
         let lazy = match self.mode {
-            Mode::INITIALIZATION => true,
+            Mode::INITIALIZATION | Mode::EVENT | Mode::CONTINUOUS => true,
             Mode::STEP => self.block.direct_feedthrough(),
             _ => false,
         };

@@ -1,4 +1,4 @@
-//! The safety filter, the reference plants and nominal controllers as one FMI 2.0 co-simulation library.
+//! The safety filter, the reference plants and nominal controllers as one library of FMI 2.0 and 3.0.
 //!
 //! Every FMU that Punctual makes is this library with another `resources/configuration.toml`: a
 //! filter, a plant or a controller. The layers, each using only those above it:
@@ -11,7 +11,7 @@
 //! | [`block`] | the computation: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
-//! | `abi` | the 34 exported functions: guard, convert, delegate; plug-ins. The only unsafe code |
+//! | `abi` | the exported functions, 34 of FMI 2.0 and 75 of 3.0: guard, convert, delegate; plug-ins. The only unsafe code |
 //!
 //! [`fmi2`] and [`fmi3`] have the C types of each version and the table of its functions, for whoever calls such a library.
 #![deny(unsafe_code)]

@@ -63,6 +63,8 @@ pub struct Layout {
     pub outputs: usize,
     /// First parameter.
     pub parameters: usize,
+    /// Number of states that an importer may integrate itself: those of a plant without a disturbance, else 0.
+    pub rates: usize,
     /// One past the last parameter: the first code, where there are [codes](Product::enumerated).
     pub end: usize,
 }
@@ -83,7 +85,7 @@ impl Product {
         let experiment = configuration.experiment();
         let items = match experiment.fmi {
             FmiVersion::Two => Vec::new(),
-            FmiVersion::Three => arrays::items(&variables, &layout, experiment.arrays, 0),
+            FmiVersion::Three => arrays::items(&variables, &layout, experiment.arrays),
         };
         if let Some(other) = variables.iter().find(|v| !items.is_empty() && v.name == TIME) {
             let message =
@@ -147,7 +149,7 @@ impl Product {
                 provides_directional_derivative: true,
                 ..CoSimulation::default()
             },
-            units: units(&self.variables),
+            units: units(self.variables.iter().filter_map(|v| v.kind.unit())),
             types: match &self.configuration {
                 Configuration::Filter(c) => {
                     let mut types = vec![status_type(), phase_type()];
@@ -187,8 +189,8 @@ fn guid(canonical: &str, variables: &[Variable]) -> String {
 }
 
 /// The units used. One that [`base_unit`] cannot read is left out, and the XML is then refused.
-fn units(variables: &[Variable]) -> Vec<Unit> {
-    let mut names: Vec<&str> = variables.iter().filter_map(|v| v.kind.unit()).collect();
+fn units<'a>(names: impl Iterator<Item = &'a str>) -> Vec<Unit> {
+    let mut names: Vec<&str> = names.collect();
     names.sort_unstable();
     names.dedup();
     names
@@ -436,10 +438,11 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         // At the start it may depend on any state and constant.
         table.signal("y", output, "", Causality::Output).dependencies = Some(Vec::new());
     }
+    let rates = if c.can_be_integrated() { states.len() } else { 0 };
     table.finish(
         c,
         &c.parameters(),
-        Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() },
+        Layout { states: states.len(), inputs: inputs.len(), outputs, rates, ..Layout::default() },
     )
 }
 

@@ -196,6 +196,11 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     // The fields of the instance, and the values in the order of the table.
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
+    if mode.is_in(Mode::EVENT.or(Mode::CONTINUOUS)) && !(has_stop(product) && product.layout.rates > 0) {
+        // These two come after all others.
+        let index = Mode::EACH.iter().position(|each| *each == mode).unwrap_or_default();
+        return Err(format!("mode: is {index}, must be < {}", Mode::EACH.len() - 2));
+    }
     let time = input.finite("time")?;
     let stop = if has_stop(product) { input.field("stop")? } else { f64::INFINITY };
     if stop.is_nan() {
@@ -205,7 +210,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     let last_step = input.finite("last_step")?;
     let fresh = input.field("fresh")?;
     let configured: bool = input.field("configured")?;
-    if !configured && mode.is_in(Mode::STEP.or(Mode::TERMINATED)) {
+    if !configured && !mode.is_in(Mode::INSTANTIATED.or(Mode::INITIALIZATION)) {
         return Err(format!("configured: is false, must be true in the mode {:?}", mode.name()));
     }
     let values = read_values(product, &mut input)?;

@@ -174,7 +174,15 @@ impl<'a> Resolver<'a> {
             );
         }
         let unknown = format!("{} ({}) has no variable {name:?}", owner.name, owner.fmu);
-        format!("{unknown}{}", self.similar(component, name))
+        // As the variables of the same FMU of FMI 2.0 are called.
+        let base = name.split_once('.').and_then(|(base, _)| description.array(base));
+        match base.and_then(|array| Some((array, description.variables.get(array.first)?))) {
+            Some((array, first)) => {
+                let (base, sizes) = (&array.name, sizes(&array.sizes));
+                format!("{unknown}; {base} is an array of {sizes}, with elements such as {:?}", first.name)
+            }
+            None => format!("{unknown}{}", self.similar(component, name)),
+        }
     }
 
     /// A hint at variables whose name ends alike or contains the name given.

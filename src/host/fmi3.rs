@@ -145,7 +145,7 @@ impl Instance {
     }
 
     /// The state that a call gave.
-    fn saved(&self, call: &str, state: fmi3::State) -> Result<Saved, Error> {
+    fn saved(&self, call: &'static str, state: fmi3::State) -> Result<Saved, Error> {
         let state = std::ptr::NonNull::new(state);
         state.map(Saved).ok_or_else(|| self.handle.broken(call, "gave no state, though it returned fmi3OK"))
     }
@@ -249,7 +249,8 @@ impl Participant for Instance {
             return Err(self.handle.broken("fmi3DoStep", how));
         }
         let asked = time + step;
-        if self.off.is_none() && !((reached - asked).abs() <= ON_TIME * step) {
+        let is_on_time = (reached - asked).abs() <= ON_TIME * step;
+        if self.off.is_none() && !is_on_time {
             self.off = Some((asked, reached));
         }
         Ok(())

@@ -49,6 +49,7 @@ impl Handle {
                 path: fmu.path().to_owned(),
                 time: None,
                 status: None,
+                fault: None,
                 log: logging.messages(),
             }));
         };
@@ -117,27 +118,30 @@ impl Handle {
             self.warnings += 1;
             return Ok(());
         }
-        Err(Error::call(CallFailure {
-            call,
-            instance: self.name.clone(),
-            path: self.fmu.path().to_owned(),
-            time: self.time,
-            status: Some(status),
-            log: self.logging.messages(),
-        }))
+        Err(self.failure(call, Some(status), None))
     }
 
     /// The error of a call that was done, but not as the standard says.
     #[cold]
-    pub(super) fn broken(&self, call: &str, how: impl Into<String>) -> Error {
-        let time = self.time.map(|time| format!(" at t = {} s", crate::error::brief_time(time)));
-        let (name, path) = (&self.name, self.fmu.path().display());
-        Error::broken(format!("{call} of {name} ({path}){}", time.unwrap_or_default()), how)
+    pub(super) fn broken(&self, call: &'static str, how: impl Into<String>) -> Error {
+        self.failure(call, None, Some(how.into()))
+    }
+
+    fn failure(&self, call: &'static str, status: Option<Status>, fault: Option<String>) -> Error {
+        Error::call(CallFailure {
+            call,
+            instance: self.name.clone(),
+            path: self.fmu.path().to_owned(),
+            time: self.time,
+            status,
+            fault,
+            log: self.logging.messages(),
+        })
     }
 
     /// The error of a number that its type, or a run, cannot hold.
     #[cold]
-    pub(super) fn lost(&self, call: &str, of: DataType, references: &[u32], loss: &Loss) -> Error {
+    pub(super) fn lost(&self, call: &'static str, of: DataType, references: &[u32], loss: &Loss) -> Error {
         let mut element = loss.at;
         let mut variable = None;
         for reference in references {

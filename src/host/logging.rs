@@ -215,7 +215,7 @@ mod tests {
         unsafe { punctual_host_logger(std::ptr::null_mut(), null, fmi2::Status::OK, null, c"lost".as_ptr()) };
         // SAFETY: as above. A conversion that writes is not carried out: nothing is there to write to.
         unsafe {
-            punctual_host_logger(environment, instance, fmi2::Status::OK, null, c"100%n %s\x1b[2J".as_ptr())
+            punctual_host_logger(environment, instance, fmi2::Status::OK, null, c"100%n %s\x1b[2J".as_ptr());
         };
         let messages = logging.messages();
         assert_eq!(messages.len(), 3);
@@ -252,7 +252,7 @@ mod tests {
         let (callback, null) = (callback.expect("a callback"), std::ptr::null());
         // SAFETY: the environment lives; texts are literals.
         unsafe {
-            callback(environment, fmi3::Status::ERROR, c"logError".as_ptr(), c"100%n\x1b[2J\n".as_ptr())
+            callback(environment, fmi3::Status::ERROR, c"logError".as_ptr(), c"100%n\x1b[2J\n".as_ptr());
         };
         // SAFETY: NULL is allowed.
         unsafe { callback(environment, fmi3::Status(9), null, null) };

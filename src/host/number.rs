@@ -55,7 +55,7 @@ pub(crate) trait Number: Copy + Default + Display {
 }
 
 macro_rules! whole {
-    ($($type:ty),*) => {$(
+    ($($type:ty: $double:expr;)*) => {$(
         impl Number for $type {
             // Of the types of 64 bits the bound of a double counts.
             const RANGE: (f64, f64) = (
@@ -64,7 +64,7 @@ macro_rules! whole {
             );
 
             fn to_double(self) -> Option<f64> {
-                let value = self as f64;
+                let value = ($double)(self);
                 let fits = (Self::RANGE.0..=Self::RANGE.1).contains(&value) && value as Self == self;
                 fits.then_some(value)
             }
@@ -77,7 +77,17 @@ macro_rules! whole {
     )*};
 }
 
-whole!(i8, u8, i16, u16, i32, u32, i64, u64);
+whole! {
+    i8: f64::from;
+    u8: f64::from;
+    i16: f64::from;
+    u16: f64::from;
+    i32: f64::from;
+    u32: f64::from;
+    // The nearest double, which is refused where it is another number.
+    i64: |number| number as f64;
+    u64: |number| number as f64;
+}
 
 impl Number for f32 {
     const RANGE: (f64, f64) = (f32::MIN as f64, f32::MAX as f64);

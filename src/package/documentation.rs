@@ -10,6 +10,8 @@ pub(super) type Row = [String; 6];
 /// A model description as its file, and as rows of the page.
 pub(super) struct Described {
     pub(super) xml: String,
+    /// The file of the terminals, which FMI 3.0 alone has.
+    pub(super) terminals: Option<String>,
     pub(super) rows: Vec<Row>,
 }
 

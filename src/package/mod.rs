@@ -14,6 +14,7 @@ use std::rc::Rc;
 
 use punctual_fmu::configuration::{Configuration, FmiVersion, RESOURCE};
 use punctual_fmu::product::Product;
+use punctual_modeldescription::fmi3::TERMINALS;
 use punctual_modeldescription::{Archive, Timestamp};
 
 use crate::error::Error;
@@ -57,6 +58,7 @@ fn described(product: &Product) -> Result<documentation::Described, Error> {
             let description = product.model_description();
             documentation::Described {
                 xml: description.to_xml().map_err(broken)?,
+                terminals: None,
                 rows: description.variables.iter().map(documentation::row).collect(),
             }
         }
@@ -64,6 +66,7 @@ fn described(product: &Product) -> Result<documentation::Described, Error> {
             let description = product.model_description_of_fmi3();
             documentation::Described {
                 xml: description.to_xml().map_err(broken)?,
+                terminals: Some(product.terminals().to_xml(&description).map_err(broken)?),
                 rows: description.variables.iter().map(documentation::row_of_fmi3).collect(),
             }
         }
@@ -95,6 +98,9 @@ pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Er
         FmiVersion::Three => "terminalsAndIcons/icon.png",
     };
     archive.add(icon, ICON).map_err(broken)?;
+    if let Some(terminals) = described.terminals {
+        archive.add(TERMINALS, terminals).map_err(broken)?;
+    }
     archive.add("documentation/index.html", page).map_err(broken)?;
     archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
     for library in libraries {

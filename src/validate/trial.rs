@@ -10,7 +10,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use super::finding::{Finding, Findings, Place, severity};
-use crate::error::Error;
+use crate::error::{Error, FmuProblem};
 use crate::host::{
     Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
@@ -136,8 +136,7 @@ pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<()
         let rule = match error.as_call() {
             Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
             Some(_) => "trial.call",
-            // A call that was done, but not as the standard says.
-            None if error.as_fmu_problem().is_none() => "trial.call",
+            None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
             None => "trial.load",
         };
         trial.tell(rule, None, &error.to_string());
@@ -254,10 +253,11 @@ impl Trial {
                 break;
             }
         }
+        // Before derivatives are compared with differences: inputs that are set again belong to the present time.
+        let last = self.outputs(slave, variables)?;
         if !set {
             self.derivatives(slave, description)?;
         }
-        let last = self.outputs(slave, variables)?;
         slave.terminate()?;
         Ok(last)
     }
@@ -346,16 +346,14 @@ impl Trial {
         slave.do_step(time, step)?;
         let again = self.outputs(slave, variables)?;
         self.compare_states(&first, &again, "it was set back");
-        if description.states[1]
-            && let Some(bytes) = slave.to_bytes(&before)?
-        {
-            if let Some(state) = slave.of_bytes(&bytes)? {
-                slave.restore(&state)?;
-                slave.do_step(time, step)?;
-                let again = self.outputs(slave, variables)?;
-                self.compare_states(&first, &again, "its state went through bytes");
-                slave.release(state)?;
-            }
+        let bytes = if description.states[1] { slave.to_bytes(&before)? } else { None };
+        let state = bytes.map(|bytes| slave.of_bytes(&bytes)).transpose()?.flatten();
+        if let Some(state) = state {
+            slave.restore(&state)?;
+            slave.do_step(time, step)?;
+            let again = self.outputs(slave, variables)?;
+            self.compare_states(&first, &again, "its state went through bytes");
+            slave.release(state)?;
         }
         slave.restore(&before)?;
         slave.release(before)?;
@@ -425,7 +423,8 @@ impl Trial {
             let [right, left] = [(up[i] - here[i]) / by, (here[i] - down[i]) / by];
             let allowed = AGREE * (1.0 + right.abs());
             let is_smooth = (right - left).abs() <= allowed;
-            if is_smooth && !((directional[i] - right).abs() <= allowed) {
+            let is_right = (directional[i] - right).abs() <= allowed;
+            if is_smooth && !is_right {
                 let text = format!(
                     "its directional derivative by {} is {}, the quotient of differences {right}",
                     input[0].name, directional[i]
@@ -443,7 +442,8 @@ impl Trial {
         }
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (forward, reverse) = (product(&weights, &directional), product(&reverse, &direction));
-        if !((forward - reverse).abs() <= ADJOINT * (1.0 + forward.abs())) {
+        let is_equal = (forward - reverse).abs() <= ADJOINT * (1.0 + forward.abs());
+        if !is_equal {
             let text = format!(
                 "its adjoint derivative by {} gives {reverse} where the directional one gives {forward}",
                 input[0].name

@@ -64,6 +64,26 @@ macro_rules! api {
 
 punctual_fmu::fmi2_functions!(api);
 
+/// The functions of FMI 3.0.
+pub(crate) mod three {
+    use std::ffi::c_int;
+    use std::path::Path;
+    use std::sync::LazyLock;
+
+    pub(crate) use punctual_fmu::fmi3::{
+        Binary, Boolean, Clock, ClockUpdate, DependencyKind, Environment, Instance, IntermediateUpdate,
+        IntervalQualifier, LogMessage, Preemption, State, Text, ValueReference,
+    };
+
+    /// Statuses are compared and printed as numbers here.
+    type Status = c_int;
+
+    punctual_fmu::fmi3_functions!(api);
+
+    /// The library, loaded once for all tests that do not unload it.
+    pub(crate) static API: LazyLock<Api> = LazyLock::new(|| Api::load(&super::library_path()));
+}
+
 /// The path where cargo puts the library of the tested build: beside the test's executable.
 pub(crate) fn library_path() -> PathBuf {
     let name = format!("{}punctual_fmu{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);

@@ -10,13 +10,13 @@ use crate::fmu::{EXTERNAL, FILTER, Fmu, PLANT, STEERED};
 use crate::slave::Slave;
 
 /// Step of the differences, in units of inputs of order 1 to 10.
-const STEP: f64 = 1e-4;
+pub(crate) const STEP: f64 = 1e-4;
 
 /// Tolerance of a derivative of size 1: outputs are known to 1e-9 of numbers up to 100, which STEP divides.
-const TOLERANCE: f64 = 1e-3;
+pub(crate) const TOLERANCE: f64 = 1e-3;
 
 /// A unicycle with an obstacle that is an input, tight bounds and a second barrier.
-const TRAFFIC: &str = r#"
+pub(crate) const TRAFFIC: &str = r#"
 kind = "filter"
 plant.model = "unicycle"
 bounds = { a = [-4.0, 4.0], omega = [-1.0, 1.0] }

@@ -6,8 +6,9 @@ use std::process::Command;
 use std::ptr::{null, null_mut};
 
 use punctual_fmu::fmi2::FUNCTIONS;
+use punctual_fmu::fmi3;
 
-use crate::api::{API, ERROR, library_path};
+use crate::api::{API, ERROR, library_path, three};
 
 #[test]
 fn all_34_functions_resolve() {
@@ -15,6 +16,15 @@ fn all_34_functions_resolve() {
     assert_eq!(unique.len(), 34, "{FUNCTIONS:?}");
     // Loading resolves each symbol.
     let _ = &*API;
+}
+
+#[test]
+fn all_75_functions_of_fmi3_resolve() {
+    let unique: BTreeSet<_> = fmi3::FUNCTIONS.iter().collect();
+    assert_eq!(unique.len(), 75, "{:?}", fmi3::FUNCTIONS);
+    let _ = &*three::API;
+    // SAFETY: a static string of the library.
+    assert_eq!(unsafe { CStr::from_ptr((three::API.get_version)()) }, c"3.0");
 }
 
 /// Output of a tool of binutils on the library.
@@ -29,7 +39,7 @@ fn told(tool: &str, arguments: &[&str]) -> String {
 fn nothing_else_is_exported() {
     let text = told("nm", &["-D", "--defined-only"]);
     let found: BTreeSet<_> = text.lines().filter_map(|line| line.split_whitespace().last()).collect();
-    let wanted: BTreeSet<_> = FUNCTIONS.iter().copied().collect();
+    let wanted: BTreeSet<_> = FUNCTIONS.iter().chain(fmi3::FUNCTIONS).copied().collect();
     assert_eq!(found, wanted);
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use punctual_fmu::configuration::{Configuration, FilterConfiguration, RESOURCE};
-use punctual_fmu::product::Product;
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, FmiVersion, RESOURCE};
+use punctual_fmu::product::{Item, Product};
 use tempfile::TempDir;
 
 /// A filter for the point mass with input bounds: its rows alone.
@@ -68,7 +68,16 @@ impl Fmu {
 
     /// An FMU that was extracted to a folder called `name`.
     pub(crate) fn below(name: &str, configuration: &str) -> Self {
+        Self::of(name, Configuration::parse(configuration).expect("a valid configuration"))
+    }
+
+    /// The FMU of FMI 3.0, with arrays or without.
+    pub(crate) fn of_fmi3(configuration: &str, arrays: bool) -> Self {
         let configuration = Configuration::parse(configuration).expect("a valid configuration");
+        Self::of("extracted", configuration.for_fmi(FmiVersion::Three, arrays))
+    }
+
+    fn of(name: &str, configuration: Configuration) -> Self {
         let folder = TempDir::new().expect("a temporary folder");
         let resources = folder.path().join(name).join("resources");
         std::fs::create_dir_all(&resources).unwrap();
@@ -89,6 +98,17 @@ impl Fmu {
     pub(crate) fn reference(&self, name: &str) -> u32 {
         let found = self.product.variables.iter().find(|v| v.name == name);
         found.unwrap_or_else(|| panic!("no variable {name}")).value_reference
+    }
+
+    /// The variable of FMI 3.0 called `name`.
+    pub(crate) fn item(&self, name: &str) -> &Item {
+        let found = self.product.items.iter().find(|item| item.name == name);
+        found.unwrap_or_else(|| panic!("no variable {name}"))
+    }
+
+    /// The folder of the resources as importers of FMI 3.0 pass it.
+    pub(crate) fn path(&self) -> String {
+        self.resources.display().to_string()
     }
 
     /// The configuration of a filter.

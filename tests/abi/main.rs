@@ -20,6 +20,7 @@
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `mistimed` | times that a restore took back, told at the next step |
+//! | `fmi3` | the functions of FMI 3.0, beside those of 2.0 |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
 mod api;
@@ -29,6 +30,7 @@ mod assurance;
 mod derivatives;
 mod exports;
 mod external;
+mod fmi3;
 mod fmu;
 mod instantiate;
 mod legality;

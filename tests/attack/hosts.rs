@@ -1,4 +1,4 @@
-//! Sessions of a C program, `tests/fixtures/host.c`, with every FMU of the fleet: once under
+//! Sessions of two C programs, `tests/fixtures/host.c` for FMI 2.0 and `host3.c` for 3.0, with every FMU of the fleet: once under
 //! AddressSanitizer and UBSan, once under valgrind. An access to what is not there, or memory that is still
 //! there after `fmi2FreeInstance` and `dlclose`, is an error. `PUNCTUAL_ATTACK_LIBRARY` names another build
 //! of the shared library, such as one that is itself instrumented, which valgrind does not take (`tests/nightly`).
@@ -7,13 +7,21 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::arrays;
 use crate::fleet::FLEET;
 use crate::workshop::Workshop;
 
-/// Compiles the host; the compiler's answer and the program.
-fn compiled(workshop: &Workshop, name: &str, flags: &[&str]) -> (Output, PathBuf) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/host.c");
-    let program = workshop.path(name);
+/// The two hosts: the source, and GUID and resources of each FMU as it wants them.
+fn hosts() -> [(&'static str, Vec<String>); 2] {
+    let two = FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.location()]).collect();
+    let three = arrays::FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.path()]).collect();
+    [("host", two), ("host3", three)]
+}
+
+/// Compiles a host; the compiler's answer and the program.
+fn compiled(workshop: &Workshop, host: &str, flags: &[&str]) -> (Output, PathBuf) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/fixtures/{host}.c"));
+    let program = workshop.path(host);
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut command = Command::new(&compiler);
     command.args(["-g", "-Wall", "-Wextra", "-Werror"]).args(flags).arg(source).arg("-o").arg(&program);
@@ -24,12 +32,10 @@ fn compiled(workshop: &Workshop, name: &str, flags: &[&str]) -> (Output, PathBuf
     )
 }
 
-/// The library, then GUID and resources of each FMU.
-fn arguments(workshop: &Workshop) -> Vec<String> {
+/// The library.
+fn library(workshop: &Workshop) -> String {
     let library = std::env::var("PUNCTUAL_ATTACK_LIBRARY");
-    let mut arguments = vec![library.unwrap_or_else(|_| workshop.path("library").display().to_string())];
-    arguments.extend(FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.location()]));
-    arguments
+    library.unwrap_or_else(|_| workshop.path("library").display().to_string())
 }
 
 /// Says on the terminal, past the capture of test output, that something was not tested; in CI that is a failure.
@@ -52,17 +58,19 @@ fn clean(output: &Output) {
 fn a_c_host_under_address_and_undefined_behaviour_sanitizers() {
     let workshop = Workshop::with_library();
     let flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
-    let (compiler, host) = compiled(&workshop, "host", &flags);
-    if !compiler.status.success() {
-        let (plain, _) = compiled(&workshop, "plain", &[]);
-        assert!(plain.status.success(), "{}", String::from_utf8_lossy(&plain.stderr));
-        let why = String::from_utf8_lossy(&compiler.stderr);
-        return skipped("AddressSanitizer", why.lines().last().unwrap_or_default());
+    for (name, fmus) in hosts() {
+        let (compiler, host) = compiled(&workshop, name, &flags);
+        if !compiler.status.success() {
+            let (plain, _) = compiled(&workshop, name, &[]);
+            assert!(plain.status.success(), "{}", String::from_utf8_lossy(&plain.stderr));
+            let why = String::from_utf8_lossy(&compiler.stderr);
+            return skipped("AddressSanitizer", why.lines().last().unwrap_or_default());
+        }
+        let mut command = Command::new(host);
+        command.arg(library(&workshop)).args(fmus);
+        command.env("ASAN_OPTIONS", "detect_leaks=1").env("UBSAN_OPTIONS", "print_stacktrace=1");
+        clean(&command.output().expect("the host"));
     }
-    let mut command = Command::new(host);
-    command.args(arguments(&workshop));
-    command.env("ASAN_OPTIONS", "detect_leaks=1").env("UBSAN_OPTIONS", "print_stacktrace=1");
-    clean(&command.output().expect("the host"));
 }
 
 #[test]
@@ -71,10 +79,12 @@ fn a_c_host_under_valgrind() {
         return skipped("valgrind", &why.to_string());
     }
     let workshop = Workshop::with_library();
-    let (compiler, host) = compiled(&workshop, "host", &[]);
-    assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
-    let mut command = Command::new("valgrind");
-    command.args(["-q", "--leak-check=full", "--show-leak-kinds=all", "--errors-for-leak-kinds=all"]);
-    command.args(["--error-exitcode=9", "--keep-debuginfo=yes"]).arg(host).args(arguments(&workshop));
-    clean(&command.output().expect("valgrind"));
+    for (name, fmus) in hosts() {
+        let (compiler, host) = compiled(&workshop, name, &[]);
+        assert!(compiler.status.success(), "{}", String::from_utf8_lossy(&compiler.stderr));
+        let mut command = Command::new("valgrind");
+        command.args(["-q", "--leak-check=full", "--show-leak-kinds=all", "--errors-for-leak-kinds=all"]);
+        command.args(["--error-exitcode=9", "--keep-debuginfo=yes"]).arg(host).arg(library(&workshop));
+        clean(&command.args(fmus).output().expect("valgrind"));
+    }
 }

@@ -10,6 +10,7 @@
 //! | `instance` | nothing: an instance that watches its log |
 //! | `fleet`, `machine` | nothing: FMUs of every kind, and the conditions after each call |
 //! | `calls` | the 34 functions in any order with any arguments |
+//! | `arrays` | the 75 functions of FMI 3.0 in the same way |
 //! | `states` | serialised states with bytes changed, checksums right or wrong |
 //! | `configurations` | configurations and system files |
 //! | `archives` | archives, model descriptions and library files |
@@ -21,6 +22,7 @@
 #[path = "../abi/api.rs"]
 mod api;
 mod archives;
+mod arrays;
 mod bytes;
 mod calls;
 mod campaign;

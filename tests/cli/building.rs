@@ -45,6 +45,31 @@ fn the_library_beside_the_program_is_found() {
 }
 
 #[test]
+fn both_versions_of_fmi() {
+    let workshop = workshop();
+    let said = workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--fmi", "both"]).success();
+    let says = "Fixed-time safety filter for a unicycle with";
+    let wanted = format!(
+        "x.fmu: {says} 42 variables, guid {{GUID}}\nx-fmi3.fmu: {says} 43 variables, guid {{GUID}}\n"
+    );
+    assert_eq!(without_guids(&said), wanted);
+    // The one of 2.0 is what it is without a choice.
+    workshop.punctual(["build", "filter.toml", "-o", "y.fmu"]).success();
+    assert!(workshop.bytes("x.fmu") == workshop.bytes("y.fmu"));
+    workshop.punctual(["build", "filter.toml", "-o", "z.fmu", "--fmi", "3"]).success();
+    assert!(workshop.bytes("z.fmu") == workshop.bytes("x-fmi3.fmu"), "the same file");
+    // Ours find nothing in them.
+    workshop.punctual(["validate", "x-fmi3.fmu"]).success();
+    workshop.punctual(["build", "filter.toml", "-o", "s.fmu", "--fmi", "3", "--scalars"]).success();
+    workshop.punctual(["validate", "s.fmu"]).success();
+    assert!(workshop.punctual(["inspect", "s.fmu"]).success().contains("x.x_p "));
+    let message = "--scalars: is for FMI 3.0, such as `--fmi 3`; FMI 2.0 has no arrays";
+    workshop.punctual(["build", "filter.toml", "-o", "n.fmu", "--scalars"]).fails(2, message);
+    let message = "--fmi: is for one FMU; an .ssp file takes the FMUs that the system names as they are";
+    workshop.punctual(["build", "filter.toml", "-o", "n.ssp", "--fmi", "3"]).fails(2, message);
+}
+
+#[test]
 fn the_option_goes_before_the_variable() {
     let workshop = workshop().with_variable("PUNCTUAL_FMU_LIBRARY", "nowhere.so");
     workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--library", "library"]).success();

@@ -52,14 +52,17 @@ pub use plugin::{PluginFolder, file_name};
 use guard::{Answer, Handle, catch, install_panic_hook, slice, text};
 use logger::Logger;
 
-use crate::configuration::FmiVersion;
+use crate::configuration::{Configuration, FmiVersion};
 use crate::instance::{Failure, Instance};
+
+/// Makes an instance for one of the interfaces, for a token.
+type Made = fn(Configuration, &str) -> Result<Instance, Failure>;
 
 /// A new instance behind a pointer, or NULL with a log message under `name`. `arguments` checks what the importer said,
 /// and gives the token of the FMU and the place of its resources.
 fn instantiated(
     name: &str,
-    fmi: FmiVersion,
+    (made, fmi): (Made, FmiVersion),
     logger: Logger,
     arguments: impl FnOnce() -> Result<(String, String), Failure>,
 ) -> *mut c_void {
@@ -72,7 +75,7 @@ fn instantiated(
             let (found, asked) = (found.name(), fmi.name());
             return Err(format!("the FMU is one of FMI {found}, which has no instance of FMI {asked}"));
         }
-        Instance::new(configuration, &token)
+        made(configuration, &token)
     });
     match built.and_then(|result| result) {
         Ok(instance) => {

@@ -12,6 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::guard::{Handle, guarded, slice, slice_mut};
 use super::{fmi2, fmi3};
+use crate::configuration::FmiVersion;
 use crate::instance::{Failure, State};
 use crate::state;
 
@@ -46,9 +47,13 @@ impl States {
         if pointer.is_null() {
             return Err("FMUstate is NULL".to_owned());
         }
-        let entry = self.live.get_mut(&pointer.addr()).ok_or(
-            "FMUstate is none that was got or deserialised here, or was freed, or the instance that made it was",
-        )?;
+        let entry = self.live.get_mut(&pointer.addr()).ok_or_else(|| {
+            let functions = match handle.instance.fmi() {
+                FmiVersion::Two => "fmi2GetFMUstate or fmi2DeSerializeFMUstate",
+                FmiVersion::Three => "fmi3GetFMUState or fmi3DeserializeFMUState",
+            };
+            format!("FMUstate is none that {functions} gave, or was freed, or the instance that made it was")
+        })?;
         let (found, wanted) = (&entry.state.guid, &handle.instance.product().guid);
         if found != wanted {
             return Err(format!("FMUstate belongs to the FMU with the GUID {found:?}, must be {wanted:?}"));

@@ -16,10 +16,10 @@ use super::states::{
     fmi2DeSerializeFMUstate, fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SerializeFMUstate,
     fmi2SerializedFMUstateSize, fmi2SetFMUstate,
 };
-use super::{free, instantiated, switch};
+use super::{Made, free, instantiated, switch};
 
 use crate::configuration::FmiVersion;
-use crate::instance::{Call, Mode};
+use crate::instance::{Call, Instance, Mode};
 
 /// Defines exports with the types of the standard.
 macro_rules! exported {
@@ -67,7 +67,7 @@ unsafe extern "C" fn fmi2Instantiate(
     let guid = unsafe { text(guid) };
     // SAFETY: the caller's contract for strings.
     let location = unsafe { text(resource_location) };
-    instantiated("fmi2Instantiate", FmiVersion::Two, logger, || {
+    instantiated("fmi2Instantiate", (Instance::new as Made, FmiVersion::Two), logger, || {
         if fmu_type != CO_SIMULATION {
             return Err(format!("fmuType is {fmu_type}, must be 1 (fmi2CoSimulation)"));
         }

@@ -1,10 +1,11 @@
-//! The 75 functions of FMI 3.0. Those of states are in [`states`](super::states), those of features that our FMUs
-//! do not have in [`absent`].
+//! The 75 functions of FMI 3.0. Those of FMU states are in [`states`](super::states), those of model exchange in
+//! [`exchange`], those of features that our FMUs do not have in [`absent`].
 //!
-//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist at this
-//! sample; the run may go on.
+//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist here, or that a
+//! continuous state is no number; the run may go on.
 
 mod absent;
+mod exchange;
 
 use std::ptr;
 
@@ -18,8 +19,9 @@ use super::states::{
     fmi3DeserializeFMUState, fmi3FreeFMUState, fmi3GetFMUState, fmi3SerializeFMUState,
     fmi3SerializedFMUStateSize, fmi3SetFMUState,
 };
-use super::{free, instantiated, switch};
+use super::{Made, free, instantiated, switch};
 use absent::*;
+use exchange::*;
 
 use crate::configuration::FmiVersion;
 use crate::instance::Failure;
@@ -60,9 +62,11 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     _intermediate_update: IntermediateUpdate,
 ) -> Instance {
     // SAFETY: the caller's contract for strings.
-    let (token, path) = unsafe { (text(token), text(resource_path)) };
+    let token = unsafe { text(token) };
+    // SAFETY: the caller's contract for strings.
+    let path = unsafe { text(resource_path) };
     let logger = Logger::of_fmi3(log_message, environment, logging_on != FALSE);
-    instantiated("fmi3InstantiateCoSimulation", FmiVersion::Three, logger, || {
+    instantiated("fmi3InstantiateCoSimulation", (Own::new as Made, FmiVersion::Three), logger, || {
         if event_mode_used != FALSE {
             return Err("eventModeUsed is true, must be false: hasEventMode is false".to_owned());
         }
@@ -82,7 +86,7 @@ fn told(token: Option<String>, path: Option<String>) -> Result<(String, String),
     Ok((token, path.ok_or("resourcePath is NULL, must be the folder with the FMU's configuration")?))
 }
 
-/// Makes no instance: returns NULL with a log message.
+/// Makes a new instance whose states the importer integrates, or returns NULL with a log message.
 ///
 /// # Safety
 ///
@@ -90,16 +94,20 @@ fn told(token: Option<String>, path: Option<String>) -> Result<(String, String),
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3InstantiateModelExchange(
     _instance_name: Text,
-    _token: Text,
-    _resource_path: Text,
+    token: Text,
+    resource_path: Text,
     _visible: Boolean,
     logging_on: Boolean,
     environment: Environment,
     log_message: LogMessage,
 ) -> Instance {
+    // SAFETY: the caller's contract for strings.
+    let token = unsafe { text(token) };
+    // SAFETY: the caller's contract for strings.
+    let path = unsafe { text(resource_path) };
     let logger = Logger::of_fmi3(log_message, environment, logging_on != FALSE);
-    logger.error("fmi3InstantiateModelExchange: the FMU has no model exchange, only co-simulation");
-    ptr::null_mut()
+    let made = (Own::for_model_exchange as Made, FmiVersion::Three);
+    instantiated("fmi3InstantiateModelExchange", made, logger, || told(token, path))
 }
 
 /// Makes no instance: returns NULL with a log message.
@@ -178,12 +186,16 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
 
 plain! {
     Status;
-    /// Takes the parameters over and goes to step mode.
+    /// Takes the parameters over and goes to step mode; in model exchange to event mode.
     fmi3ExitInitializationMode => |handle| {
         handle.instance.exit_initialization_mode()?;
         handle.logger.event("initialized");
         Ok(())
     };
+    /// Goes to event mode.
+    fmi3EnterEventMode => |handle| handle.instance.enter_event_mode();
+    /// Goes to continuous-time mode.
+    fmi3EnterContinuousTimeMode => |handle| handle.instance.enter_continuous_time_mode();
     /// Ends the run.
     fmi3Terminate => |handle| handle.instance.terminate();
     /// Goes back to the instantiated state.
@@ -274,13 +286,8 @@ macro_rules! derivatives {
                 let seed = unsafe { slice("seed", seed, seed_count) }?;
                 // SAFETY: the caller's contract for arrays.
                 let result = unsafe { slice_mut("sensitivity", sensitivity, sensitivity_count) }?;
-                match handle.instance.$method(unknowns, knowns, seed, result)? {
-                    Ok(()) => Ok(Status::OK),
-                    Err(unknown) => {
-                        handle.logger.discarded(&format!("{}: {unknown}", stringify!($name)));
-                        Ok(Status::DISCARD)
-                    }
-                }
+                let done = handle.instance.$method(unknowns, knowns, seed, result)?;
+                Ok(done_or_discarded(handle, stringify!($name), done))
             };
             // SAFETY: the caller's contract for instances.
             unsafe { guarded(instance, stringify!($name), body) }

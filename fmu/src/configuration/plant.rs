@@ -367,6 +367,12 @@ impl PlantConfiguration {
         Ok(())
     }
 
+    /// Whether an importer may integrate the plant itself. One with a disturbance has to be stepped: that is held for a
+    /// period, and the states measured are not those that move.
+    pub fn can_be_integrated(&self) -> bool {
+        self.disturbance.is_none()
+    }
+
     /// The outputs as signals, in order.
     pub fn output_signals(&self) -> Vec<VariableSection> {
         let signal = |output: &OutputSection| VariableSection {

@@ -2,7 +2,7 @@
 
 use punctual_modeldescription::{BaseType, Causality, Variability, Variable};
 
-use super::{Call, Failure, Instance, Mode};
+use super::{Call, Failure, Instance};
 
 impl Instance {
     pub(super) fn check_references(
@@ -17,7 +17,7 @@ impl Instance {
 
     pub(super) fn check_settable(&self, base: BaseType, references: &[u32]) -> Result<(), Failure> {
         self.check(Call::Set)?;
-        let fixed = self.mode == Mode::STEP;
+        let fixed = self.is_running();
         let settable = |c, v| {
             c == Causality::Input || (c == Causality::Parameter && (!fixed || v == Variability::Tunable))
         };

@@ -49,9 +49,22 @@ impl Instance {
         Ok(())
     }
 
-    /// Reads a variable that FMI 2.0 does not have: the time.
-    fn beyond_the_table(&mut self, _first: usize, out: &mut [f64]) {
-        out.fill(self.time);
+    /// Reads a variable that FMI 2.0 does not have: the time, or rates of the states.
+    fn beyond_the_table(&mut self, first: usize, out: &mut [f64]) {
+        match (first - self.product.variables.len()).checked_sub(1) {
+            None => out.fill(self.time),
+            Some(first) => {
+                self.derivative[0].fill(0.0);
+                let rates = self.block.rates(&self.values, &self.derivative[0]);
+                rates[first..].iter().zip(out).for_each(|(rate, o)| *o = rate.value);
+            }
+        }
+    }
+
+    /// Whether a variable is, or holds, states that the importer may integrate.
+    fn is_state(&self, reference: u32) -> bool {
+        let first = self.product.layout.outputs;
+        (first..first + self.product.layout.rates).contains(&(reference as usize))
     }
 
     /// Reads Int32 variables.
@@ -105,12 +118,21 @@ impl Instance {
                 self.check_range(i, value)?;
             }
         }
+        let states = self.mode == Mode::CONTINUOUS && references.iter().any(|&r| self.is_state(r));
+        if states {
+            // Those that are not set are in the values too, once they have been computed.
+            self.refresh();
+        }
         let mut rest = values;
         for &reference in references {
             let first = reference as usize;
             let (from, others) = rest.split_at(self.accesses[first].length as usize);
             self.values.reals[first..first + from.len()].copy_from_slice(from);
             rest = others;
+        }
+        if states {
+            let first = self.product.layout.outputs;
+            self.block.set_states(&self.values.reals[first..first + self.product.layout.rates]);
         }
         self.taken_over(references);
         Ok(())
@@ -153,19 +175,24 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A reference that is none of an output.
+    /// A reference that is none of an output or of rates.
     pub fn dependencies(
         &self,
         dependent: u32,
     ) -> Result<impl Iterator<Item = (usize, u32, usize)> + '_, Failure> {
         let item = self.item(dependent)?;
+        if item.scalars.start > self.product.variables.len() {
+            // Each rate may depend on every state and input: an index of 0 stands for all elements.
+            let all = self.product.inputs_and_states().map(|on| (0, on.reference(), 0));
+            return Ok(Either::Rates(all));
+        }
         let initial = self.mode.is_in(Mode::INSTANTIATED.or(Mode::INITIALIZATION));
         let variables = self.product.variables.get(item.scalars.clone());
         let outputs = variables.filter(|v| v.iter().all(|v| v.causality == Causality::Output));
         let Some(outputs) = outputs else {
             return Err(format!("{} is no output, so that its dependencies are not told", item.name));
         };
-        Ok(outputs.iter().enumerate().flat_map(move |(k, output)| {
+        Ok(Either::Outputs(outputs.iter().enumerate().flat_map(move |(k, output)| {
             let told =
                 output.initial_dependencies.as_ref().filter(|_| initial).or(output.dependencies.as_ref());
             let told = told.map_or(&[][..], Vec::as_slice);
@@ -174,7 +201,7 @@ impl Instance {
                 let element = on_item.element(on as usize);
                 (item.element(item.scalars.start + k), on_item.reference(), element)
             })
-        }))
+        })))
     }
 
     /// Reads or writes a type that no variable has, so that every reference is an error.
@@ -206,14 +233,15 @@ impl Instance {
         count: usize,
     ) -> Result<(), Failure> {
         self.check(call)?;
-        let (set, running) = (call == Call::Set, self.mode == Mode::STEP);
+        let (set, running) = (call == Call::Set, self.is_running());
         let mut total = 0;
         for &reference in references {
+            let state = self.mode == Mode::CONTINUOUS && self.is_state(reference);
             let fits = |access: &&Access| {
                 let settable = match access.causality {
                     Causality::Input => true,
                     Causality::Parameter => !running || access.variability == Variability::Tunable,
-                    _ => false,
+                    _ => state,
                 };
                 access.length > 0 && access.scalar == scalar && (!set || settable)
             };
@@ -260,6 +288,23 @@ impl Instance {
                 format!("{name} is a fixed parameter and cannot change after initialization")
             }
             causality => format!("{name} is of causality {} and cannot be set", causality.as_str()),
+        }
+    }
+}
+
+/// Either of two iterators.
+enum Either<A, B> {
+    Outputs(A),
+    Rates(B),
+}
+
+impl<T, A: Iterator<Item = T>, B: Iterator<Item = T>> Iterator for Either<A, B> {
+    type Item = T;
+
+    fn next(&mut self) -> Option<T> {
+        match self {
+            Self::Outputs(outputs) => outputs.next(),
+            Self::Rates(rates) => rates.next(),
         }
     }
 }

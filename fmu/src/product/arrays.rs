@@ -98,8 +98,9 @@ fn array_at(variables: &[Variable], first: usize, inputs: usize) -> Option<Item>
 }
 
 /// The variables of FMI 3.0 over the table `variables`, with arrays or without; then the time, and the derivatives
-/// of `rates` states.
-pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool, rates: usize) -> Vec<Item> {
+/// of the states that can be integrated.
+pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Vec<Item> {
+    let rates = layout.rates;
     let mut items = Vec::new();
     let mut next = 0;
     while next < variables.len() {

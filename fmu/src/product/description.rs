@@ -1,13 +1,15 @@
 //! The model description of FMI 3.0, from that of FMI 2.0 and the arrays.
 
 use punctual_modeldescription::fmi3::{
-    CoSimulation, Dimension, EnumerationItem, Float, Integer, Interface, ModelDescription, ModelStructure,
-    Plain, TypeDefinition, Unknown, Variable, VariableKind,
+    CoSimulation, Dimension, EnumerationItem, Float, Integer, Interface, ModelDescription, ModelExchange,
+    ModelStructure, Plain, Terminal, TerminalMember, Terminals, TypeDefinition, Unknown, Variable,
+    VariableKind,
 };
 use punctual_modeldescription::{self as fmi2, Causality, Variability};
 
 use super::Product;
 use super::arrays::{Item, TIME};
+use crate::configuration::{Configuration, over_seconds};
 
 impl Product {
     /// The model description of an FMU of FMI 3.0.
@@ -27,6 +29,9 @@ impl Product {
         for unknown in &mut structure.outputs {
             self.depend(unknown, |output| output.dependencies.as_ref());
         }
+        for rate in &mut structure.derivatives {
+            rate.dependencies = Some(self.inputs_and_states().map(Item::reference).collect());
+        }
         for unknown in &mut structure.initial_unknowns {
             self.depend(unknown, |output| {
                 output.initial_dependencies.as_ref().or(output.dependencies.as_ref())
@@ -41,12 +46,14 @@ impl Product {
             license: of_fmi2.license,
             generation_tool: of_fmi2.generation_tool,
             variable_naming_convention: of_fmi2.variable_naming_convention,
+            model_exchange: (self.layout.rates > 0)
+                .then(|| ModelExchange { interface: interface.clone(), ..ModelExchange::default() }),
             co_simulation: Some(CoSimulation {
                 interface,
                 can_handle_variable_step: true,
                 ..CoSimulation::default()
             }),
-            units: of_fmi2.units,
+            units: units(&variables),
             types: of_fmi2.types.into_iter().map(enumeration).collect(),
             log_categories: of_fmi2.log_categories,
             default_experiment: of_fmi2.default_experiment,
@@ -54,6 +61,33 @@ impl Product {
             structure,
             ..ModelDescription::default()
         }
+    }
+
+    /// The terminals: `vehicle` joins plant, filter and controller, `wanted` a controller and a filter. Each matches what
+    /// the other one has of its members.
+    pub fn terminals(&self) -> Terminals {
+        let vehicle = ("vehicle", "the state measured, and the input");
+        let wanted = ("wanted", "the input that is wanted");
+        let groups: &[(_, &[&str])] = match self.configuration {
+            Configuration::Filter(_) => &[(vehicle, &["x", "u"]), (wanted, &["u_ref"])],
+            Configuration::Plant(_) => &[(vehicle, &["x", "u"])],
+            Configuration::Controller(_) => &[(vehicle, &["x"]), (wanted, &["u_ref"])],
+        };
+        let terminal = |((name, description), families): &((&str, &str), &[&str])| {
+            let belongs = |item: &&Item| {
+                let family = item.name.split_once('.').map_or(&*item.name, |(family, _)| family);
+                families.contains(&family)
+            };
+            let member = |item: &Item| TerminalMember::signal(&*item.name, &*item.name);
+            Terminal {
+                name: (*name).to_owned(),
+                matching_rule: "bus".to_owned(),
+                description: (*description).to_owned(),
+                members: self.items.iter().filter(belongs).map(member).collect(),
+                ..Terminal::default()
+            }
+        };
+        Terminals { terminals: groups.iter().map(terminal).filter(|t| !t.members.is_empty()).collect() }
     }
 
     /// Fills in what `unknown` depends on: what any of its scalars does, by `dependencies`.
@@ -71,8 +105,20 @@ impl Product {
         unknown.dependencies = Some(references);
     }
 
+    /// The variables that the rates of the states depend on.
+    pub(crate) fn inputs_and_states(&self) -> impl Iterator<Item = &Item> {
+        let end = self.layout.outputs + self.layout.rates;
+        self.items.iter().filter(move |item| item.scalars.end <= end)
+    }
+
     fn variable_of(&self, item: &Item) -> Variable {
-        let Some(scalars) = self.variables.get(item.scalars.clone()) else { return time(item.reference()) };
+        let Some(scalars) = self.variables.get(item.scalars.clone()) else {
+            let after = item.scalars.start - self.variables.len();
+            return match after.checked_sub(1) {
+                None => time(item.reference()),
+                Some(first) => self.rate(item, self.layout.outputs + first),
+            };
+        };
         let first = &scalars[0];
         let (causality, variability) = (first.causality, first.variability);
         let mut variable =
@@ -83,6 +129,25 @@ impl Product {
             variable.declared_type.clone_from(&of.declared_type);
         }
         variable
+    }
+}
+
+impl Product {
+    /// The rate of the states from number `first` of the table on.
+    fn rate(&self, item: &Item, first: usize) -> Variable {
+        let states = &self.variables[first..first + item.scalars.len()];
+        let unit = common(states.iter().map(|v| Some(over_seconds(v.kind.unit().unwrap_or("1"), 1))));
+        let kind = VariableKind::Float64(Float {
+            unit,
+            derivative: Some(self.item_of(first).reference()),
+            ..Float::default()
+        });
+        let (local, continuous) = (Causality::Local, Variability::Continuous);
+        let mut rate = Variable::new(&*item.name, item.reference(), local, continuous, kind);
+        let of = |v: &fmi2::Variable| v.name.clone();
+        rate.description = format!("rate of {}", states.iter().map(of).collect::<Vec<_>>().join(", "));
+        rate.dimensions = item.dimensions.iter().map(|length| Dimension::fixed(*length as u64)).collect();
+        rate
     }
 }
 
@@ -105,6 +170,11 @@ fn enumeration(of: fmi2::SimpleType) -> TypeDefinition {
         kind: VariableKind::Enumeration(Integer::default()),
         items: of.items.into_iter().map(item).collect(),
     }
+}
+
+/// The units of `variables`.
+fn units(variables: &[Variable]) -> Vec<fmi2::Unit> {
+    super::units(variables.iter().filter_map(|v| v.kind.as_float()?.unit.as_deref()))
 }
 
 /// What all have in common; nothing where one differs.

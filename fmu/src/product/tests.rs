@@ -86,7 +86,10 @@ fn every_product_has_a_valid_model_description() {
 fn every_unit_has_its_exponents() {
     let mut seen = BTreeSet::new();
     for product in every_product() {
-        let units: BTreeMap<_, _> = units(&product.variables).into_iter().map(|u| (u.name, u.base)).collect();
+        let units: BTreeMap<_, _> = units(product.variables.iter().filter_map(|v| v.kind.unit()))
+            .into_iter()
+            .map(|u| (u.name, u.base))
+            .collect();
         for variable in &product.variables {
             if matches!(variable.kind, VariableKind::Real(_)) {
                 let unit = variable.kind.unit().unwrap_or_else(|| panic!("{} has no unit", variable.name));
@@ -317,4 +320,101 @@ fn an_integrated_state_is_commanded_and_not_measured() {
     {
         assert!(parameters.contains(&parameter), "{parameter} in {parameters:?}");
     }
+}
+
+/// Every product for FMI 3.0, with arrays and without.
+fn every_product_of_fmi3() -> impl Iterator<Item = (Product, Product)> {
+    every_product().into_iter().flat_map(|old| {
+        [true, false].map(|arrays| {
+            let configuration = old.configuration.clone().for_fmi(FmiVersion::Three, arrays);
+            (product(&old.configuration.canonical().unwrap()), Product::new(configuration).unwrap())
+        })
+    })
+}
+
+/// The description can be written, which checks it by the rules of the standard, and says what the table says.
+#[test]
+fn descriptions_of_fmi3() {
+    for (old, new) in every_product_of_fmi3() {
+        let name = new.configuration.name();
+        assert_ne!(old.guid, new.guid, "{name}: a token of its own");
+        assert_eq!(old.variables, new.variables, "{name}: the same table");
+        let description = new.model_description_of_fmi3();
+        let xml = description.to_xml().unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(xml.contains("fmiVersion=\"3.0\""));
+        if let Some(terminals) = Some(new.terminals()).filter(|t| !t.terminals.is_empty()) {
+            terminals.to_xml(&description).unwrap_or_else(|e| panic!("{name}: {e}"));
+        }
+        // The variables cover the table in order, once, and the start values are those of the scalars.
+        let mut next = 0;
+        for (item, variable) in new.items.iter().zip(&description.variables) {
+            assert_eq!((item.scalars.start, item.reference()), (next, variable.value_reference), "{name}");
+            let elements: u64 = variable.dimensions.iter().filter_map(|d| d.start).product();
+            assert_eq!(elements as usize, item.scalars.len(), "{name}: {}", item.name);
+            next = item.scalars.end;
+            let Some(scalars) = new.variables.get(item.scalars.clone()) else { continue };
+            let starts: Vec<_> = scalars
+                .iter()
+                .filter_map(|v| match &v.kind {
+                    VariableKind::Real(real) => real.start,
+                    _ => None,
+                })
+                .collect();
+            if let Some(float) = variable.kind.as_float() {
+                assert_eq!(float.start, starts, "{name}: {}", item.name);
+            }
+        }
+        assert_eq!(next, new.variables.len() + 1 + new.layout.rates, "{name}");
+        assert_eq!(description.model_exchange.is_some(), new.layout.rates > 0, "{name}");
+        assert_eq!(description.structure.derivatives.is_empty(), new.layout.rates == 0, "{name}");
+    }
+}
+
+#[test]
+fn units_and_ranges_that_all_elements_share() {
+    use punctual_modeldescription::fmi3;
+    let text = "kind = \"plant\"\nexperiment.fmi = 3\n[plant]\n\
+                states = [{ name = \"a\", unit = \"m\", min = 0.0, max = 5.0 }, { name = \"b\", unit = \"m\", min = 0.0, max = 6.0 }]\n\
+                inputs = [{ name = \"u\", unit = \"m/s\" }]\nderivatives = { a = \"u\", b = \"-u\" }\n";
+    let description = product(text).model_description_of_fmi3();
+    let of = |name: &str| -> fmi3::Float {
+        description.by_name(name).and_then(|v| v.kind.as_float()).expect("a number").clone()
+    };
+    let x0 = of("x0");
+    assert_eq!((x0.unit.as_deref(), x0.min, x0.max), (Some("m"), Some(0.0), None));
+    let rates = of("der(x)");
+    assert_eq!((rates.unit.as_deref(), rates.derivative), (Some("m/s"), Some(1)));
+    assert_eq!(description.by_name("x").unwrap().description, "a in m: a; b in m: b");
+    assert_eq!(of("u").unit.as_deref(), Some("m/s"));
+}
+
+#[test]
+fn the_version_of_fmi_and_its_arrays() {
+    let text = format!("kind = \"filter\"\nplant.model = \"unicycle\"\nEXPERIMENT\n{BARRIER}");
+    let parsed = |experiment: &str| Configuration::parse(&text.replace("EXPERIMENT", experiment));
+    let default = parsed("").unwrap();
+    assert_eq!(parsed("experiment.fmi = 2").unwrap(), default);
+    assert!(!default.canonical().unwrap().contains("fmi"), "as before there was a choice");
+    let three = parsed("experiment.fmi = 3").unwrap();
+    assert_eq!(Configuration::parse(&three.canonical().unwrap()).unwrap(), three);
+    assert_eq!(three.clone().for_fmi(FmiVersion::Two, true), default);
+    let scalars = parsed("experiment = { fmi = 3, arrays = false }").unwrap();
+    assert_eq!(three.for_fmi(FmiVersion::Three, false), scalars);
+    assert_eq!(scalars.for_fmi(FmiVersion::Two, false), default);
+    for (experiment, message) in [
+        ("experiment.fmi = 4", "experiment.fmi: is 4, must be 2 or 3"),
+        (
+            "experiment.arrays = false",
+            "experiment.arrays: is false, must be left out with `fmi = 2`: FMI 2.0 has no arrays",
+        ),
+    ] {
+        let error = parsed(experiment).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    let named = "kind = \"plant\"\nexperiment.fmi = 3\n[plant]\nstates = [{ name = \"a\" }]\n\
+                 inputs = [{ name = \"u\" }]\nparameters = [{ name = \"time\", start = 1.0 }]\n\
+                 derivatives = { a = \"u*time\" }\n";
+    let refused = Product::new(Configuration::parse(named).unwrap()).err().expect("a refusal").to_string();
+    assert!(refused.contains("\"time\", which is the name of the time with `fmi = 3`"), "{refused}");
+    assert!(Product::new(Configuration::parse(&named.replace("fmi = 3", "fmi = 2")).unwrap()).is_ok());
 }

@@ -232,6 +232,10 @@ fn each_defect_of_arrays_is_told_with_its_field() {
         ),
         (connection("a.w[3]", "c.v[1]"), "connection[0].from: a (a.fmu) has no variable \"w[3]\""),
         (
+            connection("a.w.x", "c.v[1]"),
+            "connection[0].from: a (a.fmu) has no variable \"w.x\"; w is an array of [2], with elements such as \"w[1]\"",
+        ),
+        (
             "plot = [{ kind = \"time\", signals = [\"a.w\"] }]".into(),
             "\"w\" of a (a.fmu) is an array of [2]; name an element, such as \"w[1]\"",
         ),

@@ -2,6 +2,7 @@
 
 use super::super::fmi2::{self, CallbackFunctions, Environment};
 
+use super::super::fmi2::{Component, Status, Text};
 use super::super::logger::Logger;
 use super::*;
 use crate::configuration::Configuration;
@@ -37,7 +38,7 @@ fn handle(messages: &mut Vec<String>) -> Handle {
     };
     Handle {
         instance: Instance::new(configuration, &guid).unwrap(),
-        logger: Logger::new(Some(&callbacks), c"instance".to_owned(), true),
+        logger: Logger::of_fmi2(Some(&callbacks), c"instance".to_owned(), true),
         poisoned: false,
     }
 }
@@ -59,7 +60,7 @@ fn a_panic_becomes_an_error_and_poisons_the_instance() {
     let mut handle = handle(&mut messages);
     let component: Component = std::ptr::from_mut(&mut handle).cast();
     // SAFETY: the component is a handle that lives until the end of this function.
-    let status = unsafe { guarded(component, "fmi2DoStep", |_| panic!("100% wrong\nat line 2")) };
+    let status: Status = unsafe { guarded(component, "fmi2DoStep", |_| panic!("100% wrong\nat line 2")) };
     assert_eq!(status, Status::ERROR);
     let mut ran = false;
     let body = |_: &mut Handle| {
@@ -88,7 +89,7 @@ fn a_panic_becomes_an_error_and_poisons_the_instance() {
 #[test]
 fn null_is_an_error_and_runs_nothing() {
     // SAFETY: NULL is allowed.
-    let status = unsafe { guarded(std::ptr::null_mut(), "fmi2Reset", |_| panic!("ran")) };
+    let status: Status = unsafe { guarded(std::ptr::null_mut(), "fmi2Reset", |_| panic!("ran")) };
     assert_eq!(status, Status::ERROR);
 }
 
