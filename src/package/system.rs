@@ -371,7 +371,7 @@ fn start_values(
             let named = |name: &str| format!("{}.{name}", component.name);
             match array_of(description, first) {
                 Some(array) if array.count == of_name.len() => {
-                    let value = list(of_name).ok_or_else(|| {
+                    let value = list(&of_name).ok_or_else(|| {
                         refused("is an array of neither numbers nor truth values, which has no start value in SSP".to_owned())
                     })?;
                     values.push((named(&array.name), value));
@@ -391,7 +391,7 @@ fn start_values(
 }
 
 /// The value of an array of numbers or truth values.
-fn list(values: Vec<ParameterValue>) -> Option<ParameterValue> {
+fn list(values: &[ParameterValue]) -> Option<ParameterValue> {
     use ParameterValue::{Boolean, Booleans, Integer, Integers, Real, Reals};
     let reals = values.iter().map(|value| if let Real(x) = value { Some(*x) } else { None });
     let integers = values.iter().map(|value| if let Integer(i) = value { Some(*i) } else { None });

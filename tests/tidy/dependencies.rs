@@ -293,7 +293,7 @@ fn each_dependency_is_named_in_one_place() {
                 "src/validate/",
                 "src/host/description/",
                 "src/package/difference.rs",
-                "src/command/inspect.rs",
+                "src/command/inspect",
                 "src/references.rs",
             ],
         ),
