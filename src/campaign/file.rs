@@ -245,8 +245,8 @@ impl Campaign {
     ///
     /// A component that is no text: an FMU of another program.
     pub fn packed(&self) -> Result<String, Error> {
-        let parts = self.models.iter().zip(self.system.components());
-        for (_, component) in parts.filter(|(part, _)| part.configuration().is_none()) {
+        let mut parts = self.models.iter().zip(self.system.components());
+        if let Some((_, component)) = parts.find(|(part, _)| part.configuration().is_none()) {
             let message = format!(
                 "{} of component {:?} is an FMU of another program, which is not packed; run shards where its file is",
                 component.fmu, component.name
