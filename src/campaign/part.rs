@@ -41,7 +41,7 @@ pub enum Part {
     Fmu {
         /// Its file.
         path: PathBuf,
-        /// [`Foreign::digest`].
+        /// A name-based UUID of its bytes.
         digest: String,
         /// Its model description, with the sizes that arrays have here.
         description: Box<Description>,
