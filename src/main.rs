@@ -14,7 +14,7 @@ use punctual::error::Details;
 use punctual::output;
 use serde::Serialize;
 
-/// A safety filter that keeps deadlines, as FMI 2.0 FMUs: build, check, couple, plot and validate.
+/// A safety filter that keeps deadlines, as FMI 2.0 and 3.0 FMUs: build, check, couple, plot and validate.
 ///
 /// Exit codes: 0 success; 1 the run finished but a promise was not kept, or an FMU is at fault; 2 bad
 /// usage or configuration; 130 interrupted, with what was done until then kept. Results go to stdout, talk and progress to stderr.

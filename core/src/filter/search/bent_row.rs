@@ -12,8 +12,8 @@
 //! symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps shorten faster
 //! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
 //!
-//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. It stands under the terms of [`correction`](super::correction): the rows are
-//! all but affine from u_ref to there, every other row holds, and no other answer is in sight. λH, without a unit, is how far
+//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. It stands under the
+//! terms of [`correction`](super::correction): the rows are all but affine from u_ref to there, every other row holds, and no other answer is in sight. λH, without a unit, is how far
 //! the normal turns on the way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
