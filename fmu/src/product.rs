@@ -468,12 +468,18 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         // `x0.*` are the first parameters, in the order of the states.
         variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
     }
+    let rows = c.parameters();
     for output in &told {
-        // At the start it may depend on any state and constant.
-        table.signal("y", output, "", Causality::Output).dependencies = Some(known(outputs, states.len()));
+        let variable = table.signal("y", output, "", Causality::Output);
+        variable.dependencies = Some(known(outputs, states.len()));
+        if c.experiment.fmi == FmiVersion::Three {
+            // At the start it may depend on any state and constant. With FMI 2.0 that is what is said by nothing.
+            let all = parameters..parameters + rows.len();
+            variable.initial_dependencies = Some(all.map(|i| i as u32).collect());
+        }
     }
     let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, rates, ..Layout::default() };
-    let (mut table, layout) = table.finish(c, &c.parameters(), layout);
+    let (mut table, layout) = table.finish(c, &rows, layout);
     if c.experiment.fmi == FmiVersion::Two {
         for i in outputs..outputs + rates {
             table.rate(i, (0..(outputs + rates) as u32).collect());

@@ -339,9 +339,12 @@ fn descriptions_of_fmi3() {
         let name = new.configuration.name();
         assert_ne!(old.guid, new.guid, "{name}: a token of its own");
         let mut table = new.variables.clone();
-        for (own, other) in table.iter_mut().zip(&old.variables).filter(|_| new.layout.rates > 0) {
-            // Who integrates the states knows them.
-            own.dependencies.clone_from(&other.dependencies);
+        for (own, other) in table.iter_mut().zip(&old.variables) {
+            if matches!(new.configuration, Configuration::Plant(_)) {
+                // Who integrates the states knows them.
+                own.dependencies.clone_from(&other.dependencies);
+                own.initial_dependencies.clone_from(&other.initial_dependencies);
+            }
         }
         assert_eq!(old.variables, table, "{name}: the same table");
         let description = new.model_description_of_fmi3();
@@ -423,6 +426,12 @@ fn model_exchange_of_fmi2_is_asked_for() {
     let three = with.configuration.clone().for_fmi(FmiVersion::Three, true);
     let three = Product::new(three).unwrap().model_description_of_fmi3();
     assert!(three.model_exchange.is_some());
+    let first = &three.structure.initial_unknowns[1];
+    assert_eq!(
+        (first.value_reference, &first.dependencies),
+        (3, &Some(vec![4, 6, 7])),
+        "on x0, w, inner_step"
+    );
     // Whatever has to be stepped says so.
     let asked = "experiment.model_exchange = true\n";
     let noisy = format!(
