@@ -18,6 +18,7 @@ mod arrays;
 mod derivative;
 mod exchange;
 
+use punctual_core::jet::Tangent;
 use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
@@ -110,15 +111,17 @@ pub enum Call {
     DoStep,
     /// `fmi2GetDirectionalDerivative`; `fmi3GetAdjointDerivative` too.
     GetDirectionalDerivative,
-    /// `fmi3EnterEventMode`.
+    /// `fmi2EnterEventMode`.
     EnterEventMode,
-    /// `fmi3UpdateDiscreteStates`.
+    /// `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
     UpdateDiscreteStates,
-    /// `fmi3EnterContinuousTimeMode`.
+    /// `fmi2EnterContinuousTimeMode`.
     EnterContinuousTimeMode,
-    /// `fmi3SetTime`, `fmi3SetContinuousStates` and `fmi3CompletedIntegratorStep`.
+    /// `fmi2SetTime`.
+    SetTime,
+    /// `fmi2SetContinuousStates` and `fmi2CompletedIntegratorStep`.
     Integrate,
-    /// `fmi3GetContinuousStates` and its like.
+    /// `fmi2GetContinuousStates` and its like.
     GetContinuousStates,
 }
 
@@ -131,30 +134,32 @@ pub enum Interface {
     ModelExchange,
 }
 
-/// The modes in which each call is legal in FMI 2.0 and in FMI 3.0, in the order of [`Call`] (FMI 2.0.4, section 4.2.4,
-/// figure 11; FMI 3.0.2, sections 2.3.2 to 2.3.8, 3.2.1 and 4.2.1). They are wider than the standards where importers are:
+/// The modes in which each call is legal in FMI 2.0 and in FMI 3.0, in the order of [`Call`] (FMI 2.0.4, sections 3.2.3 and
+/// 4.2.4, figures 6 and 11; FMI 3.0.2, sections 2.3.2 to 2.3.8, 3.2.1 and 4.2.1). They are wider than the standards where importers are:
 /// values may be read in every mode. Calls that are not here are legal in every mode.
-pub const LEGAL: [(Call, Mode, Mode); 13] = {
+pub const LEGAL: [(Call, Mode, Mode); 14] = {
     const EXCHANGED: Mode = Mode::EVENT.or(Mode::CONTINUOUS);
-    const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP);
-    const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED);
+    const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP).or(EXCHANGED);
+    const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED).or(EXCHANGED);
+    const ENDED: Mode = Mode::STEP.or(EXCHANGED);
     const STATES: Mode = Mode::INITIALIZATION.or(EXCHANGED).or(Mode::TERMINATED);
     [
         // FMI 3.0 has no such function, but in process there is one for both.
         (Call::SetupExperiment, Mode::INSTANTIATED, Mode::INSTANTIATED),
         (Call::EnterInitializationMode, Mode::INSTANTIATED, Mode::INSTANTIATED),
         (Call::ExitInitializationMode, Mode::INITIALIZATION, Mode::INITIALIZATION),
-        (Call::Terminate, Mode::STEP, Mode::STEP.or(EXCHANGED)),
+        (Call::Terminate, ENDED, ENDED),
         (Call::Get, Mode::ANY, Mode::ANY),
-        (Call::Set, SETTABLE, SETTABLE.or(EXCHANGED)),
+        (Call::Set, SETTABLE, SETTABLE),
         (Call::DoStep, Mode::STEP, Mode::STEP),
-        (Call::GetDirectionalDerivative, KNOWN, KNOWN.or(EXCHANGED)),
-        // FMI 2.0 has no model exchange here.
-        (Call::EnterEventMode, Mode::NONE, Mode::CONTINUOUS),
-        (Call::UpdateDiscreteStates, Mode::NONE, Mode::EVENT),
-        (Call::EnterContinuousTimeMode, Mode::NONE, Mode::EVENT),
-        (Call::Integrate, Mode::NONE, Mode::CONTINUOUS),
-        (Call::GetContinuousStates, Mode::NONE, STATES),
+        (Call::GetDirectionalDerivative, KNOWN, KNOWN),
+        // FMI 2.0 lets an importer go from event to event, and tell the time of one in it.
+        (Call::EnterEventMode, EXCHANGED, Mode::CONTINUOUS),
+        (Call::UpdateDiscreteStates, Mode::EVENT, Mode::EVENT),
+        (Call::EnterContinuousTimeMode, Mode::EVENT, Mode::EVENT),
+        (Call::SetTime, EXCHANGED, Mode::CONTINUOUS),
+        (Call::Integrate, Mode::CONTINUOUS, Mode::CONTINUOUS),
+        (Call::GetContinuousStates, STATES, STATES),
     ]
 };
 
@@ -314,7 +319,10 @@ impl Instance {
     pub fn for_model_exchange(configuration: Configuration, guid: &str) -> Result<Self, Failure> {
         let instance = Self::new(configuration, guid)?;
         if instance.product.layout.rates == 0 {
-            let why = match instance.product.configuration {
+            let why = match &instance.product.configuration {
+                Configuration::Plant(plant) if plant.disturbance.is_none() => {
+                    "since it was built without; build it with `--model-exchange` or `experiment.model_exchange = true`"
+                }
                 Configuration::Plant(_) => "since a plant with a disturbance has to be stepped",
                 _ => "which plants alone have",
             };
@@ -348,6 +356,14 @@ impl Instance {
         self.product.configuration.experiment().fmi
     }
 
+    /// The modes that its interface does not have.
+    fn foreign(&self) -> Mode {
+        match self.interface {
+            Interface::CoSimulation => Mode::EVENT.or(Mode::CONTINUOUS),
+            Interface::ModelExchange => Mode::STEP,
+        }
+    }
+
     /// Whether it is past its initialization, so that fixed parameters stay as they are.
     fn is_running(&self) -> bool {
         self.mode.is_in(Mode::STEP.or(Mode::EVENT).or(Mode::CONTINUOUS))
@@ -365,10 +381,14 @@ impl Instance {
         }
         let allowed: Vec<_> = Mode::EACH
             .into_iter()
-            .filter(|m| m.is_in(modes))
+            .filter(|m| m.is_in(modes) && !m.is_in(self.foreign()))
             .map(|mode| format!("{:?}", mode.name()))
             .collect();
-        Err(format!("not allowed in the mode {:?}, only in {}", self.mode.name(), allowed.join(", ")))
+        let only = match allowed[..] {
+            [] => "and in no other of this interface".to_owned(),
+            _ => format!("only in {}", allowed.join(", ")),
+        };
+        Err(format!("not allowed in the mode {:?}, {only}", self.mode.name()))
     }
 
     /// Takes the start time; tolerance and stop time are not needed.
@@ -524,11 +544,7 @@ impl Instance {
                 self.product.guid
             ));
         }
-        let foreign = match self.interface {
-            Interface::CoSimulation => Mode::EVENT.or(Mode::CONTINUOUS),
-            Interface::ModelExchange => Mode::STEP,
-        };
-        if mode.is_in(foreign) {
+        if mode.is_in(self.foreign()) {
             return Err(format!(
                 "the state is one in the mode {:?}, which the interface of this instance does not have",
                 mode.name()
@@ -640,7 +656,26 @@ impl Instance {
     ///
     /// A value reference that is not one of a real.
     pub fn get_real(&mut self, references: &[u32], out: &mut [f64]) -> Result<(), Failure> {
-        self.get(BaseType::Real, references, out, |values| &values.reals)
+        self.get(BaseType::Real, references, out, |values| &values.reals)?;
+        if self.product.layout.rates == 0 {
+            return Ok(());
+        }
+        let first = self.product.first_rate();
+        if references.iter().any(|&reference| reference as usize >= first) {
+            let rates = self.rates();
+            for (&reference, o) in references.iter().zip(out) {
+                if let Some(i) = (reference as usize).checked_sub(first) {
+                    *o = rates[i].value;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The rates of the states now.
+    fn rates(&mut self) -> &[Tangent<f64>] {
+        self.derivative[0].fill(0.0);
+        self.block.rates(&self.values, &self.derivative[0])
     }
 
     /// Reads integers and enumerations.

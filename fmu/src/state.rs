@@ -196,7 +196,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     // The fields of the instance, and the values in the order of the table.
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
-    if mode.is_in(Mode::EVENT.or(Mode::CONTINUOUS)) && !(has_stop(product) && product.layout.rates > 0) {
+    if mode.is_in(Mode::EVENT.or(Mode::CONTINUOUS)) && product.layout.rates == 0 {
         // These two come after all others.
         let index = Mode::EACH.iter().position(|each| *each == mode).unwrap_or_default();
         return Err(format!("mode: is {index}, must be < {}", Mode::EACH.len() - 2));

@@ -92,6 +92,42 @@ pub struct LogCategory {
     pub description: String,
 }
 
+/// Identity and capabilities for model exchange (FMI 2.0.4, section 3.3.1). All flags are false by default.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ModelExchange {
+    /// The name of the shared library without its ending: a C identifier in ASCII.
+    #[serde(rename = "@modelIdentifier")]
+    pub model_identifier: String,
+    /// The FMU needs another program to run.
+    #[serde(rename = "@needsExecutionTool", skip_serializing_if = "xsd::is_default")]
+    pub needs_execution_tool: bool,
+    /// `fmi2CompletedIntegratorStep` need not be called.
+    #[serde(rename = "@completedIntegratorStepNotNeeded", skip_serializing_if = "xsd::is_default")]
+    pub completed_integrator_step_not_needed: bool,
+    /// Only one instance can exist in one process.
+    #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess", skip_serializing_if = "xsd::is_default")]
+    pub can_be_instantiated_only_once_per_process: bool,
+    /// The FMU does not use the memory functions of the importer.
+    #[serde(rename = "@canNotUseMemoryManagementFunctions", skip_serializing_if = "xsd::is_default")]
+    pub can_not_use_memory_management_functions: bool,
+    /// `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
+    #[serde(rename = "@canGetAndSetFMUstate", skip_serializing_if = "xsd::is_default")]
+    pub can_get_and_set_state: bool,
+    /// The state can be turned to bytes and back; needs `can_get_and_set_state`.
+    #[serde(rename = "@canSerializeFMUstate", skip_serializing_if = "xsd::is_default")]
+    pub can_serialize_state: bool,
+    /// `fmi2GetDirectionalDerivative` works.
+    #[serde(rename = "@providesDirectionalDerivative", skip_serializing_if = "xsd::is_default")]
+    pub provides_directional_derivative: bool,
+    /// Names of the files of its source code, relative to `sources/`; none: it comes without.
+    #[serde(
+        rename = "SourceFiles",
+        skip_serializing_if = "Vec::is_empty",
+        serialize_with = "crate::xml::source_files"
+    )]
+    pub source_files: Vec<String>,
+}
+
 /// Identity and capabilities of the slave (FMI 2.0.4, section 4.3.1). All flags are false by default.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CoSimulation {
@@ -166,6 +202,8 @@ pub struct ModelDescription {
     pub generation_date_and_time: Option<String>,
     /// The convention by which variable names are built.
     pub variable_naming_convention: NamingConvention,
+    /// The interface for model exchange beside the one for co-simulation, if there is one. It has no event indicators.
+    pub model_exchange: Option<ModelExchange>,
     /// Identity and capabilities.
     pub co_simulation: CoSimulation,
     /// The units that variables use; names unique.

@@ -1,4 +1,4 @@
-//! Model descriptions of FMI 2.0 co-simulation and of FMI 3.0 ([`fmi3`]) from typed variables, SSP system
+//! Model descriptions of FMI 2.0 co-simulation, with model exchange beside it or without, and of FMI 3.0 ([`fmi3`]) from typed variables, SSP system
 //! structures, and reproducible `.fmu` and `.ssp` archives.
 //!
 //! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
@@ -68,8 +68,8 @@
 //! # References
 //!
 //! Functional Mock-up Interface for Model Exchange and Co-Simulation, version 2.0.4: section 2.2
-//! (description schema), 2.2.7 (variables), 2.2.8 (model structure), 2.2.9 (names), 2.3 (archive),
-//! 4.3.1 (co-simulation capabilities). The same, version 3.0.2: section 2.4 (description schema), 2.4.9
+//! (description schema), 2.2.7 (variables), 2.2.8 (model structure), 2.2.9 (names), 2.3 (archive), 3.3.1
+//! (model exchange capabilities), 4.3.1 (co-simulation capabilities). The same, version 3.0.2: section 2.4 (description schema), 2.4.9
 //! (terminals), 2.5 (archive), 3.4 and 4.4 (capabilities).
 #![forbid(unsafe_code)]
 
@@ -97,8 +97,8 @@ pub mod xsd;
 #[cfg(feature = "archive")]
 pub use archive::{Archive, Timestamp};
 pub use description::{
-    CoSimulation, DefaultExperiment, EnumerationItem, LogCategory, ModelDescription, NamingConvention,
-    SimpleType,
+    CoSimulation, DefaultExperiment, EnumerationItem, LogCategory, ModelDescription, ModelExchange,
+    NamingConvention, SimpleType,
 };
 pub use error::Error;
 pub use names::{PLATFORM, is_c_identifier, is_structured_name};

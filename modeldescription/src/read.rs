@@ -8,8 +8,9 @@ use crate::notes::{At, Notes, children, list};
 use crate::rules::{Check, Place, UnknownList, Violation, fmi2};
 use crate::xsd::{boolean, double, int, unsigned};
 use crate::{
-    Causality, CoSimulation, EnumerationItem, Initial, Integer, ModelDescription, ModelStructure,
-    NamingConvention, Plain, Real, ScalarType, SimpleType, Unknown, Variability, Variable, VariableKind,
+    Causality, CoSimulation, EnumerationItem, Initial, Integer, ModelDescription, ModelExchange,
+    ModelStructure, NamingConvention, Plain, Real, ScalarType, SimpleType, Unknown, Variability, Variable,
+    VariableKind,
 };
 use roxmltree::{Document, Node};
 
@@ -97,6 +98,8 @@ impl Located {
             ..ModelDescription::default()
         };
         self.description = description;
+        self.description.model_exchange =
+            children(root, "ModelExchange").next().map(|node| self.exchange(node));
         // The co-simulation interfaces; the first is the model's.
         let interfaces: Vec<_> = children(root, "CoSimulation").collect();
         self.interfaces = interfaces.len();
@@ -131,9 +134,24 @@ impl Located {
         };
     }
 
+    fn exchange(&mut self, node: Node<'_, '_>) -> ModelExchange {
+        self.notes.interface(Place::ModelExchange, node);
+        let mut at = self.notes.at(Place::ModelExchange, Some(node));
+        ModelExchange {
+            model_identifier: at.required("modelIdentifier", |text| Some(text.to_owned())),
+            needs_execution_tool: at.flag("needsExecutionTool"),
+            completed_integrator_step_not_needed: at.flag("completedIntegratorStepNotNeeded"),
+            can_be_instantiated_only_once_per_process: at.flag("canBeInstantiatedOnlyOncePerProcess"),
+            can_not_use_memory_management_functions: at.flag("canNotUseMemoryManagementFunctions"),
+            can_get_and_set_state: at.flag("canGetAndSetFMUstate"),
+            can_serialize_state: at.flag("canSerializeFMUstate"),
+            provides_directional_derivative: at.flag("providesDirectionalDerivative"),
+            source_files: source_files(node),
+        }
+    }
+
     fn interface(&mut self, place: Place, node: Node<'_, '_>) -> CoSimulation {
         let mut at = self.notes.at(place, Some(node));
-        let files = node.descendants().filter(|n| n.has_tag_name("File"));
         CoSimulation {
             model_identifier: at.required("modelIdentifier", |text| Some(text.to_owned())),
             needs_execution_tool: at.flag("needsExecutionTool"),
@@ -146,7 +164,7 @@ impl Located {
             can_get_and_set_state: at.flag("canGetAndSetFMUstate"),
             can_serialize_state: at.flag("canSerializeFMUstate"),
             provides_directional_derivative: at.flag("providesDirectionalDerivative"),
-            source_files: files.map(|n| n.attribute("name").unwrap_or_default().to_owned()).collect(),
+            source_files: source_files(node),
         }
     }
 
@@ -233,6 +251,12 @@ impl Located {
         };
         found.into_iter().flat_map(|n| children(n, "Unknown")).enumerate().map(unknown).collect()
     }
+}
+
+/// The names of the source files of an interface.
+fn source_files(node: Node<'_, '_>) -> Vec<String> {
+    let files = node.descendants().filter(|n| n.has_tag_name("File"));
+    files.map(|n| n.attribute("name").unwrap_or_default().to_owned()).collect()
 }
 
 /// A causality of FMI 2.0.

@@ -5,7 +5,7 @@
 //! the variables that may stand there ("knowns"), and refuses a value reference that fits more than one.
 
 use crate::validate::variable_path;
-use crate::{Causality, Error, Initial, ModelDescription, Variable};
+use crate::{Causality, Error, Initial, ModelDescription, Variability, Variable};
 use serde::Serialize;
 use std::collections::{BTreeSet, HashMap};
 
@@ -48,31 +48,38 @@ impl ModelDescription {
     ///
     /// # Errors
     ///
-    /// - A variable that is not an output has dependencies, or one that is not an initial unknown has
-    ///   initial dependencies.
+    /// - A variable that is neither an output nor, with model exchange, the derivative of a state has dependencies, or one
+    ///   that is not an initial unknown has initial dependencies.
     /// - A dependency is not the value reference of exactly one known.
     pub fn structure(&self) -> Result<ModelStructure, Error> {
-        let knowns = Knowns::new(&self.variables, is_known);
+        let derivatives = self.derivatives();
+        let is_state = |i: usize| derivatives.iter().any(|of| self.variables[*of].state() == Some(index(i)));
+        let knowns = Knowns::new(&self.variables, |i, v| is_known(v) || is_state(i));
         let initial_knowns =
-            Knowns::new(&self.variables, |v| is_known(v) || v.effective_initial() == Some(Initial::Exact));
+            Knowns::new(&self.variables, |_, v| is_known(v) || v.effective_initial() == Some(Initial::Exact));
+        let initial_unknowns = initial_unknowns(self, derivatives.iter().map(|of| index(*of)));
         let mut structure = ModelStructure::default();
         let unknown = |index, dependencies| Unknown { index, dependencies, dependency_kinds: None };
         for (position, variable) in self.variables.iter().enumerate() {
             let index = index(position);
             let path = |field| variable_path(variable, field);
-            if variable.causality == Causality::Output {
+            let is_derivative = derivatives.contains(&position);
+            if variable.causality == Causality::Output || is_derivative {
                 let path = path("dependencies");
-                let allowed = "value references of inputs, parameters or the independent variable";
+                let allowed = "value references of inputs, parameters, the independent variable or, with model \
+                               exchange, states";
                 let dependencies = knowns.translate(&path, variable.dependencies.as_deref(), allowed)?;
-                structure.outputs.push(unknown(index, dependencies));
+                if is_derivative {
+                    structure.derivatives.push(unknown(index, dependencies.clone()));
+                }
+                if variable.causality == Causality::Output {
+                    structure.outputs.push(unknown(index, dependencies));
+                }
             } else if variable.dependencies.is_some() {
-                return Err(Error::invalid(
-                    path("dependencies"),
-                    "given",
-                    "nothing, as this is not an output",
-                ));
+                let allowed = "nothing, as this is neither an output nor, with model exchange, the derivative of a state";
+                return Err(Error::invalid(path("dependencies"), "given", allowed));
             }
-            if variable.is_initial_unknown() {
+            if initial_unknowns.contains(&index) {
                 let path = path("initial_dependencies");
                 let allowed = "value references of inputs, parameters, the independent variable or variables \
                                with initial exact";
@@ -80,13 +87,44 @@ impl ModelDescription {
                     initial_knowns.translate(&path, variable.initial_dependencies.as_deref(), allowed)?;
                 structure.initial_unknowns.push(unknown(index, dependencies));
             } else if variable.initial_dependencies.is_some() {
-                let allowed = "nothing, as this is neither an output with initial approx or calculated nor a \
-                               calculated parameter";
+                let allowed = "nothing, as this is neither an output with initial approx or calculated, nor a calculated \
+                               parameter, nor with model exchange a derivative or state computed then";
                 return Err(Error::invalid(path("initial_dependencies"), "given", allowed));
             }
         }
         Ok(structure)
     }
+
+    /// The positions of the derivatives of continuous states, which only model exchange makes known: variables with
+    /// `derivative`, unless they or the states are inputs.
+    pub(crate) fn derivatives(&self) -> Vec<usize> {
+        let is_flow = |v: &Variable| v.causality == Causality::Input;
+        let is_derivative = |v: &Variable| {
+            let state = v.state().and_then(|state| self.at(state));
+            let moves = |state: &Variable| !is_flow(state) && state.variability == Variability::Continuous;
+            !is_flow(v) && state.is_some_and(moves)
+        };
+        let all = self.variables.iter().enumerate();
+        let all = all.filter(|(_, v)| self.model_exchange.is_some() && is_derivative(v));
+        all.map(|(i, _)| i).collect()
+    }
+}
+
+/// The indices of the unknowns of initialization: outputs that are computed then, calculated parameters, and of the
+/// derivatives with the indices `derivatives` those that are computed then, and their states.
+pub(crate) fn initial_unknowns(
+    description: &ModelDescription,
+    derivatives: impl Iterator<Item = u32>,
+) -> BTreeSet<u32> {
+    let variables = description.variables.iter().enumerate();
+    let mut wanted: BTreeSet<u32> =
+        variables.filter(|(_, v)| v.is_initial_unknown()).map(|(i, _)| index(i)).collect();
+    for derivative in derivatives {
+        let state = description.at(derivative).and_then(Variable::state);
+        let pair = [Some(derivative), state].into_iter().flatten();
+        wanted.extend(pair.filter(|index| description.at(*index).is_some_and(Variable::is_computed)));
+    }
+    wanted
 }
 
 fn is_known(variable: &Variable) -> bool {
@@ -100,9 +138,9 @@ struct Knowns<'a> {
 }
 
 impl<'a> Knowns<'a> {
-    fn new(variables: &'a [Variable], is_known: impl Fn(&Variable) -> bool) -> Self {
+    fn new(variables: &'a [Variable], is_known: impl Fn(usize, &Variable) -> bool) -> Self {
         let mut positions = HashMap::<u32, Vec<usize>>::new();
-        for (position, variable) in variables.iter().enumerate().filter(|(_, v)| is_known(v)) {
+        for (position, variable) in variables.iter().enumerate().filter(|(i, v)| is_known(*i, v)) {
             positions.entry(variable.value_reference).or_default().push(position);
         }
         Self { variables, positions }

@@ -86,6 +86,7 @@ impl Paths<'_> {
             Place::Interface(i) => {
                 self.interfaces.get(i).or(self.interfaces.last()).copied().unwrap_or_default().to_owned()
             }
+            Place::ModelExchange => "model_exchange".to_owned(),
             Place::Experiment => "default_experiment".to_owned(),
             Place::Category(c) => format!("log_categories[{c}]"),
             Place::Unit(u) => of_unit(u),
@@ -125,9 +126,12 @@ pub(crate) fn header(token: &str, header: &Header<'_>) -> Result<(), Error> {
 }
 
 fn source_files(description: &ModelDescription) -> Result<(), Error> {
-    for name in &description.co_simulation.source_files {
-        required("co_simulation.source_files", name)?;
-        line("co_simulation.source_files", name)?;
+    let exchange = description.model_exchange.iter().flat_map(|of| &of.source_files);
+    let exchange = exchange.map(|name| ("model_exchange.source_files", name));
+    let co_simulation = description.co_simulation.source_files.iter();
+    for (path, name) in exchange.chain(co_simulation.map(|name| ("co_simulation.source_files", name))) {
+        required(path, name)?;
+        line(path, name)?;
     }
     Ok(())
 }

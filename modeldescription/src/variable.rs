@@ -333,8 +333,8 @@ pub struct Variable {
     pub initial: Option<Initial>,
     /// Type, start value and range.
     pub kind: VariableKind,
-    /// Outputs only: value references of the inputs, parameters and independent variable that this output depends
-    /// on directly at communication points. `None`: unknown, so on everything; empty: on nothing. Order and
+    /// Outputs, and with model exchange derivatives of states: value references of the inputs, parameters, independent
+    /// variable and, with model exchange, states that this one depends on directly at communication points. `None`: unknown, so on everything; empty: on nothing. Order and
     /// repetition do not matter. A value reference that several of those variables have (of different base types)
     /// is refused as ambiguous.
     pub dependencies: Option<Vec<u32>>,
@@ -344,6 +344,16 @@ pub struct Variable {
 }
 
 impl Variable {
+    /// The index, from 1, of the variable that this one is the derivative of by time.
+    pub fn state(&self) -> Option<u32> {
+        if let VariableKind::Real(Real { derivative, .. }) = self.kind { derivative } else { None }
+    }
+
+    /// Whether its first value is computed: `initial` is approx or calculated.
+    pub fn is_computed(&self) -> bool {
+        matches!(self.effective_initial(), Some(Initial::Approx | Initial::Calculated))
+    }
+
     /// The origin of the first value, with the default of the standard filled in. `None` for inputs, the
     /// independent variable and illegal pairs of causality and variability.
     pub fn effective_initial(&self) -> Option<Initial> {
@@ -360,9 +370,7 @@ impl Variable {
     /// or calculated, and calculated parameters.
     pub fn is_initial_unknown(&self) -> bool {
         match self.causality {
-            Causality::Output => {
-                matches!(self.effective_initial(), Some(Initial::Approx | Initial::Calculated))
-            }
+            Causality::Output => self.is_computed(),
             Causality::CalculatedParameter => true,
             _ => false,
         }

@@ -145,8 +145,12 @@ struct Root<'a> {
 impl Serialize for Root<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let d = self.description;
-        let mut element = serializer.serialize_struct("fmiModelDescription", 18)?;
+        let mut element = serializer.serialize_struct("fmiModelDescription", 20)?;
         d.header().write(&mut element)?;
+        if let Some(exchange) = &d.model_exchange {
+            element.serialize_field("@numberOfEventIndicators", &0)?;
+            element.serialize_field("ModelExchange", exchange)?;
+        }
         element.serialize_field("CoSimulation", &d.co_simulation)?;
         units(&mut element, &d.units)?;
         let types = container(d.types.as_slice(), |types| TypeDefinitions { types });

@@ -154,10 +154,10 @@ defects! {
         |d| d.variables[6].initial = Some(Initial::Exact);
 
     dependency_on_nothing_known:
-        r#"variables["y"].dependencies is 99; allowed: value references of inputs, parameters or the independent variable"#,
+        r#"variables["y"].dependencies is 99; allowed: value references of inputs, parameters, the independent variable or, with model exchange, states"#,
         |d| d.variables[6].dependencies = Some(vec![2, 99]);
     dependency_on_an_exact_output:
-        r#"variables["y"].dependencies is 4; allowed: value references of inputs, parameters or the independent variable"#,
+        r#"variables["y"].dependencies is 4; allowed: value references of inputs, parameters, the independent variable or, with model exchange, states"#,
         |d| d.variables[6].dependencies = Some(vec![4]);
     initial_dependency_on_an_output:
         r#"variables["y"].initial_dependencies is 3; allowed: value references of inputs, parameters, the independent variable or variables with initial exact"#,
@@ -165,10 +165,10 @@ defects! {
     ambiguous_dependency:
         r#"variables["y"].dependencies is 0, which stands for "rod.length" and "count" and "rearm" and "label"; allowed: value references that stand for one variable"#,
         |d| d.variables[6].dependencies = Some(vec![0]);
-    dependencies_of_an_input: r#"variables["u[1]"].dependencies is given; allowed: nothing, as this is not an output"#,
+    dependencies_of_an_input: r#"variables["u[1]"].dependencies is given; allowed: nothing, as this is neither an output nor, with model exchange, the derivative of a state"#,
         |d| d.variables[2].dependencies = Some(vec![]);
     initial_dependencies_of_an_exact_output:
-        r#"variables["der(y)"].initial_dependencies is given; allowed: nothing, as this is neither an output with initial approx or calculated nor a calculated parameter"#,
+        r#"variables["der(y)"].initial_dependencies is given; allowed: nothing, as this is neither an output with initial approx or calculated, nor a calculated parameter, nor with model exchange a derivative or state computed then"#,
         |d| d.variables[7].initial_dependencies = Some(vec![]);
 }
 

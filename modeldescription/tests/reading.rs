@@ -3,7 +3,8 @@
 mod support;
 
 use punctual_modeldescription::{
-    DisplayUnit, Integer, Located, ModelDescription, Place, SimpleType, UnknownList, VariableKind, Violation,
+    DisplayUnit, Integer, Located, ModelDescription, ModelExchange, Place, SimpleType, Unknown, UnknownList,
+    VariableKind, Violation,
 };
 use roxmltree::Document;
 use support::small;
@@ -46,9 +47,56 @@ fn full() -> ModelDescription {
     description
 }
 
+/// The same with model exchange: `guess` is the derivative of the state `y`, on which it depends.
+fn exchanged() -> ModelDescription {
+    let mut description = full();
+    description.model_exchange = Some(ModelExchange {
+        model_identifier: "small_2".into(),
+        completed_integrator_step_not_needed: true,
+        can_not_use_memory_management_functions: true,
+        source_files: vec!["rates.c".into()],
+        ..ModelExchange::default()
+    });
+    let VariableKind::Real(rate) = &mut description.variables[7].kind else { panic!("a Real") };
+    rate.derivative = None;
+    let VariableKind::Real(rate) = &mut description.variables[9].kind else { panic!("a Real") };
+    rate.derivative = Some(7);
+    description.variables[6].dependencies = Some(vec![3]);
+    description.variables[9].dependencies = Some(vec![2, 3]);
+    description
+}
+
+#[test]
+fn model_exchange_lists_derivatives() {
+    let description = exchanged();
+    let structure = description.structure().expect("valid");
+    let unknown =
+        |index, on: &[u32]| Unknown { index, dependencies: Some(on.into()), dependency_kinds: None };
+    assert_eq!(structure.derivatives, [unknown(10, &[3, 7])]);
+    assert_eq!(structure.outputs[0], unknown(7, &[7]));
+    let unknowns: Vec<_> = structure.initial_unknowns.iter().map(|unknown| unknown.index).collect();
+    assert_eq!(unknowns, [2, 7, 9, 10], "the derivative has a first guess alone");
+    let xml = description.to_xml().expect("valid");
+    assert!(
+        xml.contains("numberOfEventIndicators=\"0\">\n  <ModelExchange modelIdentifier=\"small_2\""),
+        "{xml}"
+    );
+    for (from, to, wanted) in [
+        ("<Unknown index=\"10\" dependencies=\"3 7\"/>", "", "structure.states"),
+        ("<Unknown index=\"10\" dependencies=\"3 7\"/>", "<Unknown index=\"8\"/>", "structure.derivatives"),
+        ("      <Unknown index=\"10\"/>\n", "", "structure.initial-unknowns"),
+        ("modelIdentifier=\"small_2\"", "modelIdentifier=\"small-2\"", "interface.identifier"),
+    ] {
+        let broken = xml.replacen(from, to, 1);
+        assert_ne!(broken, xml, "{from}");
+        let rules: Vec<_> = violations(&broken).into_iter().map(|v| v.rule).collect();
+        assert!(rules.contains(&wanted), "{to}: {rules:?}");
+    }
+}
+
 #[test]
 fn what_was_written_comes_back() {
-    for description in [small(), full()] {
+    for description in [small(), full(), exchanged()] {
         let located = read(&description.to_xml().expect("valid"));
         let mut wanted = description.clone();
         for variable in &mut wanted.variables {
@@ -65,7 +113,7 @@ fn what_was_written_comes_back() {
 
 #[test]
 fn what_was_written_breaks_no_rule() {
-    for description in [small(), full()] {
+    for description in [small(), full(), exchanged()] {
         let rules: Vec<_> =
             violations(&description.to_xml().expect("valid")).into_iter().map(|v| v.rule).collect();
         assert_eq!(rules, ["structure.unsaid"], "one output says nothing");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::{Configuration, FmiVersion};
+use punctual_fmu::configuration::{Configuration, ConfigurationError, FmiVersion};
 use punctual_modeldescription::SspVersion;
 
 use crate::error::Error;
@@ -31,6 +31,9 @@ pub struct Arguments {
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
+    /// Have a plant offer model exchange too; with FMI 3.0 each that can does so anyway
+    #[arg(long)]
+    model_exchange: bool,
     /// Have the FMU carry inputs and the results that it gives here, by which a tool can check itself (FMI-LS-REF);
     /// `punctual validate --references` does so
     #[arg(long)]
@@ -77,7 +80,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let configuration = package::read_configuration(file)?;
+    let mut configuration = package::read_configuration(file)?;
+    if arguments.model_exchange {
+        let refused =
+            |e: ConfigurationError| Error::configuration("--model-exchange", e.message()).in_file(file);
+        configuration = configuration.with_model_exchange().map_err(refused)?;
+    }
     let experiment = *configuration.experiment();
     let versions = match arguments.fmi {
         None => vec![experiment.fmi],
@@ -157,9 +165,13 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--references", message));
     }
-    if arguments.fmi.is_some() || arguments.scalars {
+    let given = [
+        (arguments.scalars, "--scalars"),
+        (arguments.model_exchange, "--model-exchange"),
+        (arguments.fmi.is_some(), "--fmi"),
+    ];
+    if let Some((_, option)) = given.into_iter().find(|(given, _)| *given) {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
-        let option = if arguments.scalars { "--scalars" } else { "--fmi" };
         return Err(Error::configuration(option, message));
     }
     if let Ok(configuration) = package::read_configuration(file) {

@@ -47,6 +47,8 @@ struct Report<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     capabilities: Option<fmi2::Capabilities>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    model_exchange: Option<fmi2::Exchange<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     interfaces: Option<Vec<fmi3::Interface<'a>>>,
     default_experiment: Option<Experiment>,
     variables: Vec<VariableReport<'a>>,

@@ -65,7 +65,14 @@ impl Model {
     /// The names of its libraries, each once.
     pub(super) fn identifiers(&self) -> Vec<&str> {
         match self {
-            Self::Fmi2(model) => model.model_identifier().into_iter().collect(),
+            Self::Fmi2(model) => {
+                let exchange =
+                    model.description.model_exchange.as_ref().map(|of| of.model_identifier.as_str());
+                let mut names: Vec<&str> = model.model_identifier().into_iter().collect();
+                // What is no identifier is told as such.
+                names.extend(exchange.filter(|name| is_c_identifier(name) && !names.contains(name)));
+                names
+            }
             Self::Fmi3(model) => {
                 let mut names: Vec<&str> = Vec::new();
                 for (_, interface) in model.description.interfaces() {
@@ -101,7 +108,10 @@ impl Model {
     /// Whether the description names source code. In FMI 3.0 another file does.
     pub(super) fn names_sources(&self) -> bool {
         match self {
-            Self::Fmi2(model) => !model.description.co_simulation.source_files.is_empty(),
+            Self::Fmi2(model) => {
+                let exchange = model.description.model_exchange.iter().flat_map(|of| &of.source_files);
+                exchange.chain(&model.description.co_simulation.source_files).next().is_some()
+            }
             Self::Fmi3(_) => false,
         }
     }

@@ -1,4 +1,4 @@
-//! Checks that libraries export the functions that FMI 2.0 co-simulation needs, or all of FMI 3.0. It reads their files,
+//! Checks that libraries export the functions that the interfaces of FMI 2.0 need, or all of FMI 3.0. It reads their files,
 //! so that nothing of them runs, and those of other platforms can be checked too.
 
 use std::collections::HashSet;
@@ -10,7 +10,7 @@ use punctual_fmu::{fmi2, fmi3};
 use super::finding::Findings;
 use super::layout::ending;
 use super::model::Model;
-use crate::host::{Archive, Version};
+use crate::host::Archive;
 
 /// The greatest library looked into, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
@@ -38,11 +38,21 @@ const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
     ("aarch64-darwin", &[Architecture::Aarch64]),
 ];
 
-/// The functions that a library of a version must export, and what they are those of.
-fn functions(version: Version) -> (&'static [&'static str], &'static str) {
-    match version {
-        Version::Fmi2 => (fmi2::FUNCTIONS, "FMI 2.0 co-simulation"),
-        Version::Fmi3 => (fmi3::FUNCTIONS, "FMI 3.0"),
+/// Functions that a library must export, and what they are those of.
+type Wanted = (&'static [&'static str], &'static str);
+
+/// The functions that the library of a model called `identifier` must export.
+fn functions(model: &Model, identifier: &str) -> Vec<Wanted> {
+    match model {
+        Model::Fmi2(of) => {
+            let exchange = of.description.model_exchange.as_ref();
+            let exchange = exchange.is_some_and(|exchange| exchange.model_identifier == identifier);
+            let exchange = exchange.then_some((fmi2::EXCHANGE_FUNCTIONS, "FMI 2.0 model exchange"));
+            let stepped = of.model_identifier() == Some(identifier);
+            let stepped = stepped.then_some((fmi2::FUNCTIONS, "FMI 2.0 co-simulation"));
+            stepped.into_iter().chain(exchange).collect()
+        }
+        Model::Fmi3(_) => vec![(fmi3::FUNCTIONS, "FMI 3.0")],
     }
 }
 
@@ -66,13 +76,13 @@ pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
         for identifier in model.identifiers() {
             let entry = format!("binaries/{platform}/{identifier}{ending}");
             if archive.entries().contains(&entry) {
-                library(archive, version, platform, &entry, findings);
+                library(archive, &functions(model, identifier), platform, &entry, findings);
             }
         }
     }
 }
 
-fn library(archive: &Archive, version: Version, platform: &str, entry: &str, findings: &mut Findings) {
+fn library(archive: &Archive, wanted: &[Wanted], platform: &str, entry: &str, findings: &mut Findings) {
     let path = archive.path(entry);
     let bytes = match std::fs::metadata(&path) {
         Ok(metadata) if metadata.len() > MAX_LIBRARY_BYTES => {
@@ -88,17 +98,18 @@ fn library(archive: &Archive, version: Version, platform: &str, entry: &str, fin
     match told {
         Err(message) => findings.archive("symbols.readable", entry, message),
         Ok(exported) => {
-            let (functions, of) = functions(version);
-            let missing: Vec<&str> =
-                functions.iter().copied().filter(|function| !exported.contains(*function)).collect();
-            if !missing.is_empty() {
-                let message = format!(
-                    "does not export {} of the {} functions of {of}: {}",
-                    missing.len(),
-                    functions.len(),
-                    missing.join(", ")
-                );
-                findings.archive("symbols.missing", entry, message);
+            for (functions, of) in wanted {
+                let missing: Vec<&str> =
+                    functions.iter().copied().filter(|function| !exported.contains(*function)).collect();
+                if !missing.is_empty() {
+                    let message = format!(
+                        "does not export {} of the {} functions of {of}: {}",
+                        missing.len(),
+                        functions.len(),
+                        missing.join(", ")
+                    );
+                    findings.archive("symbols.missing", entry, message);
+                }
             }
         }
     }

@@ -319,7 +319,7 @@ fn exchange(slave: &mut Slave, bytes: &mut Bytes) {
     let (p, mut flag, mut time, mut count) = (x.as_mut_ptr(), 7, 0.5, 0);
     let f = &raw mut flag;
     let (name, call, status) = match bytes.below(11) {
-        0 => ("time", Call::Integrate, (API.set_time)(c, bytes.number())),
+        0 => ("time", Call::SetTime, (API.set_time)(c, bytes.number())),
         1..4 => ("set", Call::Integrate, (API.set_continuous_states)(c, p, n)),
         4 => ("get", Call::GetContinuousStates, (API.get_continuous_states)(c, p, n)),
         5 => ("rates", Call::GetContinuousStates, (API.get_continuous_state_derivatives)(c, p, n)),

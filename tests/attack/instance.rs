@@ -4,11 +4,15 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::ptr::null_mut;
 
+use punctual_fmu::fmi2;
 use punctual_fmu::instance::Mode;
 use punctual_modeldescription::{BaseType, Causality};
 
 use crate::api::{API, Component, ERROR, OK, State, Text, callbacks};
 use crate::fmu::Fmu;
+
+/// The status of a message that is a remark. No function returns it.
+const WARNING: c_int = fmi2::Status::WARNING.0;
 
 /// Observations of the logger.
 #[derive(Default)]
@@ -30,8 +34,9 @@ extern "C" fn log(environment: *mut c_void, name: Text, status: c_int, category:
     let mut log = log.borrow_mut();
     let error = status == ERROR && category.as_deref() == Some("logStatusError");
     let event = status == OK && category.as_deref() == Some("logEvents");
+    let warning = status == WARNING && category.as_deref() == Some("logStatusWarning");
     let text = message.as_deref().unwrap_or_default();
-    let sound = name.is_some() && (error || event) && !text.is_empty() && !text.contains('%');
+    let sound = name.is_some() && (error || event || warning) && !text.is_empty() && !text.contains('%');
     if !sound || text.contains("internal error") || (error && !text.starts_with("fmi2")) {
         log.wrong = Some(format!("{name:?} {status} {category:?} {message:?}"));
     }

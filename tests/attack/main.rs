@@ -9,7 +9,7 @@
 //! | `campaign`, `bytes` | nothing: cases, their readings, the corpus |
 //! | `instance` | nothing: an instance that watches its log |
 //! | `fleet`, `machine` | nothing: FMUs of every kind, and the conditions after each call |
-//! | `calls` | the 34 functions in any order with any arguments |
+//! | `calls` | the functions of FMI 2.0 in any order with any arguments |
 //! | `arrays` | the 75 functions of FMI 3.0 in the same way |
 //! | `states` | serialised states with bytes changed, checksums right or wrong |
 //! | `configurations` | configurations and system files |

@@ -452,6 +452,13 @@ fn libraries_that_are_none_or_lack_functions() {
         lacks.ends_with("does not export 1 of the 34 functions of FMI 2.0 co-simulation: fmi2GetFMUstate"),
         "{lacks}"
     );
+    let exchange = "<ModelExchange modelIdentifier=\"misbehaving\"/><CoSimulation";
+    let workshop = Workshop::new();
+    let library = misbehaving::library(&["WITHOUT_EXCHANGE"]);
+    misbehaving::write(&workshop, "x.fmu", description("none", &[("<CoSimulation", exchange)]), &library);
+    let (_, found) = listed(&workshop, &[]);
+    let wanted = "does not export 10 of the 10 functions of FMI 2.0 model exchange: fmi2EnterEventMode, ";
+    assert!(found.len() == 1 && found[0].contains(wanted), "{found:#?}");
     let text = with(b"text");
     assert!(
         text.starts_with("error symbols.readable ") && text.contains("is not a shared library: "),

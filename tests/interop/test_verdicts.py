@@ -45,6 +45,7 @@ BROKEN = {
     "too few kinds": ('dependencies="2"', 'dependencies="2 3"'),
     "kinds without dependencies": ('dependencies="2" ', ""),
     "an initial unknown that is not listed": ("<InitialUnknowns>\n      " + FIRST, "<InitialUnknowns>"),
+    "a derivative that is none": ("</Outputs>", '</Outputs><Derivatives><Unknown index="2"/></Derivatives>'),
     "not well-formed": ("</Outputs>", ""),
 }
 # Texts and their replacements to which we object, by this rule, and FMPy does not.
@@ -62,6 +63,10 @@ SOUND = {
     "infinity": ('max="1000"', 'max="INF"'),
     "no version of the tool": ("<LogCategories>", "<!-- a comment --><LogCategories>"),
     "a variable of its own kind": ("<String/>", '<String/><Annotations><Tool name="t"/></Annotations>'),
+    "a derivative that is not listed": (
+        "</ModelVariables>",
+        '<ScalarVariable name="r" valueReference="9"><Real derivative="1"/></ScalarVariable></ModelVariables>',
+    ),
     "model exchange too": ("<CoSimulation", '<ModelExchange modelIdentifier="misbehaving"/><CoSimulation'),
 }
 

@@ -4,7 +4,7 @@
 //! # Safety
 //!
 //! Every function expects this of its caller, besides what it says itself: a component is NULL or came from
-//! `fmi2Instantiate` or `fmi3InstantiateCoSimulation` and was not freed; calls for one component do not overlap; an
+//! `fmi2Instantiate` or its like of FMI 3.0 and was not freed; calls for one component do not overlap; an
 //! array is NULL or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong counts of
 //! zero are met with a status, never with a crash. A component of one version in a function of the other is refused.
 
@@ -12,6 +12,7 @@
 pub mod fmi2;
 #[macro_use]
 pub mod fmi3;
+mod exchange;
 #[cfg(old_glibc)]
 mod glibc;
 mod guard;

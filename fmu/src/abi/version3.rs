@@ -1,5 +1,5 @@
 //! The 75 functions of FMI 3.0. Those of FMU states are in [`states`](super::states), those of model exchange in
-//! [`exchange`], those of features that our FMUs do not have in [`absent`].
+//! `exchange` beside and below, those of features that our FMUs do not have in [`absent`].
 //!
 //! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist here, or that a
 //! continuous state is no number; the run may go on.
@@ -9,6 +9,11 @@ mod exchange;
 
 use std::ptr;
 
+use super::exchange::{
+    done_or_discarded, fmi3CompletedIntegratorStep, fmi3GetContinuousStateDerivatives,
+    fmi3GetContinuousStates, fmi3GetEventIndicators, fmi3GetNominalsOfContinuousStates,
+    fmi3SetContinuousStates, fmi3SetTime,
+};
 use super::fmi3::{
     self, Boolean, ClockUpdate, DEPENDENT, DependencyKind, Environment, FALSE, Instance, IntermediateUpdate,
     LogMessage, Preemption, Status, Text, ValueReference,

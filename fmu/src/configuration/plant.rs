@@ -16,8 +16,8 @@ use super::model::RawModel;
 use super::names::{check_identifier, check_known, taken};
 use super::unit::measured;
 use super::{
-    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
-    Range, VariableSection, check_unit, model,
+    ConfigurationError, EXPERIMENT, ExperimentSection, FmiVersion, ModelName, Parameter, PlantSection,
+    PluginLoader, Range, VariableSection, check_unit, model,
 };
 
 const INNER_STEP: Range = Range::POSITIVE;
@@ -269,6 +269,7 @@ impl PlantConfiguration {
             x0.entry(state.name).or_insert(start);
         }
         experiment.check()?;
+        self.check_exchange()?;
         for parameter in self.parameters() {
             parameter.check(&mut self)?;
         }
@@ -368,9 +369,15 @@ impl PlantConfiguration {
     }
 
     /// Whether an importer may integrate the plant itself. One with a disturbance has to be stepped: that is held for a
-    /// period, and the states measured are not those that move.
+    /// period, and the states measured are not those that move. With FMI 2.0 it has to be asked for.
     pub fn can_be_integrated(&self) -> bool {
-        self.disturbance.is_none()
+        let ExperimentSection { fmi, model_exchange, .. } = self.experiment;
+        self.disturbance.is_none() && (fmi == FmiVersion::Three || model_exchange)
+    }
+
+    pub(super) fn check_exchange(&self) -> Result<(), ConfigurationError> {
+        let noisy = "since a plant with `[disturbance]` has to be stepped; leave one of the two out";
+        self.experiment.check_exchange(self.disturbance.is_some().then_some(noisy))
     }
 
     /// The outputs as signals, in order.

@@ -54,9 +54,7 @@ impl Instance {
         match (first - self.product.variables.len()).checked_sub(1) {
             None => out.fill(self.time),
             Some(first) => {
-                self.derivative[0].fill(0.0);
-                let rates = self.block.rates(&self.values, &self.derivative[0]);
-                rates[first..].iter().zip(out).for_each(|(rate, o)| *o = rate.value);
+                self.rates()[first..].iter().zip(out).for_each(|(rate, o)| *o = rate.value);
             }
         }
     }

@@ -4,7 +4,6 @@ use punctual_modeldescription::{BaseType, Causality, ScalarType, Variable};
 
 use super::arrays::{scalars, type_name};
 use super::{Call, Failure, Instance, Mode};
-use crate::configuration::FmiVersion;
 
 /// The two sides of a Jacobian: the causality of their variables, and their name.
 const SIDES: [(Causality, &str); 2] = [(Causality::Output, "unknown"), (Causality::Input, "known")];
@@ -28,6 +27,9 @@ impl Instance {
         self.check(Call::GetDirectionalDerivative)?;
         for (references, side) in [unknowns, knowns].into_iter().zip(SIDES) {
             for &reference in references {
+                if self.is_beside(reference, side.0) {
+                    continue;
+                }
                 let Variable { name, causality, .. } = self.variable(BaseType::Real, reference)?;
                 check_side(name, *causality, side)?;
             }
@@ -113,7 +115,8 @@ impl Instance {
     fn check_sides(&self, sides: [&[u32]; 2], lengths: [usize; 2], names: [&str; 2]) -> Result<(), Failure> {
         for (references, side) in sides.into_iter().zip(SIDES) {
             for &reference in references {
-                if self.is_beside(reference, side.0) {
+                let access = self.accesses.get(reference as usize);
+                if access.is_some_and(|access| access.length > 0) && self.is_beside(reference, side.0) {
                     continue;
                 }
                 let item = self.item(reference)?;
@@ -140,13 +143,10 @@ impl Instance {
     /// Whether a variable stands on a side of the Jacobian beside inputs and outputs: rates among the unknowns; among the
     /// knowns states, and in initialization the parameters that they begin with.
     fn is_beside(&self, reference: u32, side: Causality) -> bool {
-        let Some(access) = self.accesses.get(reference as usize).filter(|access| access.length > 0) else {
-            return false;
-        };
         let layout = &self.product.layout;
         let within = |first: usize| (first..first + layout.rates).contains(&(reference as usize));
         match side {
-            Causality::Output => access.causality == Causality::Local,
+            Causality::Output => within(self.product.first_rate()),
             _ => within(layout.outputs) || self.mode == Mode::INITIALIZATION && within(layout.parameters),
         }
     }
@@ -172,14 +172,14 @@ impl Instance {
             self.configure().map_err(|e| e.to_string())?;
         }
         let layout = self.product.layout;
-        let (table, three) = (self.product.variables.len(), self.fmi() == FmiVersion::Three);
+        let first_rate = self.product.first_rate();
         let [direction, derivative, _] = &mut self.derivative;
         derivative.fill(0.0);
         // After initialization outputs without direct feedthrough change in steps only.
         if self.mode == Mode::INITIALIZATION || self.block.direct_feedthrough() {
             self.block.differentiate(self.time, &self.values, direction, derivative)?;
         }
-        if three && layout.rates > 0 {
+        if layout.rates > 0 {
             if self.mode == Mode::INITIALIZATION {
                 // A state begins with its parameter.
                 for i in 0..layout.rates {
@@ -188,7 +188,7 @@ impl Instance {
             }
             self.block.differentiate_by_states(self.time, direction, derivative);
             let rates = self.block.rates(&self.values, direction);
-            let slots = derivative[table + 1..].iter_mut();
+            let slots = derivative[first_rate..].iter_mut();
             slots.zip(rates).for_each(|(slot, rate)| *slot = rate.directional);
         }
         Ok(())

@@ -2,6 +2,7 @@
 //! plant's own, so a visit to event mode changes nothing.
 
 use super::{Call, Failure, Instance, Interface, Mode};
+use crate::configuration::FmiVersion;
 
 impl Instance {
     /// Checks that `call` is one of model exchange, and legal now.
@@ -18,10 +19,10 @@ impl Instance {
     ///
     /// The wrong mode, or an instance of co-simulation, which has no events; so of every function here.
     pub fn enter_event_mode(&mut self) -> Result<(), Failure> {
-        if self.interface == Interface::CoSimulation {
+        if (self.interface, self.fmi()) == (Interface::CoSimulation, FmiVersion::Three) {
             return Err("not supported: hasEventMode is false".to_owned());
         }
-        self.check(Call::EnterEventMode)?;
+        self.check_exchange(Call::EnterEventMode)?;
         self.mode = Mode::EVENT;
         Ok(())
     }
@@ -52,7 +53,7 @@ impl Instance {
     ///
     /// As above; a time that is not finite.
     pub fn set_time(&mut self, time: f64) -> Result<(), Failure> {
-        self.check_exchange(Call::Integrate)?;
+        self.check_exchange(Call::SetTime)?;
         if !time.is_finite() {
             return Err(format!("time is {time}, must be finite"));
         }
@@ -127,8 +128,7 @@ impl Instance {
         self.check_exchange(Call::GetContinuousStates)?;
         self.check_number(out.len())?;
         self.refresh();
-        self.derivative[0].fill(0.0);
-        let rates = self.block.rates(&self.values, &self.derivative[0]);
+        let rates = self.rates();
         if let Some(i) = rates.iter().position(|rate| !rate.value.is_finite()) {
             let value = rates[i].value;
             return Ok(Err(format!("the rate of {} is {value}, must be finite", self.state_name(i))));
@@ -157,7 +157,8 @@ impl Instance {
     pub fn event_indicators(&self, count: usize) -> Result<(), Failure> {
         self.check_exchange(Call::GetContinuousStates)?;
         if count > 0 {
-            return Err(format!("nEventIndicators is {count}, must be 0: there are none"));
+            let name = self.named("ni", "nEventIndicators");
+            return Err(format!("{name} is {count}, must be 0: there are none"));
         }
         Ok(())
     }
@@ -167,7 +168,15 @@ impl Instance {
         if found == wanted {
             return Ok(());
         }
-        Err(format!("nContinuousStates is {found}, must be {wanted}"))
+        Err(format!("{} is {found}, must be {wanted}", self.named("nx", "nContinuousStates")))
+    }
+
+    /// The name of an argument, which each version of FMI calls its own way.
+    fn named(&self, two: &'static str, three: &'static str) -> &'static str {
+        match self.fmi() {
+            FmiVersion::Two => two,
+            FmiVersion::Three => three,
+        }
     }
 
     fn state_name(&self, i: usize) -> &str {

@@ -338,7 +338,15 @@ fn descriptions_of_fmi3() {
     for (old, new) in every_product_of_fmi3() {
         let name = new.configuration.name();
         assert_ne!(old.guid, new.guid, "{name}: a token of its own");
-        assert_eq!(old.variables, new.variables, "{name}: the same table");
+        let mut table = new.variables.clone();
+        for (own, other) in table.iter_mut().zip(&old.variables) {
+            if matches!(new.configuration, Configuration::Plant(_)) {
+                // Who integrates the states knows them.
+                own.dependencies.clone_from(&other.dependencies);
+                own.initial_dependencies.clone_from(&other.initial_dependencies);
+            }
+        }
+        assert_eq!(old.variables, table, "{name}: the same table");
         let description = new.model_description_of_fmi3();
         let xml = description.to_xml().unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(xml.contains("fmiVersion=\"3.0\""));
@@ -386,6 +394,66 @@ fn units_and_ranges_that_all_elements_share() {
     assert_eq!((rates.unit.as_deref(), rates.derivative), (Some("m/s"), Some(1)));
     assert_eq!(description.by_name("x").unwrap().description, "a in m: a; b in m: b");
     assert_eq!(of("u").unit.as_deref(), Some("m/s"));
+}
+
+/// A plant with an output beside its states.
+const TANK: &str = "kind = \"plant\"\noutput = [{ name = \"twice\", expression = \"2*a\", unit = \"m\" }]\n[plant]\n\
+                    states = [{ name = \"a\", unit = \"m\" }, { name = \"b\", unit = \"rad/s\" }]\n\
+                    inputs = [{ name = \"u\", unit = \"m/s\" }]\nparameters = [{ name = \"w\", unit = \"1/s\", start = 2.0 }]\nderivatives = { a = \"u\", b = \"-w*b\" }\n";
+
+#[test]
+fn model_exchange_of_fmi2_is_asked_for() {
+    let without = product(TANK);
+    let with = without.configuration.clone().with_model_exchange().unwrap();
+    assert_eq!(with, Configuration::parse(&with.canonical().unwrap()).unwrap());
+    let with = Product::new(with).unwrap();
+    assert_ne!(with.guid, without.guid);
+    assert!(!without.model_description().to_xml().unwrap().contains("ModelExchange"));
+    // The rates come last, so that all other variables keep their value references.
+    let names = |product: &Product| product.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+    let wanted = [names(&without), vec!["der(x.a)".to_owned(), "der(x.b)".to_owned()]].concat();
+    assert_eq!((names(&with), with.first_rate()), (wanted, without.variables.len()));
+    let description = with.model_description();
+    let rate = description.variables.last().unwrap();
+    assert_eq!((rate.kind.unit(), rate.state()), (Some("rad/s2"), Some(3)));
+    let structure = description.structure().unwrap();
+    let listed: Vec<_> = structure.derivatives.iter().map(|u| (u.index, u.dependencies.clone())).collect();
+    let on_all = Some(vec![1, 2, 3]);
+    assert_eq!(listed, [(9, on_all.clone()), (10, on_all)], "on the input and the states");
+    let outputs: Vec<_> = structure.outputs.iter().map(|u| u.dependencies.clone().unwrap()).collect();
+    assert_eq!(outputs, [vec![2], vec![3], vec![2, 3]], "the states on themselves, the output on them");
+    description.to_xml().unwrap();
+    let three = with.configuration.clone().for_fmi(FmiVersion::Three, true);
+    let three = Product::new(three).unwrap().model_description_of_fmi3();
+    assert!(three.model_exchange.is_some());
+    let first = &three.structure.initial_unknowns[1];
+    assert_eq!(
+        (first.value_reference, &first.dependencies),
+        (3, &Some(vec![4, 6, 7])),
+        "on x0, w, inner_step"
+    );
+    // Whatever has to be stepped says so.
+    let asked = "experiment.model_exchange = true\n";
+    let noisy = format!(
+        "{}\n[disturbance]\ninputs = {{ u = 0.1 }}\n",
+        TANK.replace("[plant]", &format!("{asked}[plant]"))
+    );
+    let filter = format!("kind = \"filter\"\nplant.model = \"unicycle\"\n{asked}{BARRIER}");
+    let controller =
+        format!("kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"point_mass\"\n{asked}");
+    for (text, why) in [
+        (noisy, "since a plant with `[disturbance]` has to be stepped; leave one of the two out"),
+        (filter, "which plants alone have; a filter and a controller are stepped"),
+        (controller, "which plants alone have; a filter and a controller are stepped"),
+    ] {
+        let error = Configuration::parse(&text).unwrap_err().to_string();
+        let wanted = format!(
+            "experiment.model_exchange: is true, must be false: there is no model exchange here, {why}"
+        );
+        assert!(error.contains(&wanted), "{error}");
+        let plain = Configuration::parse(&text.replace(asked, "")).unwrap();
+        assert_eq!(plain.with_model_exchange().unwrap_err().to_string(), wanted);
+    }
 }
 
 #[test]

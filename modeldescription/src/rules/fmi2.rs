@@ -8,15 +8,13 @@ use super::structure::{Listed, Numbering};
 use super::variables::{AnyType, AnyVariable, Scope};
 use super::{Check, Place, brief};
 #[cfg(feature = "read")]
-use crate::structure::index;
+use crate::structure::{index, initial_unknowns as initial_unknowns_of};
 use crate::{
-    BaseType, Causality, Initial, InitialRule, ModelDescription, NamingConvention, Real, ScalarType,
-    SimpleType, Variability, Variable, VariableKind,
+    BaseType, Causality, Initial, InitialRule, ModelDescription, NamingConvention, ScalarType, SimpleType,
+    Variability, Variable, VariableKind,
 };
 #[cfg(feature = "read")]
 use crate::{ModelStructure, Unknown};
-#[cfg(feature = "read")]
-use std::collections::BTreeSet;
 use std::collections::HashMap;
 
 impl AnyType for SimpleType {
@@ -121,11 +119,22 @@ impl AnyVariable for Variable {
 
 /// Checks every rule on a description.
 pub(crate) fn description(description: &ModelDescription, check: &mut Check<'_>) {
-    let (interface, place) = (&description.co_simulation, Place::Interface(0));
     check.token("interface.guid", "guid", &description.guid);
-    check.identifier(place, &interface.model_identifier);
-    let (serialises, restores) = (interface.can_serialize_state, interface.can_get_and_set_state);
-    check.flags(place, ("canSerializeFMUstate", serialises), ("canGetAndSetFMUstate", restores));
+    let co_simulation = &description.co_simulation;
+    let mut interface = |place, name: &str, serialises, restores| {
+        check.identifier(place, name);
+        check.flags(place, ("canSerializeFMUstate", serialises), ("canGetAndSetFMUstate", restores));
+    };
+    if let Some(of) = &description.model_exchange {
+        interface(
+            Place::ModelExchange,
+            &of.model_identifier,
+            of.can_serialize_state,
+            of.can_get_and_set_state,
+        );
+    }
+    let (serialises, restores) = (co_simulation.can_serialize_state, co_simulation.can_get_and_set_state);
+    interface(Place::Interface(0), &co_simulation.model_identifier, serialises, restores);
     check.experiment(description.default_experiment);
     check.categories(&description.log_categories);
     check.units(&description.units);
@@ -168,11 +177,16 @@ pub(crate) fn structure(description: &ModelDescription, structure: &ModelStructu
     check.complete("structure.outputs", Outputs, outputs, (&wanted, &wanted), &numbering);
     for (u, unknown) in derivatives.iter().enumerate() {
         let Some(variable) = description.at(unknown.number) else { continue };
-        if state_of(variable).is_none() {
+        if variable.state().is_none() {
             check.no_derivative(u, &variable.name, "Derivatives");
         }
     }
-    let wanted = initial_unknowns_of(description, derivatives);
+    if description.model_exchange.is_some() {
+        let wanted = description.derivatives().into_iter().map(index).collect();
+        let all = (0..description.variables.len()).map(index).collect();
+        check.complete("structure.states", Derivatives, derivatives, (&wanted, &all), &numbering);
+    }
+    let wanted = initial_unknowns_of(description, derivatives.iter().map(|unknown| unknown.number));
     check.complete(
         "structure.initial-unknowns",
         InitialUnknowns,
@@ -196,35 +210,9 @@ impl<'a> From<&'a Unknown> for Listed<'a> {
     }
 }
 
-/// Outputs that are computed in initialization, calculated parameters, and states and derivatives computed
-/// then.
-#[cfg(feature = "read")]
-fn initial_unknowns_of(description: &ModelDescription, derivatives: &[Listed<'_>]) -> BTreeSet<u32> {
-    let computed = |variable: &Variable| {
-        matches!(variable.effective_initial(), Some(Initial::Approx | Initial::Calculated))
-    };
-    let variables = description.variables.iter().enumerate();
-    let mut wanted: BTreeSet<u32> =
-        variables.filter(|(_, v)| v.is_initial_unknown()).map(|(i, _)| index(i)).collect();
-    for listed in derivatives.iter().map(|unknown| unknown.number) {
-        let state = description.at(listed).and_then(state_of);
-        for index in [Some(listed), state].into_iter().flatten() {
-            if description.at(index).is_some_and(computed) {
-                wanted.insert(index);
-            }
-        }
-    }
-    wanted
-}
-
-/// The index of the state that a variable is the derivative of.
-fn state_of(variable: &Variable) -> Option<u32> {
-    if let VariableKind::Real(Real { derivative, .. }) = variable.kind { derivative } else { None }
-}
-
 impl Check<'_> {
     fn derivative(&mut self, v: usize, variable: &Variable, description: &ModelDescription) {
-        let Some(index) = state_of(variable) else { return };
+        let Some(index) = variable.state() else { return };
         let message = match description.at(index) {
             None => {
                 let most = description.variables.len();

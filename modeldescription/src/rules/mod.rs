@@ -86,7 +86,7 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     (
         "structure.states",
         Warning,
-        "FMI 3.0, model exchange: ContinuousStateDerivative lists every derivative",
+        "model exchange: Derivatives (FMI 3.0: ContinuousStateDerivative) lists every derivative",
     ),
     ("structure.clocked-states", Error, "FMI 3.0: ClockedState lists variables with a previous value"),
     ("structure.event-indicators", Error, "FMI 3.0: EventIndicator lists continuous numbers"),
@@ -160,6 +160,8 @@ pub enum Place {
     /// An interface. In FMI 2.0 one for co-simulation: the model's is the first. In FMI 3.0 the one for model exchange,
     /// co-simulation or scheduled execution, in this order.
     Interface(usize),
+    /// The interface for model exchange of FMI 2.0.
+    ModelExchange,
     /// The default experiment.
     Experiment,
     /// A log category.

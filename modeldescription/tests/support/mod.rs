@@ -65,6 +65,7 @@ pub(crate) fn small() -> ModelDescription {
         generation_tool: "by hand".into(),
         generation_date_and_time: None,
         variable_naming_convention: NamingConvention::Structured,
+        model_exchange: None,
         co_simulation: CoSimulation {
             model_identifier: "small_1".into(),
             can_handle_variable_step: true,

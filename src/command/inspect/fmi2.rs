@@ -1,6 +1,6 @@
 //! The report on an FMU of FMI 2.0.
 
-use punctual_modeldescription::Variable;
+use punctual_modeldescription::{ModelExchange, Unknown, Variable};
 use serde::Serialize;
 
 use super::{DependencyReport, Facts, Report, VariableReport, experiment, flags, given};
@@ -15,6 +15,38 @@ pub(super) struct Capabilities {
     provides_directional_derivative: bool,
     can_be_instantiated_only_once_per_process: bool,
     needs_execution_tool: bool,
+}
+
+/// What model exchange can do.
+#[derive(Serialize)]
+pub(super) struct Exchange<'a> {
+    model_identifier: &'a str,
+    completed_integrator_step_not_needed: bool,
+    can_get_and_set_fmu_state: bool,
+    can_serialize_fmu_state: bool,
+    provides_directional_derivative: bool,
+    can_be_instantiated_only_once_per_process: bool,
+    needs_execution_tool: bool,
+}
+
+impl<'a> Exchange<'a> {
+    fn of(can: &'a ModelExchange) -> Self {
+        Self {
+            model_identifier: &can.model_identifier,
+            completed_integrator_step_not_needed: can.completed_integrator_step_not_needed,
+            can_get_and_set_fmu_state: can.can_get_and_set_state,
+            can_serialize_fmu_state: can.can_serialize_state,
+            provides_directional_derivative: can.provides_directional_derivative,
+            can_be_instantiated_only_once_per_process: can.can_be_instantiated_only_once_per_process,
+            needs_execution_tool: can.needs_execution_tool,
+        }
+    }
+}
+
+/// The names of the states that model exchange has, in the order of its functions.
+fn states(d: &Description) -> Vec<&str> {
+    let state = |unknown: &Unknown| Some(d.at(d.at(unknown.index)?.state()?)?.name.as_str());
+    d.derivatives.iter().filter_map(state).collect()
 }
 
 pub(super) fn report<'a>(fmu: &'a Fmu, d: &'a Description) -> Report<'a> {
@@ -39,6 +71,8 @@ pub(super) fn report<'a>(fmu: &'a Fmu, d: &'a Description) -> Report<'a> {
             can_be_instantiated_only_once_per_process: can.can_be_instantiated_only_once_per_process,
             needs_execution_tool: can.needs_execution_tool,
         }),
+        model_exchange: d.model_exchange.as_ref().map(Exchange::of),
+        states: d.model_exchange.as_ref().map(|_| states(d)),
         default_experiment: experiment(d.default_experiment),
         variables: d.variables.iter().zip(&d.starts).map(|(v, start)| variable_report(d, v, start)).collect(),
         dependencies: d
@@ -86,5 +120,23 @@ pub(super) fn facts(d: &Description) -> Facts {
         (can.can_be_instantiated_only_once_per_process, "only be instantiated once per process"),
         (can.needs_execution_tool, "only run with its tool"),
     ]);
-    vec![("guid", d.guid.clone()), ("identifier", can.model_identifier.clone()), ("can", capabilities)]
+    let mut facts = vec![("guid", d.guid.clone()), ("identifier", can.model_identifier.clone())];
+    let Some(exchange) = &d.model_exchange else {
+        facts.push(("can", capabilities));
+        return facts;
+    };
+    let exchanged = flags(&[
+        (exchange.can_get_and_set_state, "save and restore its state"),
+        (exchange.can_serialize_state, "serialise its state"),
+        (exchange.provides_directional_derivative, "give directional derivatives"),
+        (exchange.can_be_instantiated_only_once_per_process, "only be instantiated once per process"),
+        (exchange.needs_execution_tool, "only run with its tool"),
+    ]);
+    facts.push(("interfaces", "model exchange, co-simulation".to_owned()));
+    facts.push(("states", states(d).join(", ")));
+    // Each interface has a line of its own.
+    for (can, interface) in [(exchanged, "model exchange"), (capabilities, "co-simulation")] {
+        facts.extend((!can.is_empty()).then(|| ("can", format!("{can} (in {interface})"))));
+    }
+    facts
 }

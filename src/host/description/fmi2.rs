@@ -15,8 +15,8 @@ use std::ops::Deref;
 
 use fmi_rs::model_description::fmi2 as importer;
 use punctual_modeldescription::{
-    Causality, DefaultExperiment, Located, ModelDescription, ModelStructure, SimpleType, VariableKind,
-    is_c_identifier,
+    Causality, DefaultExperiment, Located, ModelDescription, ModelStructure, SimpleType, Unknown,
+    VariableKind, is_c_identifier,
 };
 use roxmltree::{Document, Node};
 
@@ -35,6 +35,8 @@ pub struct Fmi2Description {
     pub starts: Vec<Option<String>>,
     /// All outputs, in the order of the variables.
     pub outputs: Vec<Output>,
+    /// The derivatives of the continuous states, as listed.
+    pub derivatives: Vec<Unknown>,
     /// Violations of the standard, found by `fmi-rs`; empty for a valid description.
     pub problems: Vec<String>,
 }
@@ -64,7 +66,7 @@ impl Fmi2Description {
         }
         let outputs = outputs(&model, &structure)?;
         fill_in(&mut model);
-        Ok(Self { model, starts, outputs, problems })
+        Ok(Self { model, starts, outputs, derivatives: structure.derivatives, problems })
     }
 
     /// The inputs an output depends on directly, as positions in the variables.

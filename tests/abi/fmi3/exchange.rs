@@ -9,18 +9,8 @@ use punctual_fmu::instance::{Call, Mode};
 use super::slave::{Log, Slave, log};
 use crate::api::three::API;
 use crate::api::{DISCARD, ERROR};
+use crate::exchange::{PENDULUM, next};
 use crate::fmu::{FILTER, Fmu, PLANT};
-
-/// A pendulum by expressions, with an output that depends on time.
-const PENDULUM: &str = r#"
-kind = "plant"
-x0 = { phi = 0.3, omega = -0.2 }
-output = [{ name = "height", expression = "1 - cos(phi) + 0.1*t", unit = "1" }]
-[plant]
-states = [{ name = "phi", unit = "rad" }, { name = "omega", unit = "rad/s" }]
-inputs = [{ name = "torque", unit = "rad/s2" }]
-derivatives = { phi = "omega", omega = "torque - 9.81*sin(phi)" }
-"#;
 
 /// Step of the differences.
 const STEP: f64 = 1e-5;
@@ -75,7 +65,13 @@ fn update(slave: &Slave) -> c_int {
     status
 }
 
-fn rates(slave: &Slave, t: f64, x: &[f64]) -> Vec<f64> {
+/// An instance in continuous-time mode.
+pub(crate) fn continuous(fmu: &Fmu) -> Slave<'_> {
+    into_mode(fmu, Mode::CONTINUOUS)
+}
+
+/// The rates at a time and state.
+pub(crate) fn rates(slave: &Slave, t: f64, x: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; x.len()];
     slave.ok((API.set_time)(slave.instance, t));
     slave.ok((API.set_continuous_states)(slave.instance, x.as_ptr(), x.len()));
@@ -83,15 +79,9 @@ fn rates(slave: &Slave, t: f64, x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// One step of the classical Runge-Kutta method, in the order of additions of `punctual_core::dynamics::rk4`.
+/// One step outside.
 fn step(slave: &Slave, t: f64, x: &[f64], h: f64) -> Vec<f64> {
-    let moved = |k: &[f64], by: f64| -> Vec<f64> { x.iter().zip(k).map(|(x, k)| x + k * by).collect() };
-    let k1 = rates(slave, t, x);
-    let k2 = rates(slave, t + h / 2.0, &moved(&k1, h / 2.0));
-    let k3 = rates(slave, t + h / 2.0, &moved(&k2, h / 2.0));
-    let k4 = rates(slave, t + h, &moved(&k3, h));
-    let sum = |i: usize| k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i];
-    let next: Vec<f64> = (0..x.len()).map(|i| x[i] + sum(i) * (h / 6.0)).collect();
+    let next = next(|t, x| rates(slave, t, x), t, x, h);
     slave.ok((API.set_time)(slave.instance, t + h));
     slave.ok((API.set_continuous_states)(slave.instance, next.as_ptr(), next.len()));
     let (mut event, mut end) = (7, 7);
@@ -151,7 +141,7 @@ fn every_function_in_every_mode() {
         ("fmi3CompletedIntegratorStep", Call::Integrate, |s| {
             (API.completed_integrator_step)(s.instance, 0, &mut 0, &mut 0)
         }),
-        ("fmi3SetTime", Call::Integrate, |s| (API.set_time)(s.instance, 0.5)),
+        ("fmi3SetTime", Call::SetTime, |s| (API.set_time)(s.instance, 0.5)),
         ("fmi3SetContinuousStates", Call::Integrate, |s| {
             (API.set_continuous_states)(s.instance, [1.0; 4].as_ptr(), 4)
         }),

@@ -15,7 +15,7 @@
 mod arguments;
 mod dependencies;
 mod derivatives;
-mod exchange;
+pub(crate) mod exchange;
 mod instantiate;
 mod legality;
 mod sameness;

@@ -1,9 +1,7 @@
-//! Model exchange: time, continuous states, their rates and events, of which there are none.
+//! What model exchange has in FMI 3.0 alone: its way to end an event, and numbers of states and event indicators.
 
 use super::super::fmi3::{Boolean, FALSE, Instance, Status};
-use super::super::guard::{Handle, guarded, slice, slice_mut};
-
-use crate::instance::Failure;
+use super::super::guard::{Handle, guarded, slice_mut};
 
 /// Ends an event: nothing has changed, and no event is known to come.
 ///
@@ -44,108 +42,6 @@ pub(super) unsafe extern "C" fn fmi3UpdateDiscreteStates(
     };
     // SAFETY: the caller's contract for instances.
     unsafe { guarded(instance, "fmi3UpdateDiscreteStates", body) }
-}
-
-/// Takes note of a step of the integrator: no event follows, and the run may go on.
-///
-/// # Safety
-///
-/// See the module above; the two pointers are NULL or writable.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi3CompletedIntegratorStep(
-    instance: Instance,
-    _no_set_fmu_state_prior_to_current_point: Boolean,
-    enter_event_mode: *mut Boolean,
-    terminate: *mut Boolean,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for the pointer.
-        let event = unsafe { slice_mut("enterEventMode", enter_event_mode, 1) }?;
-        // SAFETY: the caller's contract for the pointer.
-        let terminate = unsafe { slice_mut("terminateSimulation", terminate, 1) }?;
-        handle.instance.completed_integrator_step()?;
-        (event[0], terminate[0]) = (FALSE, FALSE);
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for instances.
-    unsafe { guarded(instance, "fmi3CompletedIntegratorStep", body) }
-}
-
-/// Takes over the time.
-///
-/// # Safety
-///
-/// See the module above.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi3SetTime(instance: Instance, time: f64) -> Status {
-    // SAFETY: the caller's contract for instances.
-    unsafe { guarded(instance, "fmi3SetTime", |handle| handle.instance.set_time(time).map(|()| Status::OK)) }
-}
-
-/// Takes over the continuous states.
-///
-/// # Safety
-///
-/// See the module above.
-#[unsafe(no_mangle)]
-pub(super) unsafe extern "C" fn fmi3SetContinuousStates(
-    instance: Instance,
-    states: *const f64,
-    count: usize,
-) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for arrays.
-        let states = unsafe { slice("continuousStates", states, count) }?;
-        let done = handle.instance.set_continuous_states(states)?;
-        Ok(done_or_discarded(handle, "fmi3SetContinuousStates", done))
-    };
-    // SAFETY: the caller's contract for instances.
-    unsafe { guarded(instance, "fmi3SetContinuousStates", body) }
-}
-
-/// OK, or discarded with a message.
-pub(super) fn done_or_discarded(handle: &Handle, name: &str, done: Result<(), Failure>) -> Status {
-    match done {
-        Ok(()) => Status::OK,
-        Err(why) => {
-            handle.logger.discarded(&format!("{name}: {why}"));
-            Status::DISCARD
-        }
-    }
-}
-
-/// Defines exports that read a number for each state.
-macro_rules! states {
-    ($($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
-        $(#[$doc])*
-        ///
-        /// # Safety
-        ///
-        /// See the module above.
-        #[unsafe(no_mangle)]
-        pub(super) unsafe extern "C" fn $name(instance: Instance, values: *mut f64, count: usize) -> Status {
-            let body = |handle: &mut Handle| {
-                // SAFETY: the caller's contract for arrays.
-                let values = unsafe { slice_mut("values", values, count) }?;
-                let read: fn(&mut Handle, &mut [f64]) -> Result<Result<(), Failure>, Failure> = $body;
-                let done = read(handle, values)?;
-                Ok(done_or_discarded(handle, stringify!($name), done))
-            };
-            // SAFETY: the caller's contract for instances.
-            unsafe { guarded(instance, stringify!($name), body) }
-        }
-    )*};
-}
-
-states! {
-    /// Reads the continuous states.
-    fmi3GetContinuousStates => |handle, values| handle.instance.continuous_states(values).map(Ok);
-    /// Reads the rates of the continuous states.
-    fmi3GetContinuousStateDerivatives => |handle, values| handle.instance.continuous_state_derivatives(values);
-    /// Reads the sizes that the continuous states are expected to have.
-    fmi3GetNominalsOfContinuousStates => |handle, values| handle.instance.nominals(values).map(Ok);
-    /// Reads the event indicators, of which there are none.
-    fmi3GetEventIndicators => |handle, values| handle.instance.event_indicators(values.len()).map(Ok);
 }
 
 /// Defines exports that read one number.
