@@ -4,7 +4,8 @@
 mod support;
 
 use punctual_modeldescription::fmi3::{
-    Alias, Dimension, Float, Located, ModelDescription, Plain, Unknown, Variable, VariableKind,
+    Alias, Clock, Dimension, Float, IntervalVariability, Located, ModelDescription, Plain, Unknown, Variable,
+    VariableKind,
 };
 use punctual_modeldescription::{Causality, Initial, NamingConvention, RULES, Severity, Variability};
 use roxmltree::Document;
@@ -43,6 +44,10 @@ const OF_THE_STANDARD: &[Row] = &[
             d.co_simulation.as_mut().unwrap().can_return_early_after_intermediate_update = true;
         },
     ),
+    ("co_simulation: hasEventMode is false, though \"rearm\" is a Clock; must be true", |d| {
+        let clock = Clock { interval_variability: Some(IntervalVariability::Triggered), ..Clock::default() };
+        d.variables[15].kind = VariableKind::Clock(clock);
+    }),
     ("co_simulation: fixedInternalStepSize is 0; must be finite and > 0", |d| {
         d.co_simulation.as_mut().unwrap().fixed_internal_step = Some(0.0);
     }),

@@ -126,6 +126,10 @@ OURS_ALONE = {
     # 2.4.7.5: one start value, or as many as elements.
     "variable.length": ('start="1 2 3"', 'start="1 2"'),
     "variable.range": ('start="-3" min="-9"', 'start="-3" min="-2"'),
+    "interface.event-mode": (
+        "</ModelVariables>",
+        '<Clock name="c" valueReference="50" causality="input" intervalVariability="triggered"/></ModelVariables>',
+    ),
     "variable.enumeration": (
         "</ModelVariables>",
         '<Enumeration name="e" valueReference="70" causality="parameter" declaredType="Mode" start="7"/></ModelVariables>',
@@ -149,6 +153,8 @@ OURS_ALONE = {
 THEIRS_ALONE = {
     # It does not know the element ClockType.
     "a declared type of a clock": (
+        "<CoSimulation ",
+        '<CoSimulation hasEventMode="true" ',
         "  </TypeDefinitions>",
         '  <ClockType name="Tick" intervalVariability="triggered"/></TypeDefinitions>',
         "</ModelVariables>",
@@ -170,6 +176,8 @@ SOUND = {
     "co-simulation alone": (re.compile("<ModelExchange.*/>"), ""),
     "scheduled execution too": ("  <UnitDefinitions>", '  <ScheduledExecution modelIdentifier="everything"/><UnitDefinitions>'),
     "a clock": (
+        "<CoSimulation ",
+        '<CoSimulation hasEventMode="true" ',
         "</ModelVariables>",
         '<Clock name="c" valueReference="50" causality="input" intervalVariability="fixed" intervalDecimal="0.1"/></ModelVariables>',
     ),

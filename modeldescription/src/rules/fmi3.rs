@@ -240,6 +240,15 @@ impl Check<'_> {
                 let message = format!("fixedInternalStepSize is {step}; must be finite and > 0");
                 self.add("experiment.times", Place::Interface(1), message);
             }
+            // FMI 3.0.2, section 4.4.
+            let clock = description.variables.iter().find(|v| v.kind.data_type() == DataType::Clock);
+            if let Some(clock) = clock.filter(|_| !of.has_event_mode) {
+                let message = format!(
+                    "hasEventMode is false, though {:?} is a Clock; must be true",
+                    brief(&clock.name)
+                );
+                self.add("interface.event-mode", Place::Interface(1), message);
+            }
         }
     }
 

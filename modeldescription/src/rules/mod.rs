@@ -48,6 +48,7 @@ pub const RULES: &[(&str, Severity, &str)] = &[
     ("interface.guid", Error, "guid is not empty"),
     ("interface.kind", Error, "FMI 3.0: the FMU offers an interface"),
     ("interface.token", Error, "FMI 3.0: instantiationToken is not empty"),
+    ("interface.event-mode", Error, "FMI 3.0: an FMU with clocks has event mode in co-simulation"),
     ("interface.flags", Warning, "the capability flags do not contradict each other"),
     ("experiment.times", Error, "stopTime lies after startTime; stepSize and tolerance are positive"),
     ("experiment.step", Warning, "stepSize is at most stopTime - startTime"),
