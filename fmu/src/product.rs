@@ -349,9 +349,9 @@ impl Table {
         let (name, own) = (&self.variables[state].name, self.variables[state].kind.unit().unwrap_or("1"));
         let (name, description, unit) =
             (format!("der({name})"), format!("rate of {name}"), over_seconds(own, 1));
-        let VariableKind::Real(of) = real(None, &unit) else { return };
         // The standard counts variables from 1.
-        let kind = VariableKind::Real(Real { derivative: Some(state as u32 + 1), ..of });
+        let derivative = Some(state as u32 + 1);
+        let kind = VariableKind::Real(Real { derivative, ..real_of(None, &unit) });
         self.add(name, &description, Causality::Local, kind).dependencies = Some(dependencies);
     }
 
@@ -375,12 +375,11 @@ impl Table {
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
-    VariableKind::Real(Real {
-        start,
-        quantity: quantity(unit),
-        unit: Some(unit.to_owned()),
-        ..Real::default()
-    })
+    VariableKind::Real(real_of(start, unit))
+}
+
+fn real_of(start: Option<f64>, unit: &str) -> Real {
+    Real { start, quantity: quantity(unit), unit: Some(unit.to_owned()), ..Real::default() }
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {

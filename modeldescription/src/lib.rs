@@ -1,5 +1,5 @@
-//! Model descriptions of FMI 2.0 co-simulation, with model exchange beside it or without, and of FMI 3.0 ([`fmi3`]) from typed variables, SSP system
-//! structures, and reproducible `.fmu` and `.ssp` archives.
+//! Model descriptions of FMI 2.0 co-simulation, with model exchange beside it or without, and of FMI 3.0 ([`fmi3`]) from
+//! typed variables, SSP system structures, and reproducible `.fmu` and `.ssp` archives.
 //!
 //! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
 //! of what the slave computes, reads no file and no environment variable and prints nothing.
