@@ -29,6 +29,7 @@ fn full() -> ModelDescription {
         interval_counter: Some(500),
         shift_counter: 250,
     };
+    description.co_simulation.as_mut().expect("offered").has_event_mode = true;
     let kind = VariableKind::Clock(clock);
     description.variables.push(Variable::new("tick", 30, Causality::Input, Variability::Discrete, kind));
     let rearm = &mut description.variables[15];
