@@ -524,3 +524,73 @@ fn a_step_taken_again_gives_the_same_input() {
     println!("{samples} samples: {} give another input when taken again", others.len());
     assert!(others.is_empty(), "{} of {samples}, such as {:?}", others.len(), others[0]);
 }
+
+/// The bend of a row that the sample before has learned shortens the search and changes no answer beyond its tolerance. A
+/// sample taken again begins from the same bend, so it has the same bits.
+#[test]
+fn a_kept_bend_only_shortens_the_search() {
+    /// Both searches end within 1e-9 of the nearest input; two roundings of that size, with room.
+    const SAME: f64 = 1e-8;
+    fn run<P>(plant: P, seed: u64) -> [usize; 3]
+    where
+        P: ControlAffine<4, 2> + Copy + Send + 'static,
+    {
+        let (mut samples, mut kept, mut repeated) = (0, 0, 0);
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let period = PERIODS[random.below(PERIODS.len())];
+        let sets = sets(random, seed % 2 == 0, None);
+        let mut filters = [(); 2].map(|()| build(plant, &sets, None, period).0);
+        let [filter, without] = &mut filters;
+        let mut x = SVector::from([0.0, 0.0, random.between(-0.5, 0.5), random.between(1.0, 6.0)]);
+        let (kind, mut wanted) = (random.below(3), [0.0; 2]);
+        for k in 0..(4.0 / period).min(1000.0) as usize {
+            // Zero, damping, and now and then another one.
+            if random.below(50) == 0 {
+                wanted = [random.between(-5.0, 5.0), random.between(-2.0, 2.0)];
+            }
+            let u_ref = [[0.0; 2], [-0.5 * x[3], 0.0], wanted][kind];
+            let (t, x_now) = (k as f64 * period, x);
+            let mut state = filter.state().clone();
+            let begins = state.bends[1].is_some();
+            state.bends = [None; 2];
+            without.restore(&state).expect("as many barriers");
+            let step = |filter: &mut SafetyFilter| {
+                let mut u = [0.0; 2];
+                let report = filter.step(t, x_now.as_slice(), &u_ref, &mut u).expect("right dimensions");
+                (report.status, u)
+            };
+            let (status, u) = step(filter);
+            let (other_status, other) = step(without);
+            samples += 1;
+            if begins {
+                kept += 1;
+                let distance = |u: [f64; 2]| (u[0] - u_ref[0]).hypot(u[1] - u_ref[1]);
+                let size = u[0].hypot(u[1]).max(1.0);
+                assert_eq!(status, other_status, "{seed} at {t}");
+                let further = distance(u) - distance(other);
+                assert!(further <= SAME * size, "{seed} at {t}: {u:?}, without {other:?}");
+            }
+            // A promise may move on when asked twice, as into its next phase: then it asks for something else.
+            let after = filter.state().clone();
+            let again = step(filter).1;
+            if after.bends[1].is_some() && after.barriers == filter.state().barriers {
+                assert_eq!(again.map(f64::to_bits), u.map(f64::to_bits), "{seed} at {t}, taken again");
+                repeated += 1;
+            }
+            filter.restore(&after).expect("its own state");
+            x = rk4_step(&plant, &x, &SVector::from(u), period);
+        }
+        [samples, kept, repeated]
+    }
+    let (mut samples, mut kept, mut repeated) = (0, 0, 0);
+    for seed in 1..=if std::env::var_os("PUNCTUAL_TABLES").is_some() { 3000 } else { 60 } {
+        let [a, b, c] = match seed % 3 {
+            0 => run(PointMass, seed),
+            1 => run(Unicycle, seed),
+            _ => run(Bicycle::new(10.0).expect("valid bicycle"), seed),
+        };
+        (samples, kept, repeated) = (samples + a, kept + b, repeated + c);
+    }
+    println!("{samples} samples, {kept} from a kept bend, {repeated} taken again");
+    assert!(kept > samples / 2 && repeated > samples / 2, "{kept} and {repeated} of {samples}");
+}

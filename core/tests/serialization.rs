@@ -8,7 +8,7 @@ use punctual_core::convergence::operator::Operator;
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{
-    BarrierSettings, Begin, End, FilterBuilder, FilterState, Integration, Method, Report, SafetyFilter,
+    BarrierSettings, Begin, Bend, End, FilterBuilder, FilterState, Integration, Method, Report, SafetyFilter,
     SampleDerivative, Sampling, Strictness,
 };
 use punctual_core::lie::Direction;
@@ -166,6 +166,17 @@ prop_compose! {
     }
 }
 
+prop_compose! {
+    fn bend()(
+        barrier in 0_u32..3,
+        hessian in prop::array::uniform6(number()),
+        looked in any::<u32>(),
+        aside in prop::option::of(any::<u32>()),
+    ) -> Bend {
+        Bend { barrier, hessian, looked, aside }
+    }
+}
+
 proptest! {
     /// What stands in a file cannot lead the input out of its bounds.
     #[test]
@@ -174,8 +185,9 @@ proptest! {
         (time, period) in (prop::option::of(number()), prop::option::of(number())),
         start in prop::option::of(number()),
         input in prop::array::uniform12(number()),
+        bends in prop::array::uniform2(prop::option::of(bend())),
     ) {
-        let state = FilterState { barriers, time, period, input, start };
+        let state = FilterState { barriers, time, period, input, start, bends };
         let text = json(&state);
         prop_assert_eq!(json(&back::<FilterState>(&text)), text);
         let mut filter = filter();

@@ -14,7 +14,7 @@
 //! keep theirs. Only a plan has no fixed length, and it comes last. Damaged bytes, and those of another FMU, are refused by the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
-use punctual_core::filter::{Commitment, FilterState};
+use punctual_core::filter::{Bend, Commitment, FilterState};
 use punctual_modeldescription::BaseType;
 
 use crate::LoopState;
@@ -27,7 +27,7 @@ const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// Version of the layout, to be raised with every change of it. (The GUID changes with the version of the
 /// library.)
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
@@ -77,6 +77,7 @@ fn fixed_size(product: &Product) -> usize {
                 + c.barrier.len() * FixedTimeState::SIZE
                 + 3 * <Option<f64>>::SIZE
                 + Inputs::SIZE
+                + Bends::SIZE
                 + f64::SIZE
         }
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
@@ -127,13 +128,14 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     match block {
         BlockState::Filter { rearm_seen, memory } => {
             let LoopState { filter, integrated, commitment: _ } = &**memory;
-            let FilterState { barriers, time, period, input, start } = filter;
+            let FilterState { barriers, time, period, input, start, bends } = filter;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
             period.write(&mut out);
             input.write(&mut out);
             start.write(&mut out);
+            bends.write(&mut out);
             integrated.write(&mut out);
             if let Some(plan) = plan {
                 (plan.len() as u64).write(&mut out);
@@ -225,6 +227,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 period: input.field("period")?,
                 input: input.field("input")?,
                 start: input.field("start")?,
+                bends: input.field("bends")?,
             };
             let integrated = input.finite("integrated")?;
             let commitment = has_plan.then(|| read_commitment(&mut input)).transpose()?;
@@ -427,6 +430,9 @@ impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
 /// The type of `FilterState::input`.
 type Inputs = [f64; punctual_core::MAX_INPUTS];
 
+/// The type of `FilterState::bends`.
+type Bends = [Option<Bend>; 2];
+
 /// Writes and reads structures field by field: one that is missing here, or of another type, does not compile.
 macro_rules! structure {
     ($kind:ident { $($field:ident: $type:ty),* $(,)? }) => {
@@ -444,6 +450,8 @@ macro_rules! structure {
         }
     };
 }
+
+structure!(Bend { barrier: u32, hessian: [f64; 6], looked: u32, aside: Option<u32> });
 
 structure!(Unmet { steps: u32, since: f64, h: f64 });
 

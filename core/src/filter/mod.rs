@@ -28,6 +28,7 @@ pub use builder::FilterBuilder;
 pub use integrator::{IntegratedFilter, Integration};
 pub use report::{BarrierReport, Report, Status};
 pub use sampling::Sampling;
+pub use search::Bend;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
 pub use slot::{Begin, End, Strictness};
 
@@ -64,6 +65,10 @@ pub struct FilterState {
     /// Time of the first sample in s, valid or not, where the filter is [armed later](FilterBuilder::arm_after) than that.
     #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
     pub start: Option<f64>,
+    /// How the active row bent at the sample before [`Self::time`] and at that, where one alone was active: the search over the
+    /// period begins from the former if that sample is taken again, else from the latter. Promises do not depend on it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub bends: [Option<Bend>; 2],
 }
 
 impl Clone for FilterState {
@@ -73,9 +78,10 @@ impl Clone for FilterState {
 
     /// Reuses the memory, which a derived `Clone` would not: a step must not allocate.
     fn clone_from(&mut self, source: &Self) {
-        let Self { barriers, time, period, input, start } = source;
+        let Self { barriers, time, period, input, start, bends } = source;
         self.barriers.clone_from(barriers);
         (self.time, self.period, self.input, self.start) = (*time, *period, *input, *start);
+        self.bends = *bends;
     }
 }
 
@@ -87,11 +93,19 @@ impl FilterState {
         after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
     }
 
+    /// The bend of the active row from which the search at `t` begins.
+    #[inline]
+    fn bend_before(&self, t: f64) -> &Option<Bend> {
+        let [before, last] = &self.bends;
+        if self.time.is_some_and(|time| t > time) { last } else { before }
+    }
+
     /// Becomes `next`, which keeps memory alone.
     #[inline(always)]
     fn take(&mut self, next: &mut Self) {
         core::mem::swap(&mut self.barriers, &mut next.barriers);
         (self.time, self.period, self.input, self.start) = (next.time, next.period, next.input, next.start);
+        self.bends = next.bends;
     }
 }
 
@@ -206,7 +220,7 @@ impl SafetyFilter {
     /// [armed](FilterBuilder::arm_after) counts from its first sample all the same.
     pub fn rearm(&mut self) {
         self.state.barriers.fill(FixedTimeState::default());
-        (self.state.time, self.state.period) = (None, None);
+        (self.state.time, self.state.period, self.state.bends) = (None, None, [None; 2]);
         self.state.input.fill(0.0);
     }
 
@@ -300,6 +314,7 @@ impl SafetyFilter {
         }
         slot.source = source;
         self.state.barriers[index] = FixedTimeState::default();
+        self.state.bends = [None; 2];
         Ok(())
     }
 

@@ -32,6 +32,8 @@ mod bent_row;
 mod correction;
 mod wide;
 
+pub use bent_row::Bend;
+
 use super::errors::{MeasurementErrors, Uncertainty};
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::{PeriodBound, Weighted};
@@ -104,17 +106,21 @@ pub(super) struct PeriodProblem<'a> {
     pub(super) widens: bool,
     /// Whether a plan stands behind the step, so that rows need not be met.
     pub(super) is_backed: bool,
+    /// How the only active row of the sample before bent.
+    pub(super) bend: Option<&'a Bend>,
 }
 
 /// Scratch memory of the search; its contents change no bit of the next one.
 pub(super) struct Scratch {
     violations: [f64; MAX_ROWS],
     ahead: Ahead,
+    /// How the only active row of the last answer bends, where the search knows it.
+    pub(super) bend: Option<Bend>,
 }
 
 impl Scratch {
     pub(super) const fn new() -> Self {
-        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO }
+        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO, bend: None }
     }
 }
 
@@ -124,6 +130,7 @@ struct Linearised<'a> {
     violations: &'a mut [f64; MAX_ROWS],
     /// Room for one prediction.
     ahead: &'a mut Ahead,
+    bend: &'a mut Option<Bend>,
 }
 
 impl Linearised<'_> {
@@ -213,8 +220,8 @@ impl PeriodProblem<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
-        let Scratch { violations, ahead } = scratch;
-        let mut at = Linearised { rows, violations, ahead };
+        let Scratch { violations, ahead, bend } = scratch;
+        let mut at = Linearised { rows, violations, ahead, bend };
         if let Some(solution) = self.bent_row(u, last, &mut at, qp) {
             return Some(solution);
         }
@@ -364,7 +371,7 @@ impl PeriodProblem<'_> {
 
     #[inline(always)]
     fn linearise_for(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
-        let Linearised { rows, violations, ahead } = at;
+        let Linearised { rows, violations, ahead, .. } = at;
         let rows = rows.iter_mut().zip(violations.iter_mut());
         for (i, (requirement, (row, violation))) in self.requirements.iter().zip(rows).enumerate() {
             *violation = 0.0;
@@ -491,6 +498,19 @@ impl PeriodProblem<'_> {
     /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.
     #[inline(always)]
     fn is_nearer_aside(&self, u: &[f64], i: usize, at: &mut Linearised) -> bool {
+        self.look_aside(u, i, at, |_, _| {})
+    }
+
+    /// [`Self::is_nearer_aside`]. Tells `seen` of each way aside, as far as it went without a nearer answer, and the sum of
+    /// the row's slacks there and on the opposite side.
+    #[inline(always)]
+    fn look_aside(
+        &self,
+        u: &[f64],
+        i: usize,
+        at: &mut Linearised,
+        mut seen: impl FnMut(&[f64], f64),
+    ) -> bool {
         let (m, far, u_ref) = (u.len(), self.distance(u), &self.u_ref[..u.len()]);
         let normal = norm(at.rows[i].normal[..m].iter().copied());
         // The axis that is most along u − u_ref adds no direction aside to those of the others.
@@ -506,16 +526,25 @@ impl PeriodProblem<'_> {
             }
             direction[axis] += 1.0;
             let length = ASIDE * far / norm(direction[..m].iter().copied());
+            let mut slacks = 0.0;
             for way in [length, -length] {
                 for j in 0..m {
                     aside[j] = self.bounds.clamp(j, u[j] + way * direction[j]);
                 }
                 let aside = &aside[..m];
                 let nearer = (self.distance(aside) - far) * normal;
-                if self.slack(&self.requirements[i], aside, at.ahead).is_some_and(|s| s > nearer) {
+                // Not-a-number where it is not known, as on a way that a bound cuts short.
+                let slack = self.slack(&self.requirements[i], aside, at.ahead);
+                if slack.is_some_and(|s| s > nearer) {
                     return true;
                 }
+                let is_cut = (0..m).any(|j| aside[j] != u[j] + way * direction[j]);
+                slacks += slack.filter(|_| !is_cut).unwrap_or(f64::NAN);
             }
+            for d in &mut direction[..m] {
+                *d *= length;
+            }
+            seen(&direction[..m], slacks);
         }
         false
     }

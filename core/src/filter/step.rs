@@ -197,6 +197,7 @@ impl SafetyFilter {
     /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
         let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
+        search.bend = None;
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
         // Over the period.
         if !requirements.is_empty() {
@@ -218,6 +219,7 @@ impl SafetyFilter {
                 errors: &self.errors,
                 widens: self.state.barriers.iter().all(widens),
                 is_backed: self.is_backed,
+                bend: self.state.bend_before(moment.t).as_ref(),
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, search, qp, u) {
@@ -267,11 +269,12 @@ impl SafetyFilter {
     /// Reports the step, and notes for each promise whether it was met and is still guaranteed
     /// (docs/theory.md, section 7).
     fn report_on(&mut self, moment: &Moment, solution: Solution, u: &[f64]) {
-        let Workspace { next, report, rows, requirements, qp, .. } = &mut self.workspace;
+        let Workspace { next, report, rows, requirements, search, qp, .. } = &mut self.workspace;
         if moment.measures && self.state.time.is_some_and(|last| moment.t > last) {
             next.period = moment.period;
         }
         next.time = Some(moment.t);
+        next.bends = [*self.state.bend_before(moment.t), search.bend];
         next.input[..u.len()].copy_from_slice(u);
         report.solver = solution.solver;
         report.iterations = solution.iterations;

@@ -12,9 +12,14 @@
 //! symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps shorten faster
 //! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
 //!
-//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. It stands under the
-//! terms of [`correction`](super::correction): the rows are all but affine from u_ref to there, every other row holds, and no other answer is in sight. λH, without a unit, is how far
-//! the normal turns on the way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too.
+//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. Where the sample before
+//! has left its H ([`Bend`]), it begins at u_ref with that, and is there in a step or two: what H s misses the change of ∇r by
+//! tells how far it has gone stale. An old H never makes an answer, it only shortens the way to it.
+//!
+//! The answer stands under the terms of [`correction`](super::correction): the rows are all but affine from u_ref to there, every other row
+//! holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the way from u_ref. What r and
+//! ∇r at u_ref miss those at the answer by tells it too. Where the answer goes on from that of the sample before, it is
+//! looked around for others every [`GOES_ON`]th time only.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, norm};
@@ -33,7 +38,47 @@ const ROOT: f64 = 1e-6;
 /// Steps of Newton's method for λ.
 const MULTIPLIER_STEPS: usize = 6;
 
+/// Samples in a row whose answers go on from the one before without a look around for others.
+const GOES_ON: u32 = 8;
+/// The most inputs with which a row is searched to its bend.
+const INPUTS: usize = 3;
+
 type Matrix<const M: usize> = [[f64; M]; M];
+
+/// How the only active row of a sample bends: the memory from which the search of the next sample begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Bend {
+    /// The number of the barrier that the row belongs to.
+    pub barrier: u32,
+    /// Second derivatives of the row by the inputs, for each second of the period, in `[h]`/(sⁿ⁺¹ · unit of u²): of
+    /// inputs 1 and 1, 2 and 1, 2 and 2, 3 and 1, …; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub hessian: [f64; INPUTS * (INPUTS + 1) / 2],
+    /// Samples since other answers were looked for.
+    pub looked: u32,
+    /// Samples since a step aside of the way from u_ref has shown how the row bends there; `None` where none ever has.
+    pub aside: Option<u32>,
+}
+
+impl Bend {
+    /// The second derivatives over a period of so many `seconds`.
+    #[inline(always)]
+    fn over<const M: usize>(&self, seconds: f64) -> Matrix<M> {
+        let at = |i: usize, j: usize| self.hessian[i * (i + 1) / 2 + j];
+        core::array::from_fn(|i| core::array::from_fn(|j| seconds * at(i.max(j), i.min(j))))
+    }
+
+    /// As if `hessian` had been `seconds` times as large.
+    #[inline(always)]
+    fn write<const M: usize>(&mut self, hessian: &Matrix<M>, seconds: f64) {
+        for i in 0..M {
+            for j in 0..=i {
+                self.hessian[i * (i + 1) / 2 + j] = hessian[i][j] / seconds;
+            }
+        }
+    }
+}
 
 /// Σ a_i b_i, unrolled.
 #[inline(always)]
@@ -79,6 +124,22 @@ impl<const M: usize> Bent<M> {
         for i in 0..M {
             for j in 0..M {
                 self.hessian[i][j] += (rest[i] * s[j] + s[i] * rest[j] - along * s[i] * s[j]) * per_square;
+            }
+        }
+    }
+
+    /// Changes the Hessian along a way aside of an answer by what makes the value there and on the opposite side sum up to
+    /// `values`, where that is a number.
+    #[inline(always)]
+    fn learn_aside(&mut self, way: &[f64], values: f64) {
+        let Some(s) = way.first_chunk::<M>() else { return };
+        let rest = values - product(s, &self.turn(s));
+        if rest.is_finite() {
+            let square = product(s, s);
+            for i in 0..M {
+                for j in 0..M {
+                    self.hessian[i][j] += rest * s[i] * s[j] / (square * square);
+                }
             }
         }
     }
@@ -201,10 +262,23 @@ impl PeriodProblem<'_> {
         if at_reference.value >= -MET * (at_reference.terms + moved) {
             return None;
         }
-        // From the answer of the pointwise row to that of the row itself.
+        // From the answer of the pointwise row, or of the row with the bend that it had, to that of the row itself.
         let mut row = Bent { value: at_reference.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
+        let kept = self.bend.filter(|bend| bend.barrier as usize == requirement.barrier).filter(|bend| {
+            row.hessian = bend.over(requirement.ahead);
+            let Some((way, lambda)) = row.nearest(&[0.0; M]) else { return false };
+            let target: [f64; M] = core::array::from_fn(|i| u_ref[i] + way[i]);
+            let leads = lambda > 0.0 && self.bounds.contain_all(&target);
+            if leads {
+                (u, step, length) = (target, way, largest(&way));
+            }
+            leads
+        });
+        if kept.is_none() {
+            row.hessian = [[0.0; M]; M];
+        }
         let (mut way, mut turned) = ([0.0; M], [0.0; M]);
         let (mut bends_aside, mut rounds) = (false, 0);
         let (lambda, turn) = loop {
@@ -225,6 +299,9 @@ impl PeriodProblem<'_> {
                     bends_aside = true;
                 }
             }
+            let known = row.turn(&step);
+            let off: [f64; M] = core::array::from_fn(|i| change[i] - known[i]);
+            let off = elementary::sqrt(product(&off, &off) / product(&step, &step));
             row.learn(&step, &change);
             let lambda;
             (step, lambda) = row.nearest(&back)?;
@@ -237,13 +314,26 @@ impl PeriodProblem<'_> {
             let before_length = length;
             let from = core::mem::replace(&mut u, target);
             length = largest(&step);
-            // Methods of secants: a step is as the product of the two before it, where they have shown how the row bends.
             let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
-            let next = match bends_aside {
-                true => SECANT * turn * length * before_length / elementary::sqrt(product(&back, &back)),
-                false => shortened.max(turn) * length / SKIPPED,
+            let next = match kept {
+                // A step shows by how much the bend along it is off. Aside, where none has shown it, the bend is off by that for
+                // each sample that has passed.
+                Some(bend) => {
+                    let off = lambda * off;
+                    let aside = match bend.aside {
+                        _ if bends_aside => off,
+                        Some(samples) => turn.min(off * f64::from(samples)),
+                        None => turn,
+                    };
+                    SECANT * (off + aside) * length
+                }
+                // Methods of secants: a step is as the product of the two before it, where they have shown how the row bends.
+                None if bends_aside => {
+                    SECANT * turn * length * before_length / elementary::sqrt(product(&back, &back))
+                }
+                None => shortened.max(turn) * length / SKIPPED,
             };
-            if length == 0.0 || rounds > 0 && next <= MET * size {
+            if length == 0.0 || (kept.is_some() || rounds > 0) && next <= MET * size {
                 at.rows[chosen] = Row::linear(&row.normal, row.value, &from);
                 break (lambda, turn);
             }
@@ -251,8 +341,8 @@ impl PeriodProblem<'_> {
             if shortened > CONVERGING || rounds == CORRECTIONS {
                 return None;
             }
-            // The first two steps tell by how much the normal turns.
-            ratio = if rounds == 2 { shortened } else { ratio };
+            // The first two steps tell by how much the normal turns, where its turn was not known.
+            ratio = if rounds == 2 && kept.is_none() { shortened } else { ratio };
         };
         // How far the row bends between u_ref and the answer, and how far its normal turns there, as parts of themselves.
         let square = product(&row.normal, &row.normal);
@@ -278,18 +368,30 @@ impl PeriodProblem<'_> {
                 return None;
             }
         }
-        let is_sole = match last {
-            Some(last) => {
-                self.is_near(last, &u, distance, ratio) || self.leads_to(last.first_chunk()?, &u, chosen, at)
+        let young = kept.filter(|bend| bend.looked < GOES_ON);
+        let goes_on = young.filter(|_| last.is_some_and(|last| self.is_close(last, &u, distance, ratio)));
+        if goes_on.is_none() {
+            let is_sole = match last {
+                Some(last) => {
+                    self.is_near(last, &u, distance, ratio)
+                        || self.leads_to(last.first_chunk()?, &u, chosen, at)
+                }
+                None => ratio <= CONTRACTION,
+            };
+            let seen_aside = ratio <= CONTRACTION && bends_aside;
+            let learn = |way: &[f64], slacks: f64| row.learn_aside(way, slacks);
+            if !is_sole || !seen_aside && self.look_aside(&u, chosen, at, learn) {
+                return None;
             }
-            None => ratio <= CONTRACTION,
-        };
-        let seen_aside = ratio <= CONTRACTION && bends_aside;
-        if !is_sole || !seen_aside && self.is_nearer_aside(&u, chosen, at) {
-            return None;
         }
         *out = u;
         qp.note_active(chosen, lambda);
+        let looked = goes_on.map_or(0, |bend| bend.looked + 1);
+        let passed = || kept.and_then(|bend| bend.aside).map(|samples| samples.saturating_add(1));
+        let aside = if bends_aside { Some(1) } else { passed() };
+        let mut bend = Bend { barrier: requirement.barrier as u32, hessian: [0.0; _], looked, aside };
+        bend.write(&row.hessian, requirement.ahead);
+        *at.bend = Some(bend);
         Some(Solution { outcome: Outcome::Optimal, solver: Solver::ClosedForm, iterations: 0 })
     }
 
@@ -331,7 +433,7 @@ impl PeriodProblem<'_> {
     }
 }
 
-const _: () = assert!(MAX_INPUTS >= 3, "a gradient has room for so many inputs");
+const _: () = assert!(MAX_INPUTS >= INPUTS, "a gradient has room for so many inputs");
 
 #[cfg(test)]
 mod tests {

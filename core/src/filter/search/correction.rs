@@ -132,9 +132,15 @@ impl PeriodProblem<'_> {
     /// affine there and on the way to `last`, or `last` is no nearer to u_ref.
     #[inline(always)]
     pub(super) fn is_near(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
-        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
         let near = || distance <= (1.0 + MET) * self.distance(last);
-        ratio <= CONTRACTION && (ratio * away <= CONTRACTION * distance || near())
+        ratio <= CONTRACTION && (self.is_close(last, u, distance, ratio) || near())
+    }
+
+    /// Whether the rows are all but affine on the way from `last` to `u`, as for [`Self::is_near`].
+    #[inline(always)]
+    pub(super) fn is_close(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
+        let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
+        ratio * away <= CONTRACTION * distance
     }
 
     /// Whether there is no other answer near `u`, which corrections approached in `ratio`, or nearer to u_ref towards `last`.
