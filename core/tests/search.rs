@@ -538,7 +538,7 @@ fn a_kept_bend_only_shortens_the_search() {
         let (mut samples, mut kept, mut repeated) = (0, 0, 0);
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let period = PERIODS[random.below(PERIODS.len())];
-        let sets = sets(random, seed % 2 == 0, None);
+        let sets = sets(random, seed.is_multiple_of(2), None);
         let mut filters = [(); 2].map(|()| build(plant, &sets, None, period).0);
         let [filter, without] = &mut filters;
         let mut x = SVector::from([0.0, 0.0, random.between(-0.5, 0.5), random.between(1.0, 6.0)]);
