@@ -539,7 +539,9 @@ fn a_kept_bend_only_shortens_the_search() {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let period = PERIODS[random.below(PERIODS.len())];
         let sets = sets(random, seed.is_multiple_of(2), None);
-        let mut filters = [(); 2].map(|()| build(plant, &sets, None, period).0);
+        // Tight ones cut the look aside short.
+        let bound = seed.is_multiple_of(4).then(|| [random.between(5.0, 40.0), random.between(0.5, 10.0)]);
+        let mut filters = [(); 2].map(|()| build(plant, &sets, bound, period).0);
         let [filter, without] = &mut filters;
         let mut x = SVector::from([0.0, 0.0, random.between(-0.5, 0.5), random.between(1.0, 6.0)]);
         let (kind, mut wanted) = (random.below(3), [0.0; 2]);

@@ -44,7 +44,8 @@ use errors::MeasurementErrors;
 use search::Requirement;
 use slot::BarrierSlot;
 
-/// The memory of a filter between samples: one promise per barrier, and the times that [`Sampling`] needs.
+/// The memory of a filter between samples: one promise per barrier, the times that [`Sampling`] needs, and where the search
+/// for the next input begins.
 ///
 /// With the feature `serde` it can be written to a file, bit for bit (serde_json needs its feature `float_roundtrip` for
 /// that). Infinities are words in formats for people, as JSON has none. [`SafetyFilter::restore`] checks what is read.

@@ -29,7 +29,7 @@ use crate::{MAX_INPUTS, elementary};
 /// The least square of the part of a step aside, as a part of the step's, for it to show how the row bends aside.
 const ASIDE_OF_STEP: f64 = 0.05;
 /// A step over the product of the two before it with the turn of the normal per distance, at most: three to four times what
-/// vehicles show, over a third of what counts as met.
+/// vehicles show, over a third of what counts as met. Over what a kept bend is seen to be off by, as much.
 const SECANT: f64 = 30.0;
 /// The shortest step, as a part of the input, that shows a bend beyond round-off.
 const TELLING: f64 = 1e-7;
@@ -55,7 +55,7 @@ pub struct Bend {
     /// inputs 1 and 1, 2 and 1, 2 and 2, 3 and 1, …; zeros above the number of inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub hessian: [f64; INPUTS * (INPUTS + 1) / 2],
-    /// Samples since other answers were looked for.
+    /// Samples since other answers were looked for, from 8 on: the next one looks.
     pub looked: u32,
     /// Samples since a step aside of the way from u_ref has shown how the row bends there; `None` where none ever has.
     pub aside: Option<u32>,
@@ -129,19 +129,21 @@ impl<const M: usize> Bent<M> {
     }
 
     /// Changes the Hessian along a way aside of an answer by what makes the value there and on the opposite side sum up to
-    /// `values`, where that is a number.
+    /// `values`. Returns whether that is a number: where not, nothing has been learned.
     #[inline(always)]
-    fn learn_aside(&mut self, way: &[f64], values: f64) {
-        let Some(s) = way.first_chunk::<M>() else { return };
+    fn learn_aside(&mut self, way: &[f64], values: f64) -> bool {
+        let Some(s) = way.first_chunk::<M>() else { return false };
         let rest = values - product(s, &self.turn(s));
-        if rest.is_finite() {
-            let square = product(s, s);
-            for i in 0..M {
-                for j in 0..M {
-                    self.hessian[i][j] += rest * s[i] * s[j] / (square * square);
-                }
+        if !rest.is_finite() {
+            return false;
+        }
+        let square = product(s, s);
+        for i in 0..M {
+            for j in 0..M {
+                self.hessian[i][j] += rest * s[i] * s[j] / (square * square);
             }
         }
+        true
     }
 
     /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where λH is not small.
@@ -370,6 +372,7 @@ impl PeriodProblem<'_> {
         }
         let young = kept.filter(|bend| bend.looked < GOES_ON);
         let goes_on = young.filter(|_| last.is_some_and(|last| self.is_close(last, &u, distance, ratio)));
+        let mut sees_aside = true;
         if goes_on.is_none() {
             let is_sole = match last {
                 Some(last) => {
@@ -379,14 +382,15 @@ impl PeriodProblem<'_> {
                 None => ratio <= CONTRACTION,
             };
             let seen_aside = ratio <= CONTRACTION && bends_aside;
-            let learn = |way: &[f64], slacks: f64| row.learn_aside(way, slacks);
+            let learn = |way: &[f64], slacks: f64| sees_aside &= row.learn_aside(way, slacks);
             if !is_sole || !seen_aside && self.look_aside(&u, chosen, at, learn) {
                 return None;
             }
         }
         *out = u;
         qp.note_active(chosen, lambda);
-        let looked = goes_on.map_or(0, |bend| bend.looked + 1);
+        // Where the look aside told nothing, as where a bound cut it short, the next sample looks again.
+        let looked = goes_on.map_or(if sees_aside { 0 } else { GOES_ON }, |bend| bend.looked + 1);
         let passed = || kept.and_then(|bend| bend.aside).map(|samples| samples.saturating_add(1));
         let aside = if bends_aside { Some(1) } else { passed() };
         let mut bend = Bend { barrier: requirement.barrier as u32, hessian: [0.0; _], looked, aside };
