@@ -484,4 +484,17 @@ mod tests {
             assert!((found - wanted).abs() < 1e-14, "{:?}", row.hessian);
         }
     }
+
+    /// The values on both sides of an answer show the bend on the way between them; what is not known shows nothing.
+    #[test]
+    fn a_look_aside_shows_the_bend_on_its_way() {
+        let mut row = Bent { hessian: [[0.5, 0.2], [0.2, -0.1]], ..inside([0.0; 2]) };
+        let before = row.hessian;
+        assert!(!row.learn_aside(&[0.3, -0.1], f64::NAN) && row.hessian == before);
+        for way in [[0.3, -0.1], [-0.2, 0.7]] {
+            let values = product(&way, &inside([0.0; 2]).turn(&way));
+            assert!(row.learn_aside(&way, values));
+            assert!((product(&way, &row.turn(&way)) - values).abs() < 1e-14, "{:?}", row.hessian);
+        }
+    }
 }
