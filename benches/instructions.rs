@@ -19,7 +19,7 @@ mod support;
 /// A name and the work, to be done a number of times.
 type Case = (&'static str, fn(u32));
 
-const CASES: [Case; 33] = [
+const CASES: [Case; 34] = [
     ("by-hand", by_hand),
     ("step-point-mass", |times| step(goal(PointMass), [0.0; 2], times)),
     ("step-unicycle", |times| step(goal(Unicycle), [0.0; 2], times)),
@@ -54,7 +54,9 @@ const CASES: [Case; 33] = [
     ("held-bicycle-10ms-10", |times| held(bicycle(), 10, 10.0e-3, times)),
     ("held-bicycle-50ms-10", |times| held(bicycle(), 10, 50.0e-3, times)),
     ("batch-row", batch_row),
-    ("campaign-step", campaign_step),
+    // On the way to the set, and inside.
+    ("campaign-step", |times| campaign_step([45.0; 2], times)),
+    ("campaign-step-inside", |times| campaign_step([0.0; 2], times)),
 ];
 
 fn by_hand(times: u32) {
@@ -85,12 +87,12 @@ fn held<P: ControlAffine<4, 2> + Copy + Send + 'static>(plant: P, obstacles: usi
     }
 }
 
-/// The filter of a unicycle with one goal, as a file describes it.
-fn described(stop_time: f64) -> FilterConfiguration {
+/// The filter of a unicycle, which starts at the origin, with one goal, as a file describes it.
+fn described(centre: [f64; 2], stop_time: f64) -> FilterConfiguration {
     let text = format!(
         "kind = \"filter\"\nplant = {{ model = \"unicycle\" }}\n\
          experiment = {{ step_size = 0.001, stop_time = {stop_time:?} }}\n\
-         [[barrier]]\nname = \"goal\"\ncentre = [45.0, 45.0]\nradius = 2.0\ndeadline = 10.0\nmargin = 0.02\n"
+         [[barrier]]\nname = \"goal\"\ncentre = {centre:?}\nradius = 2.0\ndeadline = 10.0\nmargin = 0.02\n"
     );
     let configuration = Configuration::parse(&text);
     match configuration.expect("a valid configuration") {
@@ -102,7 +104,7 @@ fn described(stop_time: f64) -> FilterConfiguration {
 /// What a row of `punctual.FilterBatch` costs without Python: its memory goes into a loop and back.
 fn batch_row(times: u32) {
     const ROWS: usize = 10;
-    let mut own = described(1.0).build_loop().expect("a filter");
+    let mut own = described([45.0; 2], 1.0).build_loop().expect("a filter");
     let mut memories = vec![own.state(); ROWS];
     let mut u = [0.0; 2];
     for i in 0..times as usize {
@@ -115,11 +117,12 @@ fn batch_row(times: u32) {
     }
 }
 
-/// So many steps of a filter and its plant in process.
-fn campaign_step(times: u32) {
-    let (text, configurations) =
-        alone(Configuration::Filter(described(0.001 * f64::from(times)))).expect("a filter that runs alone");
-    let system = System::parse(&text).expect("a valid system");
+/// So many steps of a filter and its plant in process, recorded as campaigns do.
+fn campaign_step(centre: [f64; 2], times: u32) {
+    let filter = Configuration::Filter(described(centre, 0.001 * f64::from(times)));
+    let (text, configurations) = alone(filter).expect("a filter that runs alone");
+    let signals = ["status", "u.a", "u.omega"].map(|name| format!("filter.{name}"));
+    let system = System::parse(&text).expect("a valid system").recording(signals.to_vec());
     let models: Vec<_> = configurations.into_iter().map(|c| Own::new(c).expect("a product")).collect();
     let descriptions: Vec<_> = models.iter().map(|model| &model.description).collect();
     let instance = |c: usize| models[c].instance("it");

@@ -165,6 +165,7 @@ pub const LEGAL: [(Call, Mode, Mode); 14] = {
 
 impl Call {
     /// The modes in which it is legal in a version of FMI, by [`LEGAL`].
+    #[inline]
     pub fn modes(self, fmi: FmiVersion) -> Mode {
         let (_, two, three) = LEGAL[self as usize];
         match fmi {
@@ -234,6 +235,7 @@ pub struct State {
 /// One instance of an FMU, of either version of FMI.
 pub struct Instance {
     product: Product,
+    fmi: FmiVersion,
     /// Type and causality by value reference: checked at every read and write, in few bytes.
     kinds: Vec<(BaseType, Causality, Variability)>,
     /// The same for FMI 3.0, with the lengths of arrays; empty for FMI 2.0.
@@ -289,6 +291,7 @@ impl Instance {
             product.variables.iter().map(|v| (v.kind.base_type(), v.causality, v.variability)).collect();
         let (accesses, rates) = (product.accesses(), product.layout.rates);
         let mut instance = Self {
+            fmi: product.configuration.experiment().fmi,
             product,
             kinds,
             accesses,
@@ -353,7 +356,7 @@ impl Instance {
 
     /// The version of FMI that it is an instance of.
     pub fn fmi(&self) -> FmiVersion {
-        self.product.configuration.experiment().fmi
+        self.fmi
     }
 
     /// The modes that its interface does not have.
@@ -374,11 +377,15 @@ impl Instance {
     /// # Errors
     ///
     /// A call that [`LEGAL`] excludes in this mode.
+    #[inline]
     pub fn check(&self, call: Call) -> Result<(), Failure> {
-        let modes = call.modes(self.fmi());
-        if self.mode.is_in(modes) {
-            return Ok(());
-        }
+        let modes = call.modes(self.fmi);
+        if self.mode.is_in(modes) { Ok(()) } else { Err(self.misplaced(modes)) }
+    }
+
+    /// The reason why a call is refused that is legal in `modes` alone.
+    #[cold]
+    fn misplaced(&self, modes: Mode) -> Failure {
         let allowed: Vec<_> = Mode::EACH
             .into_iter()
             .filter(|m| m.is_in(modes) && !m.is_in(self.foreign()))
@@ -388,7 +395,7 @@ impl Instance {
             [] => "and in no other of this interface".to_owned(),
             _ => format!("only in {}", allowed.join(", ")),
         };
-        Err(format!("not allowed in the mode {:?}, {only}", self.mode.name()))
+        format!("not allowed in the mode {:?}, {only}", self.mode.name())
     }
 
     /// Takes the start time; tolerance and stop time are not needed.
@@ -506,6 +513,7 @@ impl Instance {
         // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
         let Self {
             product,
+            fmi: _,
             kinds: _,
             accesses: _,
             interface: _,
@@ -730,10 +738,15 @@ impl Instance {
     }
 
     /// Checks that the real number `index` may have the `value`: a parameter within its range, a state any finite one, and
-    /// an input any.
+    /// an input, which come first, any.
+    #[inline]
     fn check_range(&self, index: usize, value: f64) -> Result<(), Failure> {
+        if index < self.product.layout.outputs { Ok(()) } else { self.check_range_of_own(index, value) }
+    }
+
+    fn check_range_of_own(&self, index: usize, value: f64) -> Result<(), Failure> {
         match index.checked_sub(self.product.layout.parameters) {
-            None if value.is_finite() || index < self.product.layout.outputs => Ok(()),
+            None if value.is_finite() => Ok(()),
             None => Err(format!("{} is {value}, must be finite", self.product.variables[index].name)),
             Some(i) => {
                 let name = &self.product.variables[index].name;

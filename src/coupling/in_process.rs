@@ -74,11 +74,13 @@ impl Participant for InProcess {
             let done = self.instance.get_real(references, values);
             return done.map_err(|reason| self.refused("fmi2GetReal", &reason));
         }
-        self.whole.clear();
-        self.whole.resize(values.len(), 0);
+        if self.whole.len() < values.len() {
+            self.whole.resize(values.len(), 0);
+        }
+        let whole = &mut self.whole[..values.len()];
         let (call, done) = match of {
-            DataType::Boolean => ("fmi2GetBoolean", self.instance.get_boolean(references, &mut self.whole)),
-            _ => ("fmi2GetInteger", self.instance.get_integer(references, &mut self.whole)),
+            DataType::Boolean => ("fmi2GetBoolean", self.instance.get_boolean(references, whole)),
+            _ => ("fmi2GetInteger", self.instance.get_integer(references, whole)),
         };
         done.map_err(|reason| self.refused(call, &reason))?;
         for (value, number) in values.iter_mut().zip(&self.whole) {

@@ -157,6 +157,30 @@ pub(super) fn first(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     }
 }
 
+/// As [`first`], in few looks where that number is next to `guess`.
+pub(super) fn first_near(guess: f64, low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if !(low < guess && guess < high) {
+        return first(low, high, holds);
+    }
+    let (mut low, mut high) = (low, high);
+    // Away from the guess by steps that grow, until one is on the other side.
+    let (place, is_above) = (rank(guess), holds(guess));
+    let (mut near, mut step) = (guess, 1_i64);
+    loop {
+        let far = from_rank(place.saturating_add(if is_above { -step } else { step }));
+        *(if is_above { &mut high } else { &mut low }) = near;
+        if !(low < far && far < high) {
+            break;
+        }
+        if holds(far) != is_above {
+            *(if is_above { &mut low } else { &mut high }) = far;
+            break;
+        }
+        (near, step) = (far, step.saturating_mul(4));
+    }
+    first(low, high, holds)
+}
+
 /// The place of `x` among the floating-point numbers in rising order, 0 for both zeros.
 fn rank(x: f64) -> i64 {
     let bits = x.to_bits().cast_signed();
@@ -191,6 +215,31 @@ mod tests {
             assert_eq!(from_rank(rank(pair[0])), pair[0]);
         }
         assert_eq!(rank(-0.0), 0);
+    }
+
+    #[test]
+    fn a_guess_changes_no_bit_of_the_first_number() {
+        let ranges = [(0.0, f64::MAX), (-1e-3, 7.0), (f64::MIN, f64::MAX), (2.0, 2.0 + 4.0 * f64::EPSILON)];
+        let numbers =
+            [-1e300, -4.0, -1e-9, 0.0, 5e-324, 1e-9, 0.3, 1.0, 2.0 + f64::EPSILON, 6.9, 1e10, f64::MAX];
+        for (low, high) in ranges {
+            for border in numbers.into_iter().filter(|b| low < *b && *b <= high) {
+                let holds = |x: f64| x >= border;
+                assert_eq!(first(low, high, holds), border);
+                let beside = [-9, -1, 0, 1, 1000].map(|ranks| from_rank(rank(border).saturating_add(ranks)));
+                for guess in numbers.into_iter().chain(beside).chain([f64::NAN, f64::INFINITY]) {
+                    let looks = core::cell::Cell::new(0);
+                    let counted = |x: f64| {
+                        looks.set(looks.get() + 1);
+                        holds(x)
+                    };
+                    assert_eq!(first_near(guess, low, high, counted), border, "{guess} in {low} to {high}");
+                    // Next to it: the guess, two or three steps away, and the halvings between them.
+                    let is_near = rank(border).abs_diff(rank(guess)) <= 9;
+                    assert!(!is_near || looks.get() <= 8 || guess <= low || guess >= high, "{looks:?} looks");
+                }
+            }
+        }
     }
 
     #[test]

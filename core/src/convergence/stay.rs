@@ -26,7 +26,7 @@ use core::array::from_fn;
 
 use super::comparison::{Stack, lower_terms, scaled_coefficient};
 use super::condition::{AnchorChange, Bound, Condition, Rates, Sample};
-use super::polynomial::first;
+use super::polynomial::first_near;
 use super::profile::Derivatives;
 use super::settings::FixedTimeSettings;
 use super::state::FixedTimeState;
@@ -61,7 +61,9 @@ pub fn smallest_rate(e: &[f64]) -> Option<f64> {
     if is_invariant(0.0, e) {
         return Some(0.0);
     }
-    is_invariant(f64::MAX, e).then(|| first(0.0, f64::MAX, |rate| is_invariant(rate, e)))
+    // Exact for n = 2, where A_1 = a e + ė.
+    let guess = e.get(1).map_or(0.0, |rate| -rate / e[0]);
+    is_invariant(f64::MAX, e).then(|| first_near(guess, 0.0, f64::MAX, |rate| is_invariant(rate, e)))
 }
 
 /// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative where none ≥ 0 does. `h` holds
@@ -173,8 +175,10 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     } else {
         // It has to stay that low for a part of the hold: the larger a part, the less h follows an input.
         let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { own };
-        let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead[..h.len()])) <= most;
-        if is_met(limit) { first(gentle, limit, is_met) } else { limit }
+        let ahead = &ahead[..h.len()];
+        let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, ahead)) <= most;
+        let guess = rate_of_floor(most, e).max(rate_of_floor(most, ahead));
+        if is_met(limit) { first_near(guess, gentle, limit, is_met) } else { limit }
     };
     // 4. The gentle rate with all of the margin, as far as that is possible.
     let back = -lower_terms(base, e) + elementary::powi(base, h.len() as i32) * (margin - kept);
@@ -287,6 +291,16 @@ fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
     // Not `clamp`, which keeps not-a-number: 0/0 at rest on the boundary.
     if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
+}
+
+/// The rate from which φ ≤ `floor`, but for round-off: for n = 2 the larger zero of e a² + 2ė a + floor. Not a number where
+/// there is none, and for n > 2.
+fn rate_of_floor(floor: f64, e: &[f64]) -> f64 {
+    match *e {
+        [e] => -floor / e,
+        [e, rate] => (elementary::sqrt(rate * rate - e * floor) - rate) / e,
+        _ => f64::NAN,
+    }
 }
 
 /// The derivatives `e`, `hold` s later, with e⁽ⁿ⁾ = `highest`.

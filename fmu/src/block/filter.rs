@@ -6,7 +6,7 @@ use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
-use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading};
+use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading, write_barriers};
 use crate::{FilterLoop, LoopState};
 
 pub(super) struct FilterBlock {
@@ -162,17 +162,7 @@ impl FilterBlock {
         at += self.u.len();
         values.integers[at] = report.status as i32;
         at += 1;
-        for b in &report.barriers {
-            for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
-                match output.reading {
-                    Reading::Real(_, value, _) => values.reals[i] = value(b),
-                    Reading::Count(value) => values.integers[i] = i32::try_from(value(b)).unwrap_or(i32::MAX),
-                    Reading::Flag(value) => values.booleans[i] = value(b),
-                    Reading::Phase => values.integers[i] = b.phase as i32,
-                }
-            }
-            at += BARRIER_OUTPUTS.len();
-        }
+        write_barriers(&report.barriers, at, values);
         if let Some((standing, _)) = self.standing() {
             self.write_standing(standing, t, values);
         }
