@@ -7,6 +7,7 @@ import zipfile
 
 import fmpy.ssp.ssd
 import pytest
+from fmpy import read_model_description
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, read_ssv
 from lxml import etree
@@ -147,10 +148,11 @@ def test_the_same_files_give_the_same_bytes(folder):
 
 STRUCTURE, VALUES = "SystemStructure.ssd", "resources/start_values.ssv"
 SSD, SSC, SSV = (ModelicaStandard.namespaces[name] for name in ("ssd", "ssc", "ssv"))
-# What an FMU by other people is packed with: numbers of several types, and arrays of one and of two dimensions.
+# What an FMU by other people is given: numbers of every type, and arrays of one and of two dimensions.
 GIVEN = (
-    '"u" = [1.5, -2], "m" = [1, 2, 3, 4, 5, 10], in_float32 = 0.1, in_int8 = -128, in_uint16 = 65535, in_int32 = -7, '
-    "in_int64 = 2147483647, in_boolean = true"
+    "u = [1.5, -2], m = [1, 2, 3, 4, 5, 10], in_float32 = 0.5, in_int8 = -128, in_uint8 = 255, in_int16 = -32768, "
+    "in_uint16 = 65535, in_int32 = -7, in_uint32 = 4294967295, in_int64 = -9007199254740992, "
+    "in_uint64 = 9007199254740992, in_boolean = true, in_enumeration = 5000000000"
 )
 
 
@@ -205,13 +207,57 @@ def test_files_keep_to_the_schemas_of_ssp_2(packages2):
     assert set(sizes["arrays"]) == {2, 4} and not sizes["scalars"] and not sizes["factor"]
     assert sizes["types"] == [2, 2, 2, 3]
     assert len(structures["factor"].findall(f".//{{{SSC}}}LinearTransformation")) == 1
-    given = parts(packages2["types"])[VALUES].findall(f".//{{{SSV}}}Parameter")
-    assert {type.tag.split("}")[1] for parameter in given for type in parameter} == {"Real", "Integer", "Boolean"}
     # These are not the schemas of SSP 1.0. There a connector has no dimensions.
     one = etree.XMLSchema(file=str(ModelicaStandard.schemas["ssd"]))
     structure = structures["arrays"]
     structure.set("version", "1.0")
     assert not one.validate(structure) and "Dimension" in str(one.error_log)
+
+
+def test_ssp_2_has_the_types_of_fmi_3(packages2, sundry):
+    found = parts(packages2["types"])
+    description = read_model_description(str(sundry / "sundry.fmu"))
+    # Float64 and Int32 are Real and Integer. The enumeration has an item beyond 32 bits, for which SSP has no place.
+    plain = {"Float64": "Real", "Int32": "Integer", "Enumeration": "Int64"}
+    wanted = {v.name: plain.get(v.type, v.type) for v in description.modelVariables}
+    connectors = {c.get("name"): c[0].tag.split("}")[1] for c in found[STRUCTURE].iter(f"{{{SSD}}}Connector")}
+    assert connectors == {name: wanted[name] for name in connectors}
+    assert len(set(connectors.values())) == 12
+    values = {}
+    for parameter in found[VALUES].iter(f"{{{SSV}}}Parameter"):
+        value, *dimensions = parameter
+        name = parameter.get("name").removeprefix("c.")
+        assert value.tag.split("}")[1] == wanted[name]
+        assert {dimension.tag for dimension in dimensions} <= {f"{{{SSC}}}Dimension"}
+        values[name] = (value.get("value"), [int(dimension.get("size")) for dimension in dimensions])
+    assert values == {
+        "u": ("1.5 -2.0", [2]),
+        "m": ("1.0 2.0 3.0 4.0 5.0 10.0", [2, 3]),
+        "in_float32": ("0.5", []),
+        "in_int8": ("-128", []),
+        "in_uint8": ("255", []),
+        "in_int16": ("-32768", []),
+        "in_uint16": ("65535", []),
+        "in_int32": ("-7", []),
+        "in_uint32": ("4294967295", []),
+        "in_int64": ("-9007199254740992", []),
+        "in_uint64": ("9007199254740992", []),
+        "in_boolean": ("true", []),
+        "in_enumeration": ("5000000000", []),
+    }
+
+
+def test_ssp_1_refuses_numbers_beyond_32_bits(sundry, tmp_path):
+    (tmp_path / "sundry.fmu").write_bytes((sundry / "sundry.fmu").read_bytes())
+    system = '[experiment]\nstop_time = 1\nstep = 0.1\n[[component]]\nname = "c"\nfmu = "sundry.fmu"\n'
+    for value, is_packed in [(2147483647, True), (2147483648, False)]:
+        (tmp_path / "system.toml").write_text(f"{system}start = {{ in_int64 = {value} }}\n")
+        done = punctual("build", "system.toml", "-o", "system.ssp", cwd=tmp_path, check=False)
+        assert (done.returncode == 0) == is_packed, done
+    assert done.stderr == (
+        'error: system.toml: component[0].start."in_int64": is a whole number beyond 32 bits, for which SSP 1.0 has no '
+        "place; `--ssp 2` has\n"
+    )
 
 
 @pytest.mark.parametrize(
