@@ -107,7 +107,8 @@ pub use read::Located;
 pub use rules::{Place, RULES, Severity, UnknownList, Violation, brief};
 pub use structure::{ModelStructure, Unknown};
 pub use system_structure::{
-    Connector, ParameterSet, ParameterValue, SspVersion, SystemComponent, SystemConnection, SystemStructure,
+    Connector, Parameter, ParameterSet, ParameterValue, SspVersion, SystemComponent, SystemConnection,
+    SystemStructure,
 };
 pub use unit::{BaseUnit, DisplayUnit, Unit};
 pub use variable::{

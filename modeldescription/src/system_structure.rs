@@ -1,12 +1,14 @@
 //! System Structure and Parameterization 1.0 and 2.0: components, their connectors and connections as
-//! `SystemStructure.ssd`, start values as an `.ssv` parameter set. Both versions have the same namespaces; 2.0 has arrays.
+//! `SystemStructure.ssd`, start values as an `.ssv` parameter set. Both versions have the same namespaces; 2.0 has arrays
+//! and the number types of FMI 3.0.
 
+use crate::fmi3::DataType;
 use crate::names::forbidden_character;
 use crate::words::words;
 use crate::xml::{container, text};
 use crate::xsd::Number;
 use crate::{Causality, DefaultExperiment, Error, SimpleType, VariableKind};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 const SSD: &str = "http://ssp-standard.org/SSP1/SystemStructureDescription";
 const SSC: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
@@ -15,10 +17,10 @@ const SSV: &str = "http://ssp-standard.org/SSP1/SystemStructureParameterValues";
 /// A version of SSP.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SspVersion {
-    /// 1.0: scalars only.
+    /// 1.0: scalars, numbers of 32-bit integers or doubles.
     #[default]
     One,
-    /// 2.0: arrays too.
+    /// 2.0: arrays too, and numbers of every type of FMI 3.0.
     Two,
 }
 
@@ -69,6 +71,8 @@ pub struct Connector {
     /// Its type, an enumeration with the name of one of the system as its declared type. Start value, range and
     /// unit are not written.
     pub kind: VariableKind,
+    /// The type of a number in FMI 3.0, where Real (a Float64) or Integer (an Int32) is another. In SSP 2.0 only.
+    pub number: Option<DataType>,
     /// The sizes of an array, each at least 1; empty: a scalar. In SSP 2.0 only.
     pub dimensions: Vec<u64>,
 }
@@ -93,29 +97,70 @@ pub struct ParameterSet {
     pub version: SspVersion,
     /// The name of the set; not empty.
     pub name: String,
-    /// Names, unique, and values.
-    pub parameters: Vec<(String, ParameterValue)>,
+    /// The values.
+    pub parameters: Vec<Parameter>,
 }
 
-/// A value of a [`ParameterSet`].
+/// A named value of a [`ParameterSet`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its name, unique in the set.
+    pub name: String,
+    /// Its value.
+    pub value: ParameterValue,
+    /// The type of a number, as [`Connector::number`] has it.
+    pub number: Option<DataType>,
+    /// The sizes of an array, each at least 1; empty: a scalar. In SSP 2.0 only.
+    pub dimensions: Vec<u64>,
+}
+
+impl Parameter {
+    /// A scalar, a number as a double or an integer of 32 bits.
+    pub fn scalar(name: impl Into<String>, value: ParameterValue) -> Self {
+        Self { name: name.into(), value, number: None, dimensions: Vec::new() }
+    }
+}
+
+/// A value of a [`Parameter`]. Lists are those of arrays, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParameterValue {
     /// A finite double, in the unit of the variable.
     Real(f64),
-    /// A 32-bit integer.
-    Integer(i32),
+    /// An integer, within the limits of its type.
+    Integer(i64),
     /// A truth value.
     Boolean(bool),
     /// A text.
     String(String),
     /// The name of an item of an enumeration.
     Enumeration(String),
-    /// The finite doubles of an array, row by row; at least one. In SSP 2.0 only.
+    /// Finite doubles.
     Reals(Vec<f64>),
-    /// The 32-bit integers of an array, row by row; at least one. In SSP 2.0 only.
-    Integers(Vec<i32>),
-    /// The truth values of an array, row by row; at least one. In SSP 2.0 only.
+    /// Integers, each within the limits of their type.
+    Integers(Vec<i64>),
+    /// Truth values.
     Booleans(Vec<bool>),
+}
+
+impl ParameterValue {
+    /// The number of elements of a list.
+    fn len(&self) -> Option<usize> {
+        match self {
+            Self::Reals(list) => Some(list.len()),
+            Self::Integers(list) => Some(list.len()),
+            Self::Booleans(list) => Some(list.len()),
+            _ => None,
+        }
+    }
+
+    /// The integers in it.
+    fn integers(&self) -> &[i64] {
+        match self {
+            Self::Integer(value) => std::slice::from_ref(value),
+            Self::Integers(list) => list,
+            _ => &[],
+        }
+    }
 }
 
 impl SystemStructure {
@@ -146,12 +191,13 @@ impl SystemStructure {
                     let allowed = "input, output, parameter or calculatedParameter";
                     return Err(Error::invalid(path(), connector.causality.as_str(), allowed));
                 }
-                for size in &connector.dimensions {
-                    if self.version == SspVersion::One || *size == 0 {
-                        let allowed = "none in SSP 1.0, at least 1 in SSP 2.0";
-                        return Err(Error::invalid(format!("{}.dimensions", path()), size, allowed));
-                    }
-                }
+                sized(&path(), self.version, &connector.dimensions)?;
+                let is_float = match connector.kind {
+                    VariableKind::Real(_) => Some(true),
+                    VariableKind::Integer(_) => Some(false),
+                    _ => None,
+                };
+                typed(&path(), self.version, connector.number, is_float)?;
                 if let VariableKind::Enumeration(of) = &connector.kind
                     && !self.enumerations.iter().any(|e| Some(&e.name) == of.declared_type.as_ref())
                 {
@@ -189,21 +235,32 @@ impl ParameterSet {
     /// finite.
     pub fn to_xml(&self) -> Result<String, Error> {
         named("name", &self.name)?;
-        for (i, (name, value)) in self.parameters.iter().enumerate() {
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            let Parameter { name, value, number, dimensions } = parameter;
             let path = format!("parameters[{name:?}]");
             named(&path, name)?;
-            if self.parameters[..i].iter().any(|(other, _)| other == name) {
+            if self.parameters[..i].iter().any(|other| other.name == *name) {
                 return Err(Error::invalid(path, format!("{name:?}"), "a name used once"));
             }
-            let elements = match value {
-                ParameterValue::Reals(list) => Some(list.len()),
-                ParameterValue::Integers(list) => Some(list.len()),
-                ParameterValue::Booleans(list) => Some(list.len()),
+            sized(&path, self.version, dimensions)?;
+            let elements = dimensions.iter().try_fold(1, |count: u64, size| count.checked_mul(*size));
+            let wanted = if dimensions.is_empty() { None } else { elements };
+            let found = value.len().map(|count| count as u64);
+            if found != wanted || (elements.is_none() && !dimensions.is_empty()) {
+                let found =
+                    found.map_or_else(|| "one value".to_owned(), |count| format!("a list of {count}"));
+                return Err(Error::invalid(path, found, "as many values as the dimensions say"));
+            }
+            let is_float = match value {
+                ParameterValue::Real(_) | ParameterValue::Reals(_) => Some(true),
+                ParameterValue::Integer(_) | ParameterValue::Integers(_) => Some(false),
                 _ => None,
             };
-            if let Some(elements) = elements.filter(|n| *n == 0 || self.version == SspVersion::One) {
-                let allowed = "one value in SSP 1.0; at least one element in SSP 2.0";
-                return Err(Error::invalid(path, format!("an array of {elements}"), allowed));
+            typed(&path, self.version, *number, is_float)?;
+            let (least, greatest) = number.unwrap_or(DataType::Int32).limits().unwrap_or_default();
+            let beyond = |value: &&i64| !(least..=greatest).contains(&i128::from(**value));
+            if let Some(value) = value.integers().iter().find(beyond) {
+                return Err(Error::invalid(path, value, format!("{least} to {greatest}")));
             }
             match value {
                 ParameterValue::Real(value) => finite(&path, *value)?,
@@ -219,7 +276,7 @@ impl ParameterSet {
             version: self.version.as_str(),
             name: &self.name,
             parameters: Parameters {
-                parameters: self.parameters.iter().map(|(name, value)| Parameter::new(name, value)).collect(),
+                parameters: self.parameters.iter().map(ParameterElement::new).collect(),
             },
         })
     }
@@ -241,6 +298,37 @@ fn carried(path: &str, text: &str) -> Result<(), Error> {
 
 fn finite(path: &str, value: f64) -> Result<(), Error> {
     if value.is_finite() { Ok(()) } else { Err(Error::invalid(path, value, "a finite number")) }
+}
+
+/// The sizes of an array.
+fn sized(path: &str, version: SspVersion, sizes: &[u64]) -> Result<(), Error> {
+    match sizes.iter().find(|size| version == SspVersion::One || **size == 0) {
+        Some(size) => {
+            let allowed = "none in SSP 1.0, at least 1 in SSP 2.0";
+            Err(Error::invalid(format!("{path}.dimensions"), size, allowed))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The type of a number, which is a float, an integer or none.
+fn typed(
+    path: &str,
+    version: SspVersion,
+    number: Option<DataType>,
+    is_float: Option<bool>,
+) -> Result<(), Error> {
+    let Some(number) = number else { return Ok(()) };
+    let is_such = match is_float {
+        Some(true) => number.is_float(),
+        Some(false) => number.limits().is_some() && number != DataType::Enumeration,
+        None => false,
+    };
+    if version == SspVersion::One || !is_such {
+        let allowed = "none in SSP 1.0, in SSP 2.0 a float of a Real, an integer of an Integer";
+        return Err(Error::invalid(format!("{path}.number"), number.as_str(), allowed));
+    }
+    Ok(())
 }
 
 /// The kind of a connector, for the causalities that have one.
@@ -343,21 +431,33 @@ struct ConnectorElement<'a> {
 }
 
 /// The type of a connector, or after it the size of a dimension.
-#[derive(Serialize)]
 enum TypeElement<'a> {
-    #[serde(rename = "ssc:Real")]
-    Real(Empty),
-    #[serde(rename = "ssc:Integer")]
-    Integer(Empty),
-    #[serde(rename = "ssc:Boolean")]
-    Boolean(Empty),
-    #[serde(rename = "ssc:String")]
-    String(Empty),
-    #[serde(rename = "ssc:Enumeration")]
+    Plain(&'static str),
     Enumeration(Named<'a>),
-    #[serde(rename = "ssc:Dimension")]
     Dimension(Size),
 }
+
+impl Serialize for TypeElement<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Plain(tag) => element(serializer, tag, &Empty {}),
+            Self::Enumeration(named) => element(serializer, TYPES.enumeration, named),
+            Self::Dimension(size) => element(serializer, DIMENSION, size),
+        }
+    }
+}
+
+/// An element of this name.
+fn element<S: Serializer>(
+    serializer: S,
+    tag: &'static str,
+    content: &impl Serialize,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_newtype_variant("Element", 0, tag, content)
+}
+
+/// The size of one dimension, in both files.
+const DIMENSION: &str = "ssc:Dimension";
 
 #[derive(Serialize)]
 struct Size {
@@ -450,35 +550,44 @@ struct SsvRoot<'a> {
 #[derive(Serialize)]
 struct Parameters<'a> {
     #[serde(rename = "ssv:Parameter")]
-    parameters: Vec<Parameter<'a>>,
+    parameters: Vec<ParameterElement<'a>>,
 }
 
 #[derive(Serialize)]
-struct Parameter<'a> {
+struct ParameterElement<'a> {
     #[serde(rename = "@name")]
     name: &'a str,
     #[serde(rename = "$value")]
-    value: ValueElement<'a>,
+    content: Vec<ValueElement<'a>>,
 }
 
-#[derive(Serialize)]
+/// The value of a parameter, or after it the size of a dimension.
 enum ValueElement<'a> {
-    #[serde(rename = "ssv:Real")]
-    Real(Valued<Number>),
-    #[serde(rename = "ssv:Integer")]
-    Integer(Valued<i32>),
-    #[serde(rename = "ssv:Boolean")]
-    Boolean(Valued<bool>),
-    #[serde(rename = "ssv:String")]
-    String(Valued<&'a str>),
-    #[serde(rename = "ssv:Enumeration")]
-    Enumeration(Valued<&'a str>),
-    #[serde(rename = "ssv:Real")]
-    Reals(Valued<Vec<Number>>),
-    #[serde(rename = "ssv:Integer")]
-    Integers(Valued<&'a [i32]>),
-    #[serde(rename = "ssv:Boolean")]
-    Booleans(Valued<&'a [bool]>),
+    Value(&'static str, &'a ParameterValue),
+    Dimension(Size),
+}
+
+impl Serialize for ValueElement<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (tag, value) = match self {
+            Self::Value(tag, value) => (*tag, *value),
+            Self::Dimension(size) => return element(serializer, DIMENSION, size),
+        };
+        match value {
+            ParameterValue::Real(x) => element(serializer, tag, &Valued { value: Number(*x) }),
+            ParameterValue::Integer(value) => element(serializer, tag, &Valued { value }),
+            ParameterValue::Boolean(value) => element(serializer, tag, &Valued { value }),
+            ParameterValue::String(value) | ParameterValue::Enumeration(value) => {
+                element(serializer, tag, &Valued { value })
+            }
+            ParameterValue::Reals(list) => {
+                let value: Vec<_> = list.iter().map(|x| Number(*x)).collect();
+                element(serializer, tag, &Valued { value })
+            }
+            ParameterValue::Integers(value) => element(serializer, tag, &Valued { value }),
+            ParameterValue::Booleans(value) => element(serializer, tag, &Valued { value }),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -487,21 +596,69 @@ struct Valued<T> {
     value: T,
 }
 
-impl<'a> Parameter<'a> {
-    fn new(name: &'a str, value: &'a ParameterValue) -> Self {
-        let value = match value {
-            ParameterValue::Real(x) => ValueElement::Real(Valued { value: Number(*x) }),
-            ParameterValue::Integer(i) => ValueElement::Integer(Valued { value: *i }),
-            ParameterValue::Boolean(b) => ValueElement::Boolean(Valued { value: *b }),
-            ParameterValue::String(text) => ValueElement::String(Valued { value: text }),
-            ParameterValue::Reals(list) => {
-                ValueElement::Reals(Valued { value: list.iter().map(|x| Number(*x)).collect() })
+impl<'a> ParameterElement<'a> {
+    fn new(parameter: &'a Parameter) -> Self {
+        let tags = &VALUES;
+        let tag = match &parameter.value {
+            ParameterValue::Real(_) | ParameterValue::Reals(_) => tags.number(parameter.number, tags.real),
+            ParameterValue::Integer(_) | ParameterValue::Integers(_) => {
+                tags.number(parameter.number, tags.integer)
             }
-            ParameterValue::Integers(list) => ValueElement::Integers(Valued { value: list }),
-            ParameterValue::Booleans(list) => ValueElement::Booleans(Valued { value: list }),
-            ParameterValue::Enumeration(item) => ValueElement::Enumeration(Valued { value: item }),
+            ParameterValue::Boolean(_) | ParameterValue::Booleans(_) => tags.boolean,
+            ParameterValue::String(_) => tags.string,
+            ParameterValue::Enumeration(_) => tags.enumeration,
         };
-        Self { name, value }
+        let sizes = parameter.dimensions.iter().map(|&size| ValueElement::Dimension(Size { size }));
+        let value = ValueElement::Value(tag, &parameter.value);
+        Self { name: &parameter.name, content: std::iter::once(value).chain(sizes).collect() }
+    }
+}
+
+/// The names of the elements of types in a file.
+struct Tags {
+    real: &'static str,
+    integer: &'static str,
+    boolean: &'static str,
+    string: &'static str,
+    enumeration: &'static str,
+    /// Those of FMI 3.0.
+    numbers: [(DataType, &'static str); 10],
+}
+
+macro_rules! tags {
+    ($prefix:literal) => {
+        Tags {
+            real: concat!($prefix, ":Real"),
+            integer: concat!($prefix, ":Integer"),
+            boolean: concat!($prefix, ":Boolean"),
+            string: concat!($prefix, ":String"),
+            enumeration: concat!($prefix, ":Enumeration"),
+            numbers: [
+                (DataType::Float64, concat!($prefix, ":Float64")),
+                (DataType::Float32, concat!($prefix, ":Float32")),
+                (DataType::Int8, concat!($prefix, ":Int8")),
+                (DataType::UInt8, concat!($prefix, ":UInt8")),
+                (DataType::Int16, concat!($prefix, ":Int16")),
+                (DataType::UInt16, concat!($prefix, ":UInt16")),
+                (DataType::Int32, concat!($prefix, ":Int32")),
+                (DataType::UInt32, concat!($prefix, ":UInt32")),
+                (DataType::Int64, concat!($prefix, ":Int64")),
+                (DataType::UInt64, concat!($prefix, ":UInt64")),
+            ],
+        }
+    };
+}
+
+/// Those of connectors.
+const TYPES: Tags = tags!("ssc");
+/// Those of values.
+const VALUES: Tags = tags!("ssv");
+
+impl Tags {
+    /// The element of this type of numbers, or else the plain one.
+    fn number(&self, of: Option<DataType>, plain: &'static str) -> &'static str {
+        let found = self.numbers.iter().find(|(number, _)| Some(*number) == of);
+        found.map_or(plain, |(_, tag)| tag)
     }
 }
 
@@ -544,10 +701,10 @@ impl<'a> ComponentElement<'a> {
     fn new(component: &'a SystemComponent) -> Self {
         let content = |c: &'a Connector| {
             let of_type = match &c.kind {
-                VariableKind::Real(_) => TypeElement::Real(Empty {}),
-                VariableKind::Integer(_) => TypeElement::Integer(Empty {}),
-                VariableKind::Boolean(_) => TypeElement::Boolean(Empty {}),
-                VariableKind::String(_) => TypeElement::String(Empty {}),
+                VariableKind::Real(_) => TypeElement::Plain(TYPES.number(c.number, TYPES.real)),
+                VariableKind::Integer(_) => TypeElement::Plain(TYPES.number(c.number, TYPES.integer)),
+                VariableKind::Boolean(_) => TypeElement::Plain(TYPES.boolean),
+                VariableKind::String(_) => TypeElement::Plain(TYPES.string),
                 VariableKind::Enumeration(of) => {
                     TypeElement::Enumeration(Named { name: of.declared_type.as_deref().unwrap_or_default() })
                 }

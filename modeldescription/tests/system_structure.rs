@@ -1,12 +1,13 @@
 //! SSP 1.0 and 2.0: the files of a small system, and one defect at a time.
 
+use punctual_modeldescription::fmi3::DataType;
 use punctual_modeldescription::{
-    Causality, Connector, EnumerationItem, ParameterSet, ParameterValue, Real, SimpleType, SspVersion,
-    SystemComponent, SystemConnection, SystemStructure, VariableKind,
+    Causality, Connector, EnumerationItem, Integer, Parameter, ParameterSet, ParameterValue, Real,
+    SimpleType, SspVersion, SystemComponent, SystemConnection, SystemStructure, VariableKind,
 };
 
 fn connector(name: &str, causality: Causality, kind: VariableKind) -> Connector {
-    Connector { name: name.into(), causality, kind, dimensions: Vec::new() }
+    Connector { name: name.into(), causality, kind, number: None, dimensions: Vec::new() }
 }
 
 fn real() -> VariableKind {
@@ -94,10 +95,10 @@ fn a_system_in_full() {
 #[test]
 fn values_of_every_type() {
     let parameters = vec![
-        ("a.x".to_owned(), ParameterValue::Real(0.1)),
-        ("a.n".to_owned(), ParameterValue::Integer(-3)),
-        ("a.on".to_owned(), ParameterValue::Boolean(true)),
-        ("a.s".to_owned(), ParameterValue::Enumeration("good".into())),
+        Parameter::scalar("a.x", ParameterValue::Real(0.1)),
+        Parameter::scalar("a.n", ParameterValue::Integer(-3)),
+        Parameter::scalar("a.on", ParameterValue::Boolean(true)),
+        Parameter::scalar("a.s", ParameterValue::Enumeration("good".into())),
     ];
     let text =
         ParameterSet { name: "start".into(), parameters, ..ParameterSet::default() }.to_xml().expect("valid");
@@ -138,10 +139,12 @@ fn each_defect_is_told_with_its_place() {
             .to_xml()
             .expect_err("a defect")
     };
-    let twice =
-        vec![("a".to_owned(), ParameterValue::Integer(1)), ("a".to_owned(), ParameterValue::Integer(2))];
+    let twice = vec![
+        Parameter::scalar("a", ParameterValue::Integer(1)),
+        Parameter::scalar("a", ParameterValue::Integer(2)),
+    ];
     assert_eq!(set(twice).to_string(), "parameters[\"a\"] is \"a\"; allowed: a name used once");
-    let infinite = vec![("a".to_owned(), ParameterValue::Real(f64::INFINITY))];
+    let infinite = vec![Parameter::scalar("a", ParameterValue::Real(f64::INFINITY))];
     assert_eq!(set(infinite).to_string(), "parameters[\"a\"] is inf; allowed: a finite number");
 }
 
@@ -159,22 +162,88 @@ fn arrays_are_for_version_two() {
     let connector = "<ssd:Connector name=\"y\" kind=\"output\">\n            <ssc:Real/>\n            \
                      <ssc:Dimension size=\"2\"/>\n            <ssc:Dimension size=\"3\"/>\n          </ssd:Connector>";
     assert!(text.contains("version=\"2.0\" name=\"pair\"") && text.contains(connector), "{text}");
+    let array = |name: &str, value, dimensions: &[u64]| Parameter {
+        dimensions: dimensions.to_vec(),
+        ..Parameter::scalar(name, value)
+    };
     let parameters = vec![
-        ("a.x".to_owned(), ParameterValue::Reals(vec![0.1, -2.0])),
-        ("a.n".to_owned(), ParameterValue::Integers(vec![-3, 4])),
-        ("a.on".to_owned(), ParameterValue::Booleans(vec![true, false])),
+        array("a.x", ParameterValue::Reals(vec![0.1, -2.0]), &[2]),
+        array("a.n", ParameterValue::Integers(vec![-3, 4, 5, 6]), &[2, 2]),
+        array("a.on", ParameterValue::Booleans(vec![true, false]), &[1, 2]),
     ];
     let mut set = ParameterSet { name: "start".into(), parameters, ..ParameterSet::default() };
-    let refused = "parameters[\"a.x\"] is an array of 2; allowed: one value in SSP 1.0; at least one element in SSP 2.0";
+    let refused = "parameters[\"a.x\"].dimensions is 2; allowed: none in SSP 1.0, at least 1 in SSP 2.0";
     assert_eq!(set.to_xml().expect_err("an array").to_string(), refused);
     set.version = SspVersion::Two;
     let text = set.to_xml().expect("valid");
     for part in [
         r#"version="2.0" name="start""#,
-        r#"<ssv:Real value="0.1 -2.0"/>"#,
-        r#"<ssv:Integer value="-3 4"/>"#,
-        r#"<ssv:Boolean value="true false"/>"#,
+        "<ssv:Real value=\"0.1 -2.0\"/>\n      <ssc:Dimension size=\"2\"/>\n    </ssv:Parameter>",
+        "<ssv:Integer value=\"-3 4 5 6\"/>\n      <ssc:Dimension size=\"2\"/>\n      <ssc:Dimension size=\"2\"/>\n",
+        "<ssv:Boolean value=\"true false\"/>\n      <ssc:Dimension size=\"1\"/>\n      <ssc:Dimension size=\"2\"/>\n",
     ] {
         assert!(text.contains(part), "{text}");
     }
+    // The last product is beyond 64 bits.
+    for dimensions in [vec![], vec![3], vec![1 << 63, 4]] {
+        set.parameters[0].dimensions = dimensions;
+        let refused = "parameters[\"a.x\"] is a list of 2; allowed: as many values as the dimensions say";
+        assert_eq!(set.to_xml().expect_err("another number of values").to_string(), refused);
+    }
+    set.parameters[0] = array("a.x", ParameterValue::Real(1.0), &[1]);
+    let refused = "parameters[\"a.x\"] is one value; allowed: as many values as the dimensions say";
+    assert_eq!(set.to_xml().expect_err("no list").to_string(), refused);
+}
+
+/// Each type of numbers that FMI 3.0 has, with the least and the greatest value.
+#[test]
+fn numbers_of_fmi_3_are_for_version_two() {
+    let integer = || VariableKind::Integer(Integer::default());
+    let numbers = DataType::ALL.iter().filter(|of| of.limits().is_some() && **of != DataType::Enumeration);
+    let mut tried = 0;
+    for &of in numbers {
+        let mut system = system();
+        system.version = SspVersion::Two;
+        system.components[0].connectors[1].kind = integer();
+        system.components[0].connectors[1].number = Some(of);
+        let text = system.to_xml().expect("valid");
+        assert!(text.contains(&format!("<ssc:{}/>", of.as_str())), "{text}");
+        system.version = SspVersion::One;
+        let refused = format!(
+            "components[0].connectors[\"s\"].number is {}; allowed: none in SSP 1.0, in SSP 2.0 a float of a Real, an \
+             integer of an Integer",
+            of.as_str()
+        );
+        assert_eq!(system.to_xml().expect_err("a type of 2.0").to_string(), refused);
+        let (least, greatest) = of.limits().expect("an integer");
+        let set = |value: i128| {
+            let value = ParameterValue::Integer(i64::try_from(value).ok()?);
+            let parameters = vec![Parameter { number: Some(of), ..Parameter::scalar("a.n", value) }];
+            Some(ParameterSet { version: SspVersion::Two, name: "start".into(), parameters }.to_xml())
+        };
+        for value in [least, greatest] {
+            let Some(text) = set(value) else { continue };
+            let text = text.expect("valid");
+            assert!(text.contains(&format!("<ssv:{} value=\"{value}\"/>", of.as_str())), "{text}");
+        }
+        for value in [least - 1, greatest + 1] {
+            let Some(refused) = set(value) else { continue };
+            let refused = refused.expect_err("beyond the limits").to_string();
+            assert_eq!(refused, format!("parameters[\"a.n\"] is {value}; allowed: {least} to {greatest}"));
+            tried += 1;
+        }
+    }
+    // Of the 64-bit types what is beyond is no number here, but for -1.
+    assert_eq!(tried, 6 * 2 + 1);
+    let mut float = system();
+    float.version = SspVersion::Two;
+    float.components[0].connectors[0].number = Some(DataType::Float32);
+    assert!(float.to_xml().expect("valid").contains("<ssc:Float32/>"));
+    float.components[0].connectors[0].number = Some(DataType::Int8);
+    float.to_xml().expect_err("an integer of a Real");
+    let beyond = vec![Parameter::scalar("a", ParameterValue::Integer(1 << 31))];
+    let refused =
+        ParameterSet { name: "start".into(), parameters: beyond, ..ParameterSet::default() }.to_xml();
+    let wanted = "parameters[\"a\"] is 2147483648; allowed: -2147483648 to 2147483647";
+    assert_eq!(refused.expect_err("beyond 32 bits").to_string(), wanted);
 }

@@ -56,7 +56,7 @@ impl Instance {
         let instance_name = c_text("instance name", name)?;
         let guid = c_text("guid", &of.1.token)?;
         let resources = c_text("resource location", &of.0.archive.resource_location())?;
-        let handle = Handle::instantiate("fmi2Instantiate", of, name, |logging| {
+        let handle = Handle::instantiate("fmi2Instantiate", of, name, |logging, is_logged| {
             // SAFETY: the texts live through the call; the callbacks live as long as the instance.
             unsafe {
                 (functions.instantiate)(
@@ -66,7 +66,7 @@ impl Instance {
                     resources.as_ptr(),
                     logging.callbacks(),
                     FALSE,
-                    FALSE,
+                    if is_logged { TRUE } else { FALSE },
                 )
             }
         })?;

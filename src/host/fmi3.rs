@@ -104,20 +104,23 @@ impl Instance {
         let token = c_text("instantiationToken", &of.1.token)?;
         let resources =
             of.0.archive.resource_path().map(|path| c_text("resource path", &path)).transpose()?;
-        let handle = Handle::instantiate("fmi3InstantiateCoSimulation", of, name, |logging| {
+        let handle = Handle::instantiate("fmi3InstantiateCoSimulation", of, name, |logging, is_logged| {
             let (environment, callback) = logging.plain();
-            // SAFETY: the texts live through the call; what the callback needs lives as long as the instance.
+            // No variable. An FMU in Rust may make a slice of it, for which NULL is no address.
+            let required: [u32; 0] = [];
+            // SAFETY: the texts and the list live through the call; what the callback needs lives as long as the
+            // instance.
             unsafe {
                 (functions.instantiate)(
                     instance_name.as_ptr(),
                     token.as_ptr(),
                     resources.as_ref().map_or(std::ptr::null(), |path| path.as_ptr()),
                     FALSE,
+                    if is_logged { TRUE } else { FALSE },
                     FALSE,
                     FALSE,
-                    FALSE,
-                    std::ptr::null(),
-                    0,
+                    required.as_ptr(),
+                    required.len(),
                     environment,
                     callback,
                     None,

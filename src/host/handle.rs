@@ -38,11 +38,16 @@ impl Handle {
         call: &'static str,
         (fmu, description): (Rc<Fmu>, Rc<Description>),
         name: &str,
-        make: impl FnOnce(&Logging) -> *mut c_void,
+        make: impl Fn(&Logging, bool) -> *mut c_void,
     ) -> Result<Self, Error> {
         let logging = Logging::new();
         journal::entering(call, name, fmu.path(), None);
-        let Some(component) = NonNull::new(make(&logging)) else {
+        let mut component = make(&logging, false);
+        if component.is_null() && logging.messages().is_empty() {
+            // Some tell the reason only where the log is wanted.
+            component = make(&logging, true);
+        }
+        let Some(component) = NonNull::new(component) else {
             return Err(Error::call(CallFailure {
                 call,
                 instance: name.to_owned(),

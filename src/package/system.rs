@@ -1,13 +1,15 @@
 //! From a system file to an `.ssp` package: its FMUs, connections and start values as System Structure and
-//! Parameterization 1.0 or 2.0, for other masters. Arrays are for 2.0, and are connected and set as a whole there. Nothing is run; the same files give the same bytes.
+//! Parameterization 1.0 or 2.0, for other masters. Arrays are for 2.0, and are connected and set as a whole there. So are
+//! numbers of other types than a double and an integer of 32 bits. Nothing is run; the same files give the same bytes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 
 use punctual_modeldescription::{
-    Archive, Causality, Connector, DefaultExperiment, EnumerationItem, Integer, ParameterSet, ParameterValue,
-    Plain, Real, SimpleType, SspVersion, SystemComponent, SystemConnection, SystemStructure, VariableKind,
+    Archive, Causality, Connector, DefaultExperiment, EnumerationItem, Integer, Parameter, ParameterSet,
+    ParameterValue, Plain, Real, SimpleType, SspVersion, SystemComponent, SystemConnection, SystemStructure,
+    VariableKind,
 };
 
 use crate::coupling::{self, Link, Port, StartValue, System};
@@ -152,12 +154,12 @@ fn archive(
                     format!("{}.{}", component.name, array.map_or(&variable.name, |array| &array.name));
                 let port = Port { component: c, variable: *v };
                 variable.causality != Causality::Input
-                    || starts.iter().any(|(given, _)| *given == name)
+                    || starts.iter().any(|given| given.name == name)
                     || links.iter().any(|link| link.to == port)
             };
             let connectors = (0..description.variables.len()).filter(shown);
-            let connectors =
-                connectors.filter_map(|v| connector(&component.name, description, v, &mut enumerations));
+            let connectors = connectors
+                .filter_map(|v| connector(&component.name, description, v, version, &mut enumerations));
             SystemComponent {
                 name: component.name.clone(),
                 source: store.of(c).1.clone(),
@@ -231,7 +233,8 @@ fn refuse_arrays(system: &System, descriptions: &[&Description], links: &[Link])
 ///
 /// # Errors
 ///
-/// An array of which only some elements are connected, or with other elements than their own: SSP has no place for that.
+/// An array of which only some elements are connected, or with other elements than their own. SSP 2.0 has indices for
+/// that (`startIndices`), which are not written.
 fn connections(
     system: &System,
     descriptions: &[&Description],
@@ -272,7 +275,7 @@ fn connections(
 
 fn in_parts(from: &(String, String), to: &(String, String)) -> Error {
     let message = format!(
-        "{}.{} and {}.{} are connected in parts; SSP connects arrays of the same sizes as a whole",
+        "{}.{} and {}.{} are connected in parts; in an .ssp file arrays of the same sizes are connected as a whole",
         from.0, from.1, to.0, to.1
     );
     Error::configuration("connect", message)
@@ -303,6 +306,7 @@ fn connector(
     component: &str,
     description: &Description,
     variable: usize,
+    version: SspVersion,
     enumerations: &mut Enumerations,
 ) -> Option<Connector> {
     use Causality::{CalculatedParameter, Input, Output, Parameter};
@@ -325,7 +329,21 @@ fn connector(
     let name = array.map_or(&variable.name, |array| &array.name).clone();
     let sizes = array.map(|array| array.sizes.as_slice()).unwrap_or_default();
     let dimensions = sizes.iter().filter_map(|&size| u64::try_from(size).ok()).collect();
-    Some(Connector { name, causality: variable.causality, kind, dimensions })
+    let number = match kind {
+        VariableKind::Real(_) | VariableKind::Integer(_) => number(variable, version),
+        _ => None,
+    };
+    Some(Connector { name, causality: variable.causality, kind, number, dimensions })
+}
+
+/// The type of a number, where Real or Integer is another and the version has it. An enumeration whose items the
+/// format cannot hold is what it is in FMI 3.0.
+fn number(variable: &Variable, version: SspVersion) -> Option<DataType> {
+    match (version, variable.of) {
+        (SspVersion::One, _) | (_, DataType::Float64 | DataType::Int32) => None,
+        (SspVersion::Two, DataType::Enumeration) => Some(DataType::Int64),
+        (SspVersion::Two, of) => Some(of),
+    }
 }
 
 /// The items of an enumeration, if the format can hold all of them. It has no place for their meaning.
@@ -347,12 +365,12 @@ fn first_of(description: &Description, name: &str) -> Option<usize> {
 ///
 /// # Errors
 ///
-/// A whole number that the format cannot hold, an element of an array, an array of texts or enumerations.
+/// A whole number that the version cannot hold, an element of an array, an array of texts or enumerations.
 fn start_values(
     system: &System,
     descriptions: &[&Description],
     version: SspVersion,
-) -> Result<Vec<(String, ParameterValue)>, Error> {
+) -> Result<Vec<Parameter>, Error> {
     let mut values = Vec::new();
     for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
         for (name, value) in &component.start {
@@ -361,29 +379,36 @@ fn start_values(
                 |message: String| Error::configuration(format!("component[{c}].start.{name:?}"), message);
             let mut of_name = Vec::new();
             for (variable, value) in description.variables[first..].iter().zip(value.flat()) {
-                of_name.push(parameter(variable, value).ok_or_else(|| {
-                    let version = version.as_str();
-                    refused(format!(
-                        "is a whole number beyond 32 bits, for which SSP {version} has no place here"
-                    ))
+                let value = parameter(variable, value, version);
+                of_name.push(value.ok_or_else(|| {
+                    refused(
+                        "is a whole number beyond 32 bits, for which SSP 1.0 has no place; `--ssp 2` has"
+                            .to_owned(),
+                    )
                 })?);
             }
             let named = |name: &str| format!("{}.{name}", component.name);
+            let is_number =
+                of_name.iter().all(|v| matches!(v, ParameterValue::Real(_) | ParameterValue::Integer(_)));
+            let number = if is_number { number(&description.variables[first], version) } else { None };
             match array_of(description, first) {
                 Some(array) if array.count == of_name.len() => {
                     let value = list(&of_name).ok_or_else(|| {
                         refused("is an array of neither numbers nor truth values, which has no start value in SSP".to_owned())
                     })?;
-                    values.push((named(&array.name), value));
+                    let dimensions =
+                        array.sizes.iter().filter_map(|&size| u64::try_from(size).ok()).collect();
+                    values.push(Parameter { name: named(&array.name), number, value, dimensions });
                 }
                 Some(array) => {
                     let message =
                         format!("is an element of {}; in SSP an array is given as a whole", array.name);
                     return Err(refused(message));
                 }
-                None => values.extend(
-                    of_name.into_iter().map(|value| (named(&description.variables[first].name), value)),
-                ),
+                None => values.extend(of_name.into_iter().map(|value| Parameter {
+                    number,
+                    ..Parameter::scalar(named(&description.variables[first].name), value)
+                })),
             }
         }
     }
@@ -402,7 +427,7 @@ fn list(values: &[ParameterValue]) -> Option<ParameterValue> {
 }
 
 /// The value of a variable in the format; `None` where it has no place for it.
-fn parameter(variable: &Variable, value: &StartValue) -> Option<ParameterValue> {
+fn parameter(variable: &Variable, value: &StartValue, version: SspVersion) -> Option<ParameterValue> {
     Some(match value {
         StartValue::Real(x) => ParameterValue::Real(*x),
         StartValue::Boolean(b) => ParameterValue::Boolean(*b),
@@ -410,7 +435,9 @@ fn parameter(variable: &Variable, value: &StartValue) -> Option<ParameterValue> 
         StartValue::Integer(i) if variable.family() == Family::Real => ParameterValue::Real(*i as f64),
         StartValue::Integer(i) => match variable.items.iter().find(|(_, item)| item == i) {
             Some((name, _)) if items(variable).is_some() => ParameterValue::Enumeration(name.clone()),
-            _ => ParameterValue::Integer(i32::try_from(*i).ok()?),
+            // A UInt32 has a type of its own in SSP 2.0 only.
+            _ if version == SspVersion::One && i32::try_from(*i).is_err() => return None,
+            _ => ParameterValue::Integer(*i),
         },
         StartValue::List(_) => return None,
     })

@@ -210,7 +210,7 @@ fn arrays_are_packed_by_version_two() {
     }
     assert!(!ssd.contains("\"u[1]\""), "{ssd}");
     let ssv = entry(&workshop, "my.ssp", "resources/start_values.ssv");
-    assert!(ssv.contains(r#"<ssv:Real value="0.5 0.25"/>"#), "{ssv}");
+    assert!(ssv.contains("<ssv:Real value=\"0.5 0.25\"/>\n      <ssc:Dimension size=\"2\"/>\n"), "{ssv}");
     // An element alone has no place.
     workshop.write("my.toml", ARRAYS.replace("u_ref = [0.5, 0.25]", "\"u_ref[1]\" = 0.5"));
     let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]);
@@ -218,7 +218,7 @@ fn arrays_are_packed_by_version_two() {
     let halves = ARRAYS.replace("filter.u\"", "filter.u[1]\"").replace("plant.u\"", "plant.u[1]\"");
     workshop.write("my.toml", halves);
     let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]);
-    done.fails(2, "my.toml: connect: filter.u and plant.u are connected in parts; SSP connects arrays of the same sizes as a whole");
+    done.fails(2, "my.toml: connect: filter.u and plant.u are connected in parts; in an .ssp file arrays of the same sizes are connected as a whole");
     let done = workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--ssp", "2"]);
     done.fails(2, "--ssp: is for an .ssp file, which is made from a system file");
 }

@@ -232,6 +232,11 @@ fn what_cannot_be_run_is_refused_in_plain_words() {
         1,
         "fmi3InstantiateCoSimulation of b (b.fmu) returned no instance\n  [fmi3Error, logStatusError] no licence",
     );
+    // It is asked again, with the log wanted.
+    run(&workshop("no-instance-quiet", &[]), &still).fails(
+        1,
+        "fmi3InstantiateCoSimulation of b (b.fmu) returned no instance\n  [fmi3Error, logStatusError] no licence, said to who asks",
+    );
     let run = |macros: &[&str]| run(&workshop("none", macros), &still);
     run(&["WITHOUT_RESET"]).fails(1, "b (b.fmu): its library does not export fmi3Reset");
     run(&["VERSION=\"2.0\""]).fails(1, "b (b.fmu): fmi3GetVersion answered \"2.0\", not FMI 3.0");

@@ -37,6 +37,20 @@ def for_windows(here, there):
 
 
 @pytest.fixture(scope="session")
+def sundry(tmp_path_factory):
+    """A folder with sundry.fmu, of FMI 3.0 and in C, which is not ours. It has a variable of every type, and arrays."""
+    folder = tmp_path_factory.mktemp("sundry")
+    fixtures = ROOT / "tests" / "fixtures"
+    library = folder / "sundry.so"
+    compiler = os.environ.get("CC", "cc")
+    subprocess.run([compiler, "-shared", "-fPIC", fixtures / "sundry.c", "-o", library], check=True)
+    with zipfile.ZipFile(folder / "sundry.fmu", "w") as archive:
+        archive.write(fixtures / "sundry.xml", "modelDescription.xml")
+        archive.write(library, "binaries/x86_64-linux/sundry.so")
+    return folder
+
+
+@pytest.fixture(scope="session")
 def demo(tmp_path_factory):
     """The folder that `punctual demo` writes, and what it prints as JSON."""
     folder = tmp_path_factory.mktemp("demo")

@@ -6,18 +6,15 @@ import os
 import shutil
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import numpy as np
-import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from conftest import ROOT, punctual
+from conftest import punctual
 from test_foreign_plant import libpython
 
-FIXTURES = ROOT / "tests" / "fixtures"
 STOP, STEP = 1.0, 0.1
 # FMPy computes the times of steps in another way, so that the last digit of t and h may differ.
 TOLERANCE = 1e-14
@@ -54,18 +51,6 @@ def compared(folder, name, start_values, output):
             own = f"c.{variable}" if column.ndim == 1 else f"c.{variable}[{i + 1}]"
             differences[own] = np.abs(found[own] - values).max()
     return differences
-
-
-@pytest.fixture(scope="module")
-def sundry(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("sundry")
-    library = folder / "sundry.so"
-    compiler = os.environ.get("CC", "cc")
-    subprocess.run([compiler, "-shared", "-fPIC", FIXTURES / "sundry.c", "-o", library], check=True)
-    with zipfile.ZipFile(folder / "sundry.fmu", "w") as archive:
-        archive.write(FIXTURES / "sundry.xml", "modelDescription.xml")
-        archive.write(library, "binaries/x86_64-linux/sundry.so")
-    return folder
 
 
 def test_both_find_nothing_wrong_with_it(sundry):

@@ -7,6 +7,7 @@
 
 mod recording;
 mod with_fmi;
+mod with_fmi3;
 mod with_fmi_rs;
 mod with_fmi_rs3;
 
@@ -128,6 +129,7 @@ fn main() {
     assert!(recording.rows() > 1000, "{} rows", recording.rows());
     let counts = [
         ("fmi", compare::<with_fmi::Slave>(folder, h, &recording)),
+        ("fmi, FMI 3.0", compare::<with_fmi3::Slave>(&folder.join("fmi3"), h, &recording)),
         ("fmi-rs", compare::<with_fmi_rs::Slave>(folder, h, &recording)),
         ("fmi-rs, FMI 3.0", compare::<with_fmi_rs3::Slave>(&folder.join("fmi3"), h, &recording)),
     ];
