@@ -1,6 +1,6 @@
-"""Costs in one run: a step in Rust beside the same by hand, steps and batches in Python beside cbfpy, FMPy, a campaign.
+"""Costs in one run: a step in Rust beside the same by hand, steps and batches in Python beside cbfpy, FMPy, campaigns.
 
-    PYTHON benches/python.py     # of an environment with the wheel and FMPy; with cbfpy too, where it is installed
+    PYTHON benches/python.py     # of an environment with the wheel and FMPy; with cbfpy and Dask too, where they are installed
 
 Single steps are the shortest of many rounds, or times of one thread on its processor, whatever else runs there. What runs
 on all cores is the shortest of many too.
@@ -13,8 +13,10 @@ import os
 os.environ.setdefault("JAX_ENABLE_X64", "1")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 
+import json
 import resource
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -30,6 +32,13 @@ try:
     import jax.numpy as jnp
 except ImportError:
     cbfpy = None
+try:
+    import distributed
+except ImportError:
+    distributed = None
+EXAMPLE = Path(__file__).parent.parent / "examples" / "campaign"
+sys.path.append(str(EXAMPLE))
+import fmpy_runs  # noqa: E402
 
 GOAL = {"name": "goal", "centre": [45.0, 45.0], "radius": 2.0, "deadline": 10.0, "margin": 0.02}
 FILTER = {"kind": "filter", "plant": {"model": "unicycle"}, "barrier": [GOAL]}
@@ -39,12 +48,7 @@ STEP, STEPS, REPEATS = 0.001, 10_000, 5
 
 def fastest(run, clock=time.thread_time):
     """The shortest of some times, in s: by default of this thread on its processor, whatever else runs there."""
-    times = []
-    for _ in range(REPEATS):
-        begin = clock()
-        run()
-        times.append(clock() - begin)
-    return min(times)
+    return min(once(run, clock) for _ in range(REPEATS))
 
 
 def shortest(run, rounds=100):
@@ -52,10 +56,10 @@ def shortest(run, rounds=100):
     return min(once(run) for _ in range(rounds))
 
 
-def once(run):
-    begin = time.perf_counter()
+def once(run, clock=time.perf_counter):
+    begin = clock()
     run()
-    return time.perf_counter() - begin
+    return clock() - begin
 
 
 def resident():
@@ -273,26 +277,43 @@ def in_python():
 
 
 def campaigns():
-    """Runs of the example's campaign for each second of a processor."""
-    folder = Path(__file__).parent.parent / "examples" / "campaign"
-    print("a campaign, runs of 10,000 steps (examples/campaign) for each second of one processor")
-    for sampling, runs in [("measured", 40), ("pointwise", 300)]:
+    """Runs of the example's campaign: by the program, on two workers of Dask, and by FMPy."""
+    print("a campaign, runs of 10,000 steps (examples/campaign): for each second of one processor, and of the clock")
+    for sampling, runs in [("measured", 600), ("pointwise", 1800)]:
         with tempfile.TemporaryDirectory() as work:
-            for name in folder.glob("*.toml"):
-                text = name.read_text()
-                if name.name == "unicycle-filter.toml":
-                    text = f'sampling = "{sampling}"\n' + text
-                Path(work, name.name).write_text(text.replace("runs = 1000", f"runs = {runs}"))
-            for name in ["unicycle-filter", "unicycle-plant"]:
-                punctual.build(str(Path(work, f"{name}.toml")), str(Path(work, f"{name}.fmu")))
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            begin = time.perf_counter()
-            command = [Path(punctual.__file__).parent / "_bin" / "punctual", "campaign", Path(work, "unicycle.toml")]
+            file = campaign_in(Path(work), sampling, runs)
+            before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            command = [Path(punctual.__file__).parent / "_bin" / "punctual", "campaign", file]
             subprocess.run(command, cwd=work, check=True, capture_output=True)
             wall = time.perf_counter() - begin
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-            print(f"  {sampling}: {runs / spent:.0f}; {runs / wall:.0f} a second of the clock")
+            print(f"  {sampling}: {runs / spent:.0f}; {runs / wall:.0f}")
+            if distributed:
+                # A batch for each worker and second, as long campaigns have them; the workers have started before.
+                with distributed.Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
+                    wall = once(lambda: punctual.campaign(str(file), str(Path(work, "dask.parquet")), client=client))
+                same = file.with_suffix(".parquet").read_bytes() == Path(work, "dask.parquet").read_bytes()
+                print(f"  {sampling}, two workers of Dask: {runs / wall:.0f} of the clock; the file is the same: {same}")
+            else:
+                print("  Dask is not installed: pip install 'punctual-filter[dask]'")
+            simulation = fmpy_runs.Simulation(*fmpy_runs.read(file), work)
+            text = subprocess.run([*command, "--list", "0..3", "--json"], cwd=work, check=True, capture_output=True).stdout
+            drawn = json.loads(text)
+            spent = min(once(lambda run=run: simulation.run(run), time.process_time) for run in drawn)
+            print(f"  {sampling}, FMPy's library calls (fmpy_runs.py): {1 / spent:.1f}")
+
+
+def campaign_in(folder, sampling, runs):
+    """The example's campaign in a folder of its own."""
+    for name in EXAMPLE.glob("*.toml"):
+        text = name.read_text()
+        if name.name == "unicycle-filter.toml":
+            text = f'sampling = "{sampling}"\n' + text
+        Path(folder, name.name).write_text(text.replace("runs = 1000", f"runs = {runs}"))
+    for name in ["unicycle-filter", "unicycle-plant"]:
+        punctual.build(str(Path(folder, f"{name}.toml")), str(Path(folder, f"{name}.fmu")))
+    return folder / "unicycle.toml"
 
 
 def main():
