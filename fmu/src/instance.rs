@@ -624,29 +624,11 @@ impl Instance {
                 self.stop
             ));
         }
-        let gap = t - self.time;
-        let rounding = GAP * self.last_step;
-        let mut unbroken = self.unbroken;
-        // A clock that rounds does so as before when it goes back; all else within what was taken back is a wrong time.
-        let mistimed = unbroken.end > self.time
-            && t <= unbroken.end + same
-            && gap > same.max(rounding.min(unbroken.rounding));
-        let late = !mistimed && gap > same.max(rounding);
-        if late && self.stepped && !self.block.accepts_gaps() {
-            return Err(format!(
-                "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
-                self.time
-            ));
-        }
-        let start = if mistimed || gap <= same { self.time } else { t };
+        let (start, mistimed, unbroken) =
+            if t - self.time <= same { (self.time, false, self.unbroken) } else { self.after_gap(t, same)? };
         self.block.step(start, h, &mut self.values)?;
         if mistimed && matches!(self.mistimed, Mistimed::Never) {
             self.mistimed = Mistimed::First { given: t, restored: start };
-        }
-        if late {
-            unbroken = Unbroken::at(start);
-        } else {
-            unbroken.rounding = unbroken.rounding.max(start - self.time);
         }
         let end = if mistimed { start + h } else { t + h };
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
@@ -656,6 +638,27 @@ impl Instance {
         self.last_step = h;
         self.fresh = true;
         Ok(())
+    }
+
+    /// Where a step begins that is told the time `t`, more than `same` after the present one; whether that is a wrong time
+    /// after a restore; and the unbroken steps before it.
+    fn after_gap(&self, t: f64, same: f64) -> Result<(f64, bool, Unbroken), Failure> {
+        let (gap, rounding, unbroken) = (t - self.time, GAP * self.last_step, self.unbroken);
+        // A clock that rounds does so as before when it goes back; all else within what was taken back is a wrong time.
+        let is_taken_back = unbroken.end > self.time && t <= unbroken.end + same;
+        if is_taken_back && gap > rounding.min(unbroken.rounding) {
+            return Ok((self.time, true, unbroken));
+        }
+        if gap <= rounding {
+            return Ok((t, false, Unbroken { rounding: unbroken.rounding.max(gap), ..unbroken }));
+        }
+        if self.stepped && !self.block.accepts_gaps() {
+            return Err(format!(
+                "currentCommunicationPoint is {t}, must be the present one, {}: the plant did not move in between",
+                self.time
+            ));
+        }
+        Ok((t, false, Unbroken::at(t)))
     }
 
     /// Reads reals, in the units of the variables.

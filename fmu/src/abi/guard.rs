@@ -164,17 +164,22 @@ pub(super) unsafe fn slice_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, len) })
 }
 
+#[inline]
 fn check_array<T>(name: &str, pointer: *const T, len: usize) -> Result<(), Failure> {
+    let fits = !pointer.is_null() && pointer.is_aligned() && len <= isize::MAX as usize / size_of::<T>();
+    if fits { Ok(()) } else { Err(no_array(name, pointer, len)) }
+}
+
+/// The reason why there are no `len` elements at `pointer`.
+#[cold]
+fn no_array<T>(name: &str, pointer: *const T, len: usize) -> Failure {
     if pointer.is_null() {
-        return Err(format!("{name} is NULL with {len} elements"));
+        format!("{name} is NULL with {len} elements")
+    } else if !pointer.is_aligned() {
+        format!("{name} is not aligned to {} bytes", align_of::<T>())
+    } else {
+        format!("{name} cannot have {len} elements")
     }
-    if !pointer.is_aligned() {
-        return Err(format!("{name} is not aligned to {} bytes", align_of::<T>()));
-    }
-    if len > isize::MAX as usize / size_of::<T>() {
-        return Err(format!("{name} cannot have {len} elements"));
-    }
-    Ok(())
 }
 
 /// The text at `pointer`, bytes that are not UTF-8 replaced; `None` for NULL.
