@@ -279,7 +279,7 @@ def in_python():
 def campaigns():
     """Runs of the example's campaign: by the program, on two workers of Dask, and by FMPy."""
     print("a campaign, runs of 10,000 steps (examples/campaign): for each second of one processor, and of the clock")
-    for sampling, runs in [("measured", 600), ("pointwise", 1800)]:
+    for sampling, runs in [("measured", 3000), ("pointwise", 5000)]:
         with tempfile.TemporaryDirectory() as work:
             file = campaign_in(Path(work), sampling, runs)
             before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
