@@ -9,7 +9,7 @@ mod outputs;
 
 pub(crate) use arrays::Access;
 pub use arrays::{Item, TIME};
-pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading, write_barriers};
+pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 
 use punctual_core::filter::{Phase, Standing, Status};
 use punctual_modeldescription::{

@@ -1,12 +1,12 @@
 //! A filter: it samples its inputs and remembers its promises.
 
-use punctual_core::filter::{NoDerivative, SampleDerivative, Standing, Status};
+use punctual_core::filter::{BarrierReport, NoDerivative, SampleDerivative, Standing, Status};
 use punctual_core::lie::Direction;
 use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
-use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading, write_barriers};
+use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading};
 use crate::{FilterLoop, LoopState};
 
 pub(super) struct FilterBlock {
@@ -319,5 +319,40 @@ impl Block for FilterBlock {
             self.write_standing(shown, 0.0, values);
         }
         self.write_codes(values);
+    }
+}
+
+/// Writes the outputs of `reports`, one barrier after another from index `at` on.
+fn write_barriers(reports: &[BarrierReport], at: usize, values: &mut Values) {
+    const LEN: usize = BARRIER_OUTPUTS.len();
+    let (reals, _) = values.reals[at..].as_chunks_mut();
+    let (integers, _) = values.integers[at..].as_chunks_mut();
+    let (booleans, _) = values.booleans[at..].as_chunks_mut();
+    for (((b, reals), integers), booleans) in reports.iter().zip(reals).zip(integers).zip(booleans) {
+        // Each row of the table is known where this is compiled, so that reading it costs nothing.
+        macro_rules! write_rows {
+            ($($row:literal)*) => {
+                const { assert!([$($row),*].len() == LEN) };
+                $(write::<$row, LEN>(&BARRIER_OUTPUTS[$row].reading, b, reals, integers, booleans);)*
+            };
+        }
+        write_rows!(0 1 2 3 4 5 6 7 8 9 10 11 12 13);
+    }
+}
+
+/// Writes a value as number `ROW` of those of its type.
+#[inline(always)]
+fn write<const ROW: usize, const LEN: usize>(
+    reading: &Reading,
+    b: &BarrierReport,
+    reals: &mut [f64; LEN],
+    integers: &mut [i32; LEN],
+    booleans: &mut [bool; LEN],
+) {
+    match reading {
+        Reading::Real(_, value, _) => reals[ROW] = value(b),
+        Reading::Count(value) => integers[ROW] = i32::try_from(value(b)).unwrap_or(i32::MAX),
+        Reading::Flag(value) => booleans[ROW] = value(b),
+        Reading::Phase => integers[ROW] = b.phase as i32,
     }
 }

@@ -2,7 +2,6 @@
 
 use punctual_core::filter::{BarrierDerivative, BarrierReport};
 
-use crate::block::Values;
 use crate::configuration::Unit::{self, Is, OfH, OfHighestDerivative};
 
 /// An output of each barrier.
@@ -95,40 +94,3 @@ pub const BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput { name: "phase", description: "where the barrier stands", reading: Phase },
 ];
-
-/// Writes the outputs of `reports`, one barrier after another from index `at` on.
-pub fn write_barriers(reports: &[BarrierReport], at: usize, values: &mut Values) {
-    const LEN: usize = BARRIER_OUTPUTS.len();
-    let (reals, _) = values.reals[at..].as_chunks_mut();
-    let (integers, _) = values.integers[at..].as_chunks_mut();
-    let (booleans, _) = values.booleans[at..].as_chunks_mut();
-    for (((b, reals), integers), booleans) in reports.iter().zip(reals).zip(integers).zip(booleans) {
-        // Each row of the table is known where this is compiled, so that reading it costs nothing.
-        macro_rules! write_rows {
-            ($($row:literal)*) => {
-                const { assert!([$($row),*].len() == LEN) };
-                $(BARRIER_OUTPUTS[$row].reading.write::<$row, LEN>(b, reals, integers, booleans);)*
-            };
-        }
-        write_rows!(0 1 2 3 4 5 6 7 8 9 10 11 12 13);
-    }
-}
-
-impl Reading {
-    /// Writes its value as number `ROW` of those of its type.
-    #[inline(always)]
-    fn write<const ROW: usize, const LEN: usize>(
-        &self,
-        b: &BarrierReport,
-        reals: &mut [f64; LEN],
-        integers: &mut [i32; LEN],
-        booleans: &mut [bool; LEN],
-    ) {
-        match self {
-            Real(_, value, _) => reals[ROW] = value(b),
-            Count(value) => integers[ROW] = i32::try_from(value(b)).unwrap_or(i32::MAX),
-            Flag(value) => booleans[ROW] = value(b),
-            Phase => integers[ROW] = b.phase as i32,
-        }
-    }
-}
