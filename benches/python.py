@@ -290,7 +290,7 @@ def campaigns():
             spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
             print(f"  {sampling}: {runs / spent:.0f}; {runs / wall:.0f}")
             if distributed:
-                # A batch for each worker and second, as long campaigns have them; the workers have started before.
+                # The workers have started before.
                 with distributed.Client(n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
                     wall = once(lambda: punctual.campaign(str(file), str(Path(work, "dask.parquet")), client=client))
                 same = file.with_suffix(".parquet").read_bytes() == Path(work, "dask.parquet").read_bytes()

@@ -235,6 +235,7 @@ pub struct State {
 /// One instance of an FMU, of either version of FMI.
 pub struct Instance {
     product: Product,
+    /// The version of FMI in `product`: every call asks for it.
     fmi: FmiVersion,
     /// Type and causality by value reference: checked at every read and write, in few bytes.
     kinds: Vec<(BaseType, Causality, Variability)>,
