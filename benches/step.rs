@@ -59,7 +59,7 @@ fn steps(c: &mut Criterion) {
     filtered("step/bicycle, two barriers", two.expect("valid settings"));
     filtered("step/10 obstacles", goal_and_obstacles(10));
     filtered("step/60 obstacles", goal_and_obstacles(60));
-    let boxed = |builder: FilterBuilder| builder.bounds(&[-60.0; 2], &[60.0; 2]).expect("valid bounds");
+    let boxed = |builder: FilterBuilder| builder.bounds(&[-200.0; 2], &[200.0; 2]).expect("valid bounds");
     filtered("step/point mass, box", boxed(goal(PointMass)));
     filtered("step/10 obstacles, box", boxed(goal_and_obstacles(10)));
     // The default: the constraint over the sampling period, with the state at its end predicted.

@@ -33,8 +33,8 @@ const ASIDE_OF_STEP: f64 = 0.05;
 const SECANT: f64 = 30.0;
 /// The shortest step, as a part of the input, that shows a bend beyond round-off.
 const TELLING: f64 = 1e-7;
-/// The last change of λ in Newton's method, as a part of it: the next one would be its square.
-const ROOT: f64 = 1e-6;
+/// The next change of λ in Newton's method, as a part of it, that is left out: 3/2 λH times the square of the last one.
+const ROOT: f64 = SKIPPED * MET;
 /// Steps of Newton's method for λ.
 const MULTIPLIER_STEPS: usize = 6;
 
@@ -149,76 +149,91 @@ impl<const M: usize> Bent<M> {
     /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where λH is not small.
     #[inline(always)]
     fn nearest(&self, back: &[f64; M]) -> Option<([f64; M], f64)> {
-        let square = product(&self.normal, &self.normal);
-        let mut lambda = -(self.value + product(&self.normal, back)) / square;
-        let flat = self.hessian == [[0.0; M]; M];
-        let mut step = core::array::from_fn(|i| lambda * self.normal[i] + back[i]);
-        if flat {
-            return Some((step, lambda));
-        }
+        /// The largest square of λH.
+        const SMALL: f64 = CONVERGING * CONVERGING;
+        // As seen from u_ref, it is value + cᵀw + ½ wᵀHw of the way w, and (K) is w = λ (I − λH)⁻¹ c.
+        let bend = self.turn(back);
+        let c: [f64; M] = core::array::from_fn(|i| self.normal[i] + bend[i]);
+        let middle = core::array::from_fn(|i| self.normal[i] + 0.5 * bend[i]);
+        let value = self.value + product(back, &middle);
+        let inverse = Resolvent::of(&self.hessian, &c);
+        let size: f64 = self.hessian.iter().map(|h| product(h, h)).sum();
+        // The first terms in λ are value + λ cᵀc + 3/2 λ² cᵀHc.
+        let (square, bent) = (product(&c, &c), product(&c, &self.turn(&c)));
+        let mut lambda = -value * square / (square * square - 1.5 * value * bent);
         for _ in 0..MULTIPLIER_STEPS {
-            let factors = Factors::of(lambda, &self.hessian)?;
-            step = factors.solve(core::array::from_fn(|i| lambda * self.normal[i] + back[i]));
-            let turn = self.turn(&step);
-            let there: [f64; M] = core::array::from_fn(|i| self.normal[i] + turn[i]);
-            let value = self.value + product(&self.normal, &step) + 0.5 * product(&step, &turn);
-            let change = -value / product(&there, &factors.solve(there));
-            lambda += change;
-            if change.abs() <= ROOT * lambda.abs() {
-                let moved = factors.solve(there);
-                return Some((core::array::from_fn(|i| step[i] + change * moved[i]), lambda));
+            // Not-a-number is not small.
+            let turn = lambda * lambda * size;
+            if !matches!(turn, 0.0..=SMALL) {
+                return None;
             }
+            // ∇r there is w/λ, so that H w is what it differs from c by.
+            let (there, rate) = inverse.at(lambda);
+            let moved: [f64; M] = core::array::from_fn(|i| there[i] + lambda * rate[i]);
+            let both = core::array::from_fn(|i| c[i] + there[i]);
+            let missing = value + 0.5 * lambda * product(&there, &both);
+            let change = -missing / product(&there, &moved);
+            let part = change / lambda;
+            if 2.25 * turn * (part * part) * (part * part) <= ROOT * ROOT {
+                let way = core::array::from_fn(|i| lambda * there[i] + change * moved[i] + back[i]);
+                return Some((way, lambda + change));
+            }
+            lambda += change;
         }
         None
     }
 }
 
-/// I − λH = L D Lᵀ.
-struct Factors<const M: usize> {
-    below: Matrix<M>,
-    per_diagonal: [f64; M],
+/// (I − λH)⁻¹ c as a function of λ: polynomials over the characteristic one, by the recurrence of Faddeev and LeVerrier
+/// (F. R. Gantmacher, *The Theory of Matrices*, vol. 1, chapter IV, section 5).
+struct Resolvent<const M: usize> {
+    /// The coefficients of the numerator, from the constant one on.
+    numerator: [[f64; M]; M],
+    /// Those of det(I − λH) after the constant one, which is 1.
+    determinant: [f64; M],
 }
 
-impl<const M: usize> Factors<M> {
-    /// `None` where the matrix has lost half of its diagonal.
+impl<const M: usize> Resolvent<M> {
     #[inline(always)]
-    fn of(lambda: f64, hessian: &Matrix<M>) -> Option<Self> {
-        let mut factors = Self { below: [[0.0; M]; M], per_diagonal: [0.0; M] };
-        let mut diagonal = [0.0; M];
-        for j in 0..M {
-            let mut d = 1.0 - lambda * hessian[j][j];
-            for k in 0..j {
-                d -= factors.below[j][k] * factors.below[j][k] * diagonal[k];
+    fn of(hessian: &Matrix<M>, c: &[f64; M]) -> Self {
+        let mut of = Self { numerator: [*c; M], determinant: [0.0; M] };
+        let mut power = *hessian;
+        for k in 0..M {
+            let mut trace = 0.0;
+            for i in 0..M {
+                trace += power[i][i];
             }
-            if d < CONVERGING {
-                return None;
-            }
-            (diagonal[j], factors.per_diagonal[j]) = (d, 1.0 / d);
-            for i in j + 1..M {
-                let mut sum = -lambda * hessian[i][j];
-                for k in 0..j {
-                    sum -= factors.below[i][k] * factors.below[j][k] * diagonal[k];
+            of.determinant[k] = -trace / (k + 1) as f64;
+            if k + 1 < M {
+                for i in 0..M {
+                    power[i][i] += of.determinant[k];
                 }
-                factors.below[i][j] = sum * factors.per_diagonal[j];
+                of.numerator[k + 1] = core::array::from_fn(|i| product(&power[i], c));
+                // H is symmetric, and so is every polynomial in it.
+                power = core::array::from_fn(|i| core::array::from_fn(|j| product(&hessian[i], &power[j])));
             }
         }
-        Some(factors)
+        of
     }
 
+    /// The vector, and its derivative by λ.
     #[inline(always)]
-    fn solve(&self, mut b: [f64; M]) -> [f64; M] {
-        for i in 0..M {
-            for k in 0..i {
-                b[i] -= self.below[i][k] * b[k];
+    fn at(&self, lambda: f64) -> ([f64; M], [f64; M]) {
+        let (mut over, mut rate) = (self.numerator[M - 1], [0.0; M]);
+        for coefficient in self.numerator[..M - 1].iter().rev() {
+            for i in 0..M {
+                rate[i] = rate[i] * lambda + over[i];
+                over[i] = over[i] * lambda + coefficient[i];
             }
         }
-        for i in (0..M).rev() {
-            b[i] *= self.per_diagonal[i];
-            for k in i + 1..M {
-                b[i] -= self.below[k][i] * b[k];
-            }
+        let (mut under, mut change) = (self.determinant[M - 1], 0.0);
+        for k in (0..M).rev() {
+            change = change * lambda + under;
+            under = under * lambda + if k == 0 { 1.0 } else { self.determinant[k - 1] };
         }
-        b
+        let per = 1.0 / under;
+        let value: [f64; M] = core::array::from_fn(|i| over[i] * per);
+        (value, core::array::from_fn(|i| (rate[i] - value[i] * change) * per))
     }
 }
 
@@ -455,7 +470,7 @@ mod tests {
     /// The way solves (K), from wherever it begins.
     #[test]
     fn the_nearest_point_of_a_bent_row() {
-        let u_ref = [0.1, 0.3];
+        let u_ref = [-0.8, 0.1];
         let mut answers = [[-1.1, -0.4], [-0.9, -0.2]].map(|u: [f64; 2]| {
             let back = [u_ref[0] - u[0], u_ref[1] - u[1]];
             let (step, lambda) = inside(u).nearest(&back).expect("a bend that is not large");
