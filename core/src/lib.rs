@@ -93,6 +93,7 @@ pub mod dynamics;
 pub mod elementary;
 pub mod error;
 pub mod filter;
+pub mod interval;
 pub mod jet;
 pub mod judge;
 pub mod lie;

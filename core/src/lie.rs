@@ -33,6 +33,7 @@ use nalgebra::SVector;
 use crate::barrier::Barrier;
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind};
+use crate::interval::Interval;
 use crate::jet::{Response, Taylor};
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
@@ -245,6 +246,14 @@ where
 
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
         *out = ahead::value_along::<B, NX>(&self.barrier, t, path);
+    }
+
+    fn value_over(&self, time: Interval, x: &[Interval]) -> Option<Interval> {
+        Some(ahead::value_over::<B, NX>(&self.barrier, time, x))
+    }
+
+    fn last_over(&self, time: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+        Some(ahead::last_over::<B, NX>(&self.barrier, time, path))
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {

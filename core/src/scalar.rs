@@ -2,6 +2,7 @@
 //! numbers ([`f64`]), on first derivatives ([`Dual`](crate::jet::Dual)) and on Taylor series
 //! ([`Taylor`](crate::jet::Taylor)).
 
+use core::cmp::Ordering;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use num_traits::{One, Zero};
@@ -58,6 +59,13 @@ pub trait Scalar:
     #[must_use]
     fn powf(self, exponent: f64) -> Self;
 
+    /// How its value compares with that of `other`. `None` where that is not known: one is not a number, or both are
+    /// [enclosures](crate::interval::Interval) that overlap.
+    #[inline]
+    fn compare(self, other: Self) -> Option<Ordering> {
+        self.value().partial_cmp(&other.value())
+    }
+
     /// |`self`|, with the derivatives of `self` itself at the kink 0.
     #[must_use]
     #[inline]
@@ -105,7 +113,8 @@ pub trait Scalar:
     #[must_use]
     #[inline]
     fn hypot(self, other: Self) -> Self {
-        if self.value() == 0.0 && other.value() == 0.0 {
+        let is_nothing = |v: Self| v.compare(Self::zero()) == Some(Ordering::Equal);
+        if is_nothing(self) && is_nothing(other) {
             return Self::zero();
         }
         (self.squared() + other.squared()).sqrt()

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::dynamics::DynPlant;
+use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
     self, Ahead, COURSE, Coefficients, Course, DerivativeSource, Derivatives, Direction, Directional,
@@ -93,6 +94,8 @@ pub(crate) fn source<E: Equations>(
             flow_tangent: Flow::new(plant),
             courses: Along::new(plant, along, COURSE - 1),
             value: Along::new(plant, along, 1),
+            value_over: Along::new(plant, along, 1),
+            courses_over: Along::new(plant, along, COURSE - 1),
         };
         let (states, inputs) = (plant.states(), plant.inputs());
         Box::new(Source { work: RefCell::new(work), states, inputs, n })
@@ -284,10 +287,10 @@ impl<E: Equations, C: Scalar> Along<E, C> {
     }
 
     /// Computes the coefficients of h from those of the states, at time `t`, and returns h.
-    fn follow(&mut self, t: f64, state: impl Fn(usize, usize) -> C) -> C {
+    fn follow(&mut self, t: C, state: impl Fn(usize, usize) -> C) -> C {
         let Self { equations, series, n, .. } = self;
         let states = equations.states();
-        series.set(states + equations.inputs(), 0, C::from(t));
+        series.set(states + equations.inputs(), 0, t);
         for k in 0..=*n {
             for i in 0..states {
                 series.set(i, k, state(i, k));
@@ -349,6 +352,8 @@ struct Work<E, const M: usize> {
     flow_tangent: Flow<E, Tangent<f64>>,
     courses: Along<E, f64>,
     value: Along<E, f64>,
+    value_over: Along<E, Interval>,
+    courses_over: Along<E, Interval>,
 }
 
 impl<E, const M: usize> Source<E, M> {
@@ -448,6 +453,16 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         let courses = &mut self.work.borrow_mut().courses;
         courses.follow(t, |i, k| path[i][k]);
         *out = std::array::from_fn(|k| courses.series.get(courses.h, k));
+    }
+
+    fn value_over(&self, time: Interval, x: &[Interval]) -> Option<Interval> {
+        Some(self.work.borrow_mut().value_over.follow(time, |i, _| x[i]))
+    }
+
+    fn last_over(&self, time: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+        let courses = &mut self.work.borrow_mut().courses_over;
+        courses.follow(time, |i, k| path[i][k]);
+        Some(courses.series.get(courses.h, COURSE - 1))
     }
 }
 

@@ -11,6 +11,7 @@
 //! A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, section 13.2
 //! (doi:10.1137/1.9780898717761).
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use punctual_core::scalar::Scalar;
@@ -136,6 +137,7 @@ impl<C: Scalar> Series<C> {
         use Operation as O;
         let at = |register| self.get(register, k);
         let start = |register| self.get(register, 0);
+        let unknown = C::from(f64::NAN);
         match operation {
             O::Constant(_) => C::zero(),
             O::Add(a, b) => at(a) + at(b),
@@ -180,28 +182,22 @@ impl<C: Scalar> Series<C> {
                 }
                 sum * (1.0 / k as f64) / base[0]
             }
-            // The sign at order 0 decides the branch.
-            O::Abs(a) => {
-                if start(a).value() < 0.0 {
-                    -at(a)
-                } else {
-                    at(a)
-                }
-            }
-            O::Minimum(a, b) => {
-                if start(b).value() < start(a).value() {
-                    at(b)
-                } else {
-                    at(a)
-                }
-            }
-            O::Maximum(a, b) => {
-                if start(b).value() > start(a).value() {
-                    at(b)
-                } else {
-                    at(a)
-                }
-            }
+            // Order 0 decides the branch.
+            O::Abs(a) => match start(a).compare(C::zero()) {
+                Some(Ordering::Less) => -at(a),
+                Some(_) => at(a),
+                None => unknown,
+            },
+            O::Minimum(a, b) => match start(b).compare(start(a)) {
+                Some(Ordering::Less) => at(b),
+                Some(_) => at(a),
+                None => unknown,
+            },
+            O::Maximum(a, b) => match start(b).compare(start(a)) {
+                Some(Ordering::Greater) => at(b),
+                Some(_) => at(a),
+                None => unknown,
+            },
         }
     }
 }

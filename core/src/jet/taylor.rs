@@ -16,6 +16,7 @@
 //! (doi:10.1137/1.9780898717761).
 
 use core::array::from_fn;
+use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
@@ -62,6 +63,11 @@ impl<C: Scalar, const K: usize> Taylor<C, K> {
     #[inline]
     pub fn derivative(&self, k: usize) -> C {
         self.coefficients[k] * (1..=k).map(|i| i as f64).product::<f64>()
+    }
+
+    /// The value at a kink, of whose derivatives nothing is known.
+    fn kinked(value: C) -> Self {
+        Self { coefficients: from_fn(|k| if k == 0 { value } else { C::from(f64::NAN) }) }
     }
 
     /// `Σ_{i=1}^{k−1+last} i a_i b_{k−i}`, the sum in the recurrences of `y' = a' b`; with
@@ -183,6 +189,47 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
     #[inline]
     fn value(self) -> f64 {
         self.coefficients[0].value()
+    }
+
+    #[inline]
+    fn compare(self, other: Self) -> Option<Ordering> {
+        self.coefficients[0].compare(other.coefficients[0])
+    }
+
+    #[inline]
+    fn abs(self) -> Self {
+        match self.compare(Self::from(0.0)) {
+            Some(Ordering::Less) => -self,
+            Some(_) => self,
+            None => Self::kinked(self.coefficients[0].abs()),
+        }
+    }
+
+    #[inline]
+    fn min(self, other: Self) -> Self {
+        match other.compare(self) {
+            Some(Ordering::Less) => other,
+            Some(_) => self,
+            None => Self::kinked(self.coefficients[0].min(other.coefficients[0])),
+        }
+    }
+
+    #[inline]
+    fn max(self, other: Self) -> Self {
+        match other.compare(self) {
+            Some(Ordering::Greater) => other,
+            Some(_) => self,
+            None => Self::kinked(self.coefficients[0].max(other.coefficients[0])),
+        }
+    }
+
+    /// Of the two quotients the one that does not exceed 1.
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        let by_y = self.coefficients[0].abs().compare(x.coefficients[0].abs()) == Some(Ordering::Greater);
+        let mut angle = if by_y { -(x / self).atan() } else { (self / x).atan() };
+        angle.coefficients[0] = self.coefficients[0].atan2(x.coefficients[0]);
+        angle
     }
 
     /// Each pair of a Cauchy product once.

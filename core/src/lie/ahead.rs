@@ -18,6 +18,7 @@ use nalgebra::SVector;
 use super::{COURSE, Course, Direction};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, rk4};
+use crate::interval::Interval;
 use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
@@ -273,6 +274,31 @@ where
 {
     let states = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
     barrier.value(Taylor::time(t), &states).coefficients
+}
+
+/// `barrier` on enclosures of time and states. Once for a barrier.
+#[inline(never)]
+pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, x: &[Interval]) -> Interval
+where
+    B: Barrier<NX>,
+{
+    barrier.value(time, &SVector::from_column_slice(x))
+}
+
+/// The last coefficient of the course of `barrier` on enclosures of time and of those of the states. Once for a barrier.
+#[inline(never)]
+pub(super) fn last_over<B, const NX: usize>(
+    barrier: &B,
+    time: Interval,
+    path: &[[Interval; COURSE]],
+) -> Interval
+where
+    B: Barrier<NX>,
+{
+    let states = SVector::<Taylor<Interval, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
+    let mut course = Taylor::<Interval, COURSE>::time(0.0);
+    course.coefficients[0] = time;
+    barrier.value(course, &states).coefficients[COURSE - 1]
 }
 
 /// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead, for k < `K`. Leaves the

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length};
+use crate::interval::Interval;
 
 /// Most states that a picked source may have.
 const MAX_PICKED: usize = 32;
@@ -131,6 +132,22 @@ impl Predict for Embedded {
         for (&pick, own) in self.picks.iter().zip(own) {
             out[pick] = own;
         }
+    }
+
+    fn value_over(&self, time: Interval, x: &[Interval]) -> Option<Interval> {
+        let mut own = [Interval::ALL; MAX_PICKED];
+        for (own, &pick) in own.iter_mut().zip(&self.picks) {
+            *own = x[pick];
+        }
+        self.source.predict()?.value_over(time, &own[..self.picks.len()])
+    }
+
+    fn last_over(&self, time: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+        let mut own = [[Interval::ALL; COURSE]; MAX_PICKED];
+        for (own, &pick) in own.iter_mut().zip(&self.picks) {
+            *own = path[pick];
+        }
+        self.source.predict()?.last_over(time, &own[..self.picks.len()])
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {

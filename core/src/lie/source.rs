@@ -2,6 +2,7 @@
 
 use super::{Ahead, Derivatives};
 use crate::MAX_RELATIVE_DEGREE;
+use crate::interval::Interval;
 
 /// A supplier of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
 /// [`external`](super::external()) takes the derivatives from whoever computes them, and a user's own code can be another.
@@ -101,6 +102,17 @@ pub trait Predict {
 
     /// Writes the course of h along `path`, the courses of all states from `t` on.
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
+
+    /// An enclosure of h on a stretch of a path, by those of the time (s) and of each state there. The default has none: then
+    /// what bends h between the instants at which it is looked at is not seen.
+    fn value_over(&self, _time: Interval, _x: &[Interval]) -> Option<Interval> {
+        None
+    }
+
+    /// The same for the last coefficient of the course of h that begins anywhere on that stretch.
+    fn last_over(&self, _time: Interval, _path: &[[Interval; COURSE]]) -> Option<Interval> {
+        None
+    }
 
     /// The least value of h from `t` on while the state stays `x`; for sets that move. The default knows none.
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {

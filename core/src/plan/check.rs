@@ -2,10 +2,13 @@
 //!
 //! Under one input, state and h are followed by their Taylor [courses](crate::lie::Course) in pieces. A piece ends where the
 //! last terms of a state no longer vanish, and is halved while the course of a state is not a solution in its middle or at its
-//! end. On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
-//! less its last terms and less four times what the course misses h by at four instants. Where that does not decide, the
-//! piece is halved for this h. So it is assumed that plant and h are analytic on a piece, or that what bends them shows at
-//! these instants.
+//! end. So it is assumed that what bends the plant on a piece shows there.
+//!
+//! On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
+//! less its last terms and less four times what the course misses h by at four instants. What bends h between them shows in
+//! [enclosures](crate::interval): of h on the piece, or of the last coefficient of a course that begins anywhere on it, which
+//! by Taylor's theorem is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
+//! source has no enclosures, it is assumed that h bends as those instants show.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -15,6 +18,7 @@ use super::law::{Brake, Reference};
 use super::model::Model;
 use super::{Integral, Requirement};
 use crate::MAX_INPUTS;
+use crate::interval::Interval;
 use crate::lie::{COURSE, Course};
 use crate::scalar::all_finite;
 
@@ -156,6 +160,9 @@ pub(super) struct Walk<'a> {
     path: Vec<Course>,
     point: Vec<f64>,
     rate: Vec<f64>,
+    /// Enclosures of states and of their courses on a piece.
+    states: Vec<Interval>,
+    courses: Vec<[Interval; COURSE]>,
     pieces: u32,
     witness: Witness,
     started: f64,
@@ -181,6 +188,8 @@ impl<'a> Walk<'a> {
             path: vec![[0.0; COURSE]; x.len()],
             point: x.to_vec(),
             rate: x.to_vec(),
+            states: Vec::with_capacity(x.len()),
+            courses: Vec::with_capacity(x.len()),
             pieces: 0,
             witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
             started: t,
@@ -357,6 +366,15 @@ impl<'a> Walk<'a> {
     /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from`.
     fn least(&mut self, i: usize, path: &[Course], (from, dt): (f64, f64), halvings: u32) -> f64 {
         let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
+        let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
+        // Far from its edge no more need be known.
+        let time = Interval::new(from, from + dt);
+        self.states.clear();
+        self.states.extend(path.iter().map(|c| course::over(c, dt, 1)[0]));
+        let over = model.value_over(time, &self.states).map(|over| over.low);
+        if let Some(low) = over.filter(|low| *low >= needed && low - margin >= tightest) {
+            return low;
+        }
         let mut h = [0.0; COURSE];
         model.value_along(from, path, &mut h);
         let (mut least, mut missed) = (h[0], 0.0_f64);
@@ -372,12 +390,24 @@ impl<'a> Walk<'a> {
             (least, missed) = (least.min(value), missed.max((value - at(&h, after)).abs()));
         }
         let bound = course::least(&h, dt) - course::last_terms(&h, dt) - MISSED * missed;
-        let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
         let slack = bound - margin;
-        let decides = bound >= needed
-            && (slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS);
-        if decides || least < needed || halvings == 0 {
+        let is_sharp =
+            slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
+        if least < needed {
             return bound.min(least);
+        }
+        if bound >= needed && is_sharp || halvings == 0 {
+            // Whatever bends h between these instants: by what it takes on the piece, or by Taylor's theorem.
+            let enclosed = over.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
+                self.courses.clear();
+                self.courses.extend(path.iter().map(|c| course::over(c, dt, COURSE)));
+                h[COURSE - 1] =
+                    model.last_over(time, &self.courses).map_or(f64::NEG_INFINITY, |last| last.low);
+                low.max(course::least(&h, dt))
+            });
+            if enclosed >= needed || halvings == 0 {
+                return bound.min(least).min(enclosed);
+            }
         }
         let half = 0.5 * dt;
         let left = self.least(i, path, (from, half), halvings - 1);

@@ -1,6 +1,7 @@
 //! Arithmetic of [`Course`]s: polynomials in the time since their begin.
 
 use crate::elementary::powf;
+use crate::interval::Interval;
 use crate::lie::{COURSE, Course};
 
 /// Highest power.
@@ -59,6 +60,18 @@ pub(super) fn least(course: &Course, dt: f64) -> f64 {
     (0..COURSE).map(coefficient).fold(f64::INFINITY, f64::min)
 }
 
+/// The coefficients `orders` of the course from anywhere within `dt` s on: each is that of the middle, give or take what the
+/// higher ones change it by within half of `dt`.
+pub(super) fn over(course: &Course, dt: f64, orders: usize) -> [Interval; COURSE] {
+    let (middle, half) = (shifted(course, 0.5 * dt), 0.5 * dt);
+    let mut over = [Interval::ALL; COURSE];
+    for (k, over) in over.iter_mut().enumerate().take(orders) {
+        let wide = (k + 1..COURSE).rev().fold(0.0, |sum, j| (sum + CHOICES[j][k] * middle[j].abs()) * half);
+        *over = Interval::new(middle[k] - wide, middle[k] + wide);
+    }
+    over
+}
+
 /// C(n, k) at `[n][k]`.
 const CHOICES: [[f64; COURSE]; COURSE] = {
     let mut table = [[0.0; COURSE]; COURSE];
@@ -108,6 +121,21 @@ mod tests {
         }
         // A line is its own bound.
         assert_eq!(least(&[3.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0), 1.0);
+    }
+
+    #[test]
+    fn every_later_begin_is_enclosed() {
+        let found = over(&FALLS, 0.8, COURSE);
+        for i in 0..=100 {
+            let later = shifted(&FALLS, 0.8 * f64::from(i) / 100.0);
+            for (found, wanted) in found.iter().zip(later) {
+                // A hundred operations on numbers up to a few hundred.
+                assert!(found.low <= wanted + 1e-11 && wanted <= found.high + 1e-11, "{found:?} {wanted}");
+            }
+        }
+        // Of a line the bounds are its ends.
+        let line = [3.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(over(&line, 1.0, 1)[0], Interval::new(1.0, 3.0));
     }
 
     #[test]

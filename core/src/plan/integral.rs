@@ -1,6 +1,7 @@
 //! Plans behind an integrator: the plant is given the mean of an integral over each period.
 
-use crate::lie::{Ahead, Course, Predict};
+use crate::interval::Interval;
+use crate::lie::{Ahead, COURSE, Course, Predict};
 
 /// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
 #[derive(Clone, Copy, Debug)]
@@ -43,5 +44,13 @@ impl Predict for Limit<'_> {
     fn value_along(&self, _: f64, path: &[Course], out: &mut Course) {
         *out = path[self.state].map(|c| self.sign * c);
         out[0] -= self.sign * self.limit;
+    }
+
+    fn value_over(&self, _: Interval, x: &[Interval]) -> Option<Interval> {
+        Some((x[self.state] - self.limit) * self.sign)
+    }
+
+    fn last_over(&self, _: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+        Some(path[self.state][COURSE - 1] * self.sign)
     }
 }
