@@ -17,6 +17,7 @@ mod access;
 mod arrays;
 mod derivative;
 mod exchange;
+mod places;
 
 use punctual_core::jet::Tangent;
 use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
@@ -24,6 +25,7 @@ use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Varia
 use crate::block::{self, Block, BlockState, Values};
 use crate::configuration::{Configuration, ConfigurationError, FmiVersion};
 use crate::product::{Access, Product};
+pub use places::Place;
 
 /// Times in s that differ by no more than this and [`TIME_ROUND_OFF`] are the same communication point:
 /// importers count time in nanoseconds.
@@ -584,57 +586,84 @@ impl Instance {
     /// present communication point; for a plant also one after it (a part of its motion would be missing); a
     /// refusal by the block itself. Importers that ignore the error see it in the outputs of a filter: `status`
     /// is `invalid_input` and `u` nearest 0 until an input is set or a step made.
+    #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.check(Call::DoStep)?;
-        let done = self.step(t, h);
-        if done.is_err() {
-            self.block.show_refusal(&mut self.values);
-            self.fresh = true;
-        }
-        done
+        self.step(t, h).map_err(|reason| self.refused_step(reason))
+    }
+
+    /// Shows in the outputs that a step was refused.
+    #[cold]
+    fn refused_step(&mut self, reason: Failure) -> Failure {
+        self.block.show_refusal(&mut self.values);
+        self.fresh = true;
+        reason
     }
 
     /// What the user should know of the last step, if there is anything; said once.
+    #[inline]
     pub fn notice(&mut self) -> Option<String> {
-        let Mistimed::First { given, restored } = self.mistimed else { return self.block.notice() };
+        match self.mistimed {
+            Mistimed::First { given, restored } => Some(self.tell_mistimed(given, restored)),
+            Mistimed::Never | Mistimed::Told => self.block.notice(),
+        }
+    }
+
+    #[cold]
+    fn tell_mistimed(&mut self, given: f64, restored: f64) -> String {
         self.mistimed = Mistimed::Told;
-        Some(format!(
+        format!(
             "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
              as every such step after a restore (told once)"
-        ))
+        )
     }
 
     fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
-        let same = SAME_TIME + TIME_ROUND_OFF * t.abs();
-        if !t.is_finite() || t < self.time - same {
-            return Err(format!(
-                "currentCommunicationPoint is {t}, must be finite and not before the present one, {}",
-                self.time
-            ));
+        let (end, same) = (t + h, SAME_TIME + TIME_ROUND_OFF * t.abs());
+        // An end that is finite has a finite time and step.
+        if t < self.time - same || end > self.stop + same || !(h >= 0.0 && end.is_finite()) {
+            return Err(self.out_of_time(t, h, same));
         }
-        if !(h.is_finite() && h >= 0.0) {
-            return Err(format!("communicationStepSize is {h} at t = {t}, must be finite and >= 0"));
+        if t - self.time <= same {
+            self.make_step(self.time, h, end)
+        } else {
+            self.step_after_gap(t, h, same)
         }
-        if !(t + h).is_finite() {
-            return Err(format!("the step of {h} s at t = {t} ends at {}, must be finite", t + h));
+    }
+
+    /// The reason why no step is made from `t` by `h` seconds.
+    #[cold]
+    fn out_of_time(&self, t: f64, h: f64, same: f64) -> Failure {
+        let (time, end) = (self.time, t + h);
+        if !t.is_finite() || t < time - same {
+            format!("currentCommunicationPoint is {t}, must be finite and not before the present one, {time}")
+        } else if !(h.is_finite() && h >= 0.0) {
+            format!("communicationStepSize is {h} at t = {t}, must be finite and >= 0")
+        } else if !end.is_finite() {
+            format!("the step of {h} s at t = {t} ends at {end}, must be finite")
+        } else {
+            format!("the step of {h} s at t = {t} ends at {end}, must end by stopTime = {}", self.stop)
         }
-        if t + h > self.stop + same {
-            return Err(format!(
-                "the step of {h} s at t = {t} ends at {}, must end by stopTime = {}",
-                t + h,
-                self.stop
-            ));
-        }
-        let (start, mistimed, unbroken) =
-            if t - self.time <= same { (self.time, false, self.unbroken) } else { self.after_gap(t, same)? };
-        self.block.step(start, h, &mut self.values)?;
+    }
+
+    /// Makes the step from `t`, which is more than `same` after the present time.
+    #[cold]
+    fn step_after_gap(&mut self, t: f64, h: f64, same: f64) -> Result<(), Failure> {
+        let (start, mistimed, unbroken) = self.after_gap(t, same)?;
+        self.make_step(start, h, start + h)?;
         if mistimed && matches!(self.mistimed, Mistimed::Never) {
             self.mistimed = Mistimed::First { given: t, restored: start };
         }
-        let end = if mistimed { start + h } else { t + h };
+        self.unbroken = Unbroken { end: self.time, ..unbroken };
+        Ok(())
+    }
+
+    /// Makes the step from `start` by `h` seconds, which ends at `end`.
+    fn make_step(&mut self, start: f64, h: f64, end: f64) -> Result<(), Failure> {
+        self.block.step(start, h, &mut self.values)?;
         // Not before `start`: a tiny step from a time that is early by round-off must not go back.
         self.time = end.max(start);
-        self.unbroken = Unbroken { end: self.time, ..unbroken };
+        self.unbroken.end = self.time;
         self.stepped = true;
         self.last_step = h;
         self.fresh = true;
@@ -814,18 +843,23 @@ impl Instance {
     }
 
     /// Computes the outputs if inputs changed since the last time.
+    #[inline]
     fn refresh(&mut self) {
+        if !self.fresh {
+            self.refresh_stale();
+        }
+    }
+
+    #[inline(never)]
+    fn refresh_stale(&mut self) {
         let lazy = match self.mode {
             Mode::INITIALIZATION | Mode::EVENT | Mode::CONTINUOUS => true,
             Mode::STEP => self.block.direct_feedthrough(),
             _ => false,
         };
-        if self.fresh || !lazy {
-            return;
-        }
         // Contradicting parameters are an error when initialization ends. Until then the outputs stay as they
         // are.
-        if self.configured || self.configure().is_ok() {
+        if lazy && (self.configured || self.configure().is_ok()) {
             self.block.output(self.time, &mut self.values);
             self.fresh = true;
         }

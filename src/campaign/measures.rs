@@ -32,13 +32,13 @@ pub struct Measures {
     columns: Vec<Column>,
 }
 
-/// Findings on one run.
+/// Findings on a filter in one run.
 struct Seen {
-    /// Number of steps by filter and status.
-    counts: Vec<[u64; Status::ALL.len()]>,
-    /// Number of steps by filter and standing of its promise.
-    standings: Vec<[u64; Standing::ALL.len()]>,
-    /// Largest size by filter and input.
+    /// Number of steps by status.
+    counts: [u64; Status::ALL.len()],
+    /// Number of steps by standing of its promise.
+    standings: [u64; Standing::ALL.len()],
+    /// Largest size by input.
     peaks: Vec<f64>,
 }
 
@@ -126,33 +126,26 @@ impl Measures {
         self.row(number, choice, &self.nothing(), &[], Some(why))
     }
 
-    fn nothing(&self) -> Seen {
-        Seen {
-            counts: vec![[0; Status::ALL.len()]; self.filters.len()],
-            standings: vec![[0; Standing::ALL.len()]; self.filters.len()],
-            peaks: vec![0.0; self.filters.iter().map(|filter| filter.inputs.len()).sum()],
-        }
+    fn nothing(&self) -> Vec<Seen> {
+        let nothing = |filter: &FilterPlan| Seen {
+            counts: [0; Status::ALL.len()],
+            standings: [0; Standing::ALL.len()],
+            peaks: vec![0.0; filter.inputs.len()],
+        };
+        self.filters.iter().map(nothing).collect()
     }
 
     /// Takes the values of a communication point.
-    fn see(&self, seen: &mut Seen, values: &[f64]) {
-        let mut values = values.iter().copied();
-        let mut next = || values.next().unwrap_or(f64::NAN);
-        let mut peaks = seen.peaks.iter_mut();
-        for ((filter, counts), standings) in
-            self.filters.iter().zip(&mut seen.counts).zip(&mut seen.standings)
-        {
-            if let Some(count) = counts.get_mut(next() as usize) {
-                *count += 1;
+    fn see(&self, seen: &mut [Seen], mut values: &[f64]) {
+        for (filter, seen) in self.filters.iter().zip(seen) {
+            count(&mut seen.counts, &mut values);
+            if filter.assured {
+                count(&mut seen.standings, &mut values);
             }
-            if filter.assured
-                && let Some(count) = standings.get_mut(next() as usize)
-            {
-                *count += 1;
+            for (peak, u) in seen.peaks.iter_mut().zip(values) {
+                *peak = peak.max(u.abs());
             }
-            for peak in peaks.by_ref().take(filter.inputs.len()) {
-                *peak = peak.max(next().abs());
-            }
+            values = values.get(seen.peaks.len()..).unwrap_or_default();
         }
     }
 
@@ -160,7 +153,7 @@ impl Measures {
         &self,
         number: u64,
         choice: &Choice,
-        seen: &Seen,
+        seen: &[Seen],
         promises: &[Promise],
         failure: Option<&Error>,
     ) -> Row {
@@ -169,11 +162,10 @@ impl Measures {
         row.extend([Cell::Count(number), Cell::Count(choice.seed)]);
         row.extend(choice.values.iter().map(|value| Cell::Number(Some(*value))));
         let verdict = row.len();
-        let mut peaks = seen.peaks.iter();
-        for ((filter, counts), standings) in self.filters.iter().zip(&seen.counts).zip(&seen.standings) {
+        for (filter, Seen { counts, standings, peaks }) in self.filters.iter().zip(seen) {
             row.extend(counts.iter().map(|count| Cell::Count(*count)));
             row.extend(standings.iter().filter(|_| filter.assured).map(|count| Cell::Count(*count)));
-            row.extend(peaks.by_ref().take(filter.inputs.len()).map(|peak| Cell::Number(Some(*peak))));
+            row.extend(peaks.iter().map(|peak| Cell::Number(Some(*peak))));
             for plan in &filter.barriers {
                 let promise = promises.iter().find(|promise| promise.barrier == plan.name);
                 let kept = promise.is_some_and(Promise::kept);
@@ -198,6 +190,15 @@ impl Measures {
         let failure = Cell::Text(failure.map(ToString::to_string));
         row.splice(verdict..verdict, [Cell::Flag(success), failure]);
         row
+    }
+}
+
+/// Counts a step under the first of `values`, which is taken away.
+fn count(counts: &mut [u64], values: &mut &[f64]) {
+    if let Some(number) = values.split_off_first()
+        && let Some(count) = counts.get_mut(*number as usize)
+    {
+        *count += 1;
     }
 }
 

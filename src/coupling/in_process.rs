@@ -2,11 +2,12 @@
 //! the shared library runs, so the numbers are the same bit for bit.
 
 use punctual_fmu::configuration::Configuration;
-use punctual_fmu::instance::Instance;
+use punctual_fmu::instance::{Instance, Place};
+use punctual_modeldescription::BaseType;
 
 use super::Participant;
 use crate::error::Error;
-use crate::host::DataType;
+use crate::host::{Causality, DataType};
 
 /// An instance in this process.
 pub struct InProcess {
@@ -34,6 +35,17 @@ impl InProcess {
     fn refused(&self, call: &str, reason: &str) -> Error {
         let time = crate::error::brief_time(self.instance.time());
         Error::broken(format!("{call} of {} at t = {time} s", self.name), format!("was refused: {reason}"))
+    }
+
+    /// The same of a call that touches `places`: that of the first one's type, among those of reals, integers and booleans.
+    #[cold]
+    fn refused_at(&self, places: &[Place], [real, integer, boolean]: [&str; 3], reason: &str) -> Error {
+        let call = match places.first() {
+            Some(Place::Boolean(_)) => boolean,
+            Some(Place::Integer(_)) => integer,
+            _ => real,
+        };
+        self.refused(call, reason)
     }
 }
 
@@ -102,6 +114,29 @@ impl Participant for InProcess {
             _ => ("fmi2SetInteger", self.instance.set_integer(references, &self.whole)),
         };
         done.map_err(|reason| self.refused(call, &reason))
+    }
+
+    fn place(&self, causality: Causality, of: DataType, reference: u32) -> Option<Place> {
+        let base = match of {
+            DataType::Float64 => BaseType::Real,
+            DataType::Boolean => BaseType::Boolean,
+            _ => BaseType::Integer,
+        };
+        self.instance.place(causality, base, reference)
+    }
+
+    fn read(&mut self, places: &[Place], values: &mut [f64]) -> Result<(), Error> {
+        let done = self.instance.read(places, values);
+        done.map_err(|reason| {
+            self.refused_at(places, ["fmi2GetReal", "fmi2GetInteger", "fmi2GetBoolean"], &reason)
+        })
+    }
+
+    fn write(&mut self, places: &[Place], values: &[f64]) -> Result<(), Error> {
+        let done = self.instance.write(places, values);
+        done.map_err(|reason| {
+            self.refused_at(places, ["fmi2SetReal", "fmi2SetInteger", "fmi2SetBoolean"], &reason)
+        })
     }
 
     fn set_text(&mut self, _reference: u32, _texts: &[String]) -> Result<(), Error> {

@@ -92,7 +92,7 @@ impl Layout {
     pub(super) fn sources(&self, component: usize, links: &[Link]) -> Vec<Source> {
         let of_link = |link: &Link| {
             let (input, output) = (self.slot(link.to)?, self.slot(link.from)?);
-            Some(Source { input, output, factor: link.factor, offset: link.offset })
+            Some(Source::new(input, output, link.factor, link.offset))
         };
         links.iter().filter(|link| link.to.component == component).filter_map(of_link).collect()
     }

@@ -27,7 +27,7 @@ use super::promises::{self, Promise, Watched};
 use super::starts::{Start, Values};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
-use crate::host::{DataType, Description, Participant};
+use crate::host::{Causality, DataType, Description, Participant};
 use crate::recording::{Column, Recording};
 
 /// A component while it runs.
@@ -45,6 +45,14 @@ struct Member<P> {
 }
 
 impl<P: Participant> Member<P> {
+    /// Takes over what feeds its inputs.
+    fn set_inputs(&mut self, values: &mut [f64]) -> Result<(), Error> {
+        for source in &self.sources {
+            source.transfer(values);
+        }
+        self.inputs.write(&mut self.participant, values)
+    }
+
     /// Sets its start values: those of structural parameters, or the others.
     fn set_starts(&mut self, structural: bool) -> Result<(), Error> {
         let participant = &mut self.participant;
@@ -219,10 +227,14 @@ impl<P: Participant> Simulation<P> {
             .collect();
         // Make the participants.
         let mut members = Vec::new();
-        for (component, [states, direct, inputs]) in groups.into_iter().enumerate() {
+        for (component, [mut states, mut direct, mut inputs]) in groups.into_iter().enumerate() {
             let starts = std::mem::take(&mut starts[component]);
+            let participant = participant(component)?;
+            states.place(&participant, Causality::Output);
+            direct.place(&participant, Causality::Output);
+            inputs.place(&participant, Causality::Input);
             members.push(Member {
-                participant: participant(component)?,
+                participant,
                 constants: layout.constants(component, descriptions[component], &links, &starts),
                 starts,
                 states,
@@ -361,26 +373,28 @@ impl<P: Participant> Simulation<P> {
     }
 
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
-        let mut end = self.grid.steps();
+        let (mut end, mut time) = (self.grid.steps(), self.grid.time(0));
         for k in 0..self.grid.steps() {
-            let (time, step) = (self.grid.time(k), self.grid.step(k));
+            let step = self.grid.step(k);
             self.check_stop(time)?;
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
-                self.set_inputs(c)?;
-                self.members[c].participant.do_step(time, step)?;
+                let member = &mut self.members[c];
+                member.set_inputs(&mut self.values)?;
+                member.participant.do_step(time, step)?;
                 self.read_direct(c, time)?;
             }
-            for i in 0..self.delayed.len() {
-                self.set_inputs(self.delayed[i])?;
+            for &c in &self.delayed {
+                self.members[c].set_inputs(&mut self.values)?;
             }
             self.take(recorder, k, time);
-            for i in 0..self.delayed.len() {
-                self.members[self.delayed[i]].participant.do_step(time, step)?;
+            for &c in &self.delayed {
+                self.members[c].participant.do_step(time, step)?;
             }
             self.change(k + 1)?;
+            time = self.grid.time(k + 1);
             for c in 0..self.members.len() {
-                self.read_states(c, self.grid.time(k + 1))?;
+                self.read_states(c, time)?;
             }
             if self.is_ended(k + 1) {
                 end = k + 1;
@@ -388,17 +402,16 @@ impl<P: Participant> Simulation<P> {
             }
         }
         // Feedthrough outputs at the stop time, for FMUs that compute them on reading.
-        let (k, time) = (end, self.grid.time(end));
-        recorder.end_at(k);
+        recorder.end_at(end);
         for i in 0..self.direct.len() {
             let c = self.direct[i];
-            self.set_inputs(c)?;
+            self.members[c].set_inputs(&mut self.values)?;
             self.read_direct(c, time)?;
         }
-        for i in 0..self.delayed.len() {
-            self.set_inputs(self.delayed[i])?;
+        for &c in &self.delayed {
+            self.members[c].set_inputs(&mut self.values)?;
         }
-        self.take(recorder, k, time);
+        self.take(recorder, end, time);
         Ok(())
     }
 
@@ -410,8 +423,8 @@ impl<P: Participant> Simulation<P> {
         for k in 0..self.grid.steps() {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
             self.check_stop(time)?;
-            for c in 0..self.members.len() {
-                self.set_inputs(c)?;
+            for member in &mut self.members {
+                member.set_inputs(&mut self.values)?;
             }
             self.take(recorder, k, time);
             for member in &mut self.members {
@@ -427,8 +440,8 @@ impl<P: Participant> Simulation<P> {
                 break;
             }
         }
-        for c in 0..self.members.len() {
-            self.set_inputs(c)?;
+        for member in &mut self.members {
+            member.set_inputs(&mut self.values)?;
         }
         recorder.end_at(end);
         self.take(recorder, end, self.grid.time(end));
@@ -437,12 +450,14 @@ impl<P: Participant> Simulation<P> {
 
     /// Whether an FMU asked for the end of the run in the step to point `k`; told in a note.
     fn is_ended(&mut self, k: u64) -> bool {
-        let Some(member) = self.members.iter().find(|member| member.participant.asks_to_end()) else {
-            return false;
-        };
-        let (name, time) = (member.participant.name(), brief_time(self.grid.time(k)));
+        let asking = self.members.iter().position(|member| member.participant.asks_to_end());
+        asking.inspect(|c| self.note_end(*c, k)).is_some()
+    }
+
+    #[cold]
+    fn note_end(&mut self, c: usize, k: u64) {
+        let (name, time) = (self.members[c].participant.name(), brief_time(self.grid.time(k)));
         self.notes.push(format!("{name} asked to end the run at t = {time} s (terminateSimulation)"));
-        true
     }
 
     /// Sets start values and initialises. In initialization mode, outputs and inputs are passed on until nothing
@@ -478,14 +493,13 @@ impl<P: Participant> Simulation<P> {
             for member in &mut self.members {
                 member.states.read(&mut member.participant, &mut self.values)?;
             }
-            for i in 0..self.direct.len() {
-                let c = self.direct[i];
-                self.set_inputs(c)?;
+            for &c in &self.direct {
                 let member = &mut self.members[c];
+                member.set_inputs(&mut self.values)?;
                 member.direct.read(&mut member.participant, &mut self.values)?;
             }
-            for i in 0..self.delayed.len() {
-                self.set_inputs(self.delayed[i])?;
+            for &c in &self.delayed {
+                self.members[c].set_inputs(&mut self.values)?;
             }
             let unchanged = before.len() == self.values.len()
                 && before.iter().zip(&self.values).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -510,34 +524,24 @@ impl<P: Participant> Simulation<P> {
         self.promises.iter_mut().for_each(|watched| watched.see(time, &self.values));
     }
 
-    fn set_inputs(&mut self, c: usize) -> Result<(), Error> {
-        let member = &mut self.members[c];
-        for source in &member.sources {
-            source.transfer(&mut self.values);
-        }
-        member.inputs.write(&mut member.participant, &self.values)
-    }
-
     fn read_states(&mut self, c: usize, time: f64) -> Result<(), Error> {
         let member = &mut self.members[c];
-        member.states.read(&mut member.participant, &mut self.values)?;
-        let slots = member.states.real_slots();
-        self.check_finite(slots, time);
+        let reals = member.states.read(&mut member.participant, &mut self.values)?;
+        if !reals.iter().all(|value| value.is_finite()) {
+            let slots = member.states.real_slots();
+            self.report_not_finite(slots, time);
+        }
         Ok(())
     }
 
     fn read_direct(&mut self, c: usize, time: f64) -> Result<(), Error> {
         let member = &mut self.members[c];
-        member.direct.read(&mut member.participant, &mut self.values)?;
-        let slots = member.direct.real_slots();
-        self.check_finite(slots, time);
-        Ok(())
-    }
-
-    fn check_finite(&mut self, slots: std::ops::Range<usize>, time: f64) {
-        if !self.values[slots.clone()].iter().all(|value| value.is_finite()) {
+        let reals = member.direct.read(&mut member.participant, &mut self.values)?;
+        if !reals.iter().all(|value| value.is_finite()) {
+            let slots = member.direct.real_slots();
             self.report_not_finite(slots, time);
         }
+        Ok(())
     }
 
     #[cold]

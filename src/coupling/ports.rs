@@ -1,8 +1,12 @@
 //! The values of a run: one vector of doubles, in which every output and every connected input has a slot. They
 //! come from and go to instances without allocation.
 
+use std::ops::Range;
+
+use punctual_fmu::instance::Place;
+
 use crate::error::Error;
-use crate::host::{DataType, Participant, Variable};
+use crate::host::{Causality, DataType, Participant, Variable};
 
 /// Variables of one component that are read or written together, one type after another; their slots follow one
 /// another in this order. Real ones come first.
@@ -11,6 +15,8 @@ pub(super) struct Group {
     first: usize,
     reals: usize,
     parts: Vec<Part>,
+    /// Where an instance in this process keeps them all, one for each slot.
+    places: Option<Vec<Place>>,
 }
 
 /// The variables of one type.
@@ -65,28 +71,58 @@ impl Group {
     }
 
     /// The slots of the real variables.
-    pub(super) fn real_slots(&self) -> std::ops::Range<usize> {
+    pub(super) fn real_slots(&self) -> Range<usize> {
         self.first..self.first + self.reals
     }
 
-    /// Reads all variables of the group from the instance into their slots.
-    pub(super) fn read<P: Participant>(&self, instance: &mut P, values: &mut [f64]) -> Result<(), Error> {
-        let mut slot = self.first;
-        for part in &self.parts {
-            let next = slot + part.slots;
-            instance.get(part.of, &part.references, &mut values[slot..next])?;
-            slot = next;
+    /// Asks the instance where it keeps the variables, which all have this causality.
+    pub(super) fn place<P: Participant>(&mut self, instance: &P, causality: Causality) {
+        let places = self.parts.iter().flat_map(|part| {
+            part.references.iter().map(move |reference| instance.place(causality, part.of, *reference))
+        });
+        let places: Option<Vec<_>> = places.collect();
+        // An array has several slots by one reference.
+        let slots: usize = self.parts.iter().map(|part| part.slots).sum();
+        self.places = places.filter(|places| places.len() == slots);
+    }
+
+    /// Reads all variables of the group from the instance into their slots. Returns the real ones.
+    #[inline(always)]
+    pub(super) fn read<'a, P: Participant>(
+        &self,
+        instance: &mut P,
+        values: &'a mut [f64],
+    ) -> Result<&'a [f64], Error> {
+        match &self.places {
+            Some(places) if places.is_empty() => Ok(&[]),
+            Some(places) => {
+                let own = &mut values[self.first..][..places.len()];
+                instance.read(places, own)?;
+                Ok(&own[..self.reals])
+            }
+            None => {
+                self.each_part(|part, slots| instance.get(part.of, &part.references, &mut values[slots]))?;
+                Ok(&values[self.real_slots()])
+            }
         }
-        Ok(())
     }
 
     /// Writes all variables of the group from their slots to the instance.
+    #[inline]
     pub(super) fn write<P: Participant>(&self, instance: &mut P, values: &[f64]) -> Result<(), Error> {
+        match &self.places {
+            Some(places) if places.is_empty() => Ok(()),
+            Some(places) => instance.write(places, &values[self.first..][..places.len()]),
+            None => self.each_part(|part, slots| instance.set(part.of, &part.references, &values[slots])),
+        }
+    }
+
+    #[inline(never)]
+    fn each_part(&self, mut call: impl FnMut(&Part, Range<usize>) -> Result<(), Error>) -> Result<(), Error> {
         let mut slot = self.first;
         for part in &self.parts {
-            let next = slot + part.slots;
-            instance.set(part.of, &part.references, &values[slot..next])?;
-            slot = next;
+            call(part, slot..slot + part.slots)?;
+            slot += part.slots;
         }
         Ok(())
     }
@@ -96,23 +132,26 @@ impl Group {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Source {
     /// The slot of the input.
-    pub(super) input: usize,
+    input: usize,
     /// The slot of the output.
-    pub(super) output: usize,
-    /// Factor (units of the input per unit of the output) and offset (unit of the input).
-    pub(super) factor: f64,
-    /// See `factor`.
-    pub(super) offset: f64,
+    output: usize,
+    /// Factor (units of the input per unit of the output) and offset (unit of the input); `None` in a plain connection.
+    scale: Option<[f64; 2]>,
 }
 
 impl Source {
+    /// From `output` to `input`, which are slots, by a factor and an offset.
+    pub(super) fn new(input: usize, output: usize, factor: f64, offset: f64) -> Self {
+        Self { input, output, scale: (factor != 1.0 || offset != 0.0).then_some([factor, offset]) }
+    }
+
     /// Takes the value over. A plain connection copies the bits, the sign of zero included.
     pub(super) fn transfer(&self, values: &mut [f64]) {
         let value = values[self.output];
-        values[self.input] = match (self.factor == 1.0, self.offset == 0.0) {
-            (true, true) => value,
-            (_, true) => self.factor * value,
-            _ => self.factor * value + self.offset,
+        values[self.input] = match self.scale {
+            None => value,
+            Some([factor, 0.0]) => factor * value,
+            Some([factor, offset]) => factor * value + offset,
         };
     }
 }
@@ -152,9 +191,9 @@ mod tests {
     #[test]
     fn a_plain_connection_keeps_the_sign_of_zero() {
         let mut values = [-0.0, 1.0, 3.0];
-        Source { input: 1, output: 0, factor: 1.0, offset: 0.0 }.transfer(&mut values);
+        Source::new(1, 0, 1.0, 0.0).transfer(&mut values);
         assert_eq!(values[1].to_bits(), (-0.0_f64).to_bits());
-        Source { input: 1, output: 2, factor: -2.0, offset: 0.5 }.transfer(&mut values);
+        Source::new(1, 2, -2.0, 0.5).transfer(&mut values);
         assert_eq!(values[1], -5.5);
     }
 }

@@ -174,12 +174,9 @@ impl Zeros {
     /// How much farther the state goes at once, from zeros, than in the next step, where the zeros were none of the plant.
     const JUMP: f64 = 10.0;
 
-    /// Takes the state `x` at `time` (s). `is_valid` says whether the sample there, or where outputs come late that of the
+    /// Takes the state `x` at `time` (s) until it is known how far that moved. `is_valid` says whether the sample there, or where outputs come late that of the
     /// point before, is one that deadlines count from.
     fn see(&mut self, time: f64, x: impl Iterator<Item = f64> + Clone, is_valid: bool, prompt: bool) {
-        if self.moved.is_some() {
-            return;
-        }
         self.first.get_or_insert(time);
         match &self.after {
             None => {
@@ -407,7 +404,7 @@ impl Watched {
         let is = |number: Phase| phase == f64::from(number as i32);
         let status = Status::from_number(values[self.status] as i32);
         let invalid = status.is_some_and(Status::is_abstention);
-        if !self.states.is_empty() {
+        if !self.states.is_empty() && self.run.zeros.moved.is_none() {
             let x = self.states.iter().map(|slot| values[*slot]);
             self.run.zeros.see(time, x, !invalid, self.prompt);
         }

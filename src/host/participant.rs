@@ -5,6 +5,9 @@ use std::ffi::c_void;
 use std::ptr::NonNull;
 use std::rc::Rc;
 
+use punctual_fmu::instance::Place;
+use punctual_modeldescription::Causality;
+
 use super::number::DataType;
 use super::{Description, Fmu, LogMessage, Version};
 use crate::error::Error;
@@ -95,6 +98,30 @@ pub trait Participant {
     ///
     /// As above; also for a number that the type cannot hold.
     fn set(&mut self, of: DataType, references: &[u32], values: &[f64]) -> Result<(), Error>;
+
+    /// Where it keeps an input or output, if it is an instance in this process: then [`Self::read`] and [`Self::write`]
+    /// are faster than [`Self::get`] and [`Self::set`].
+    fn place(&self, _causality: Causality, _of: DataType, _reference: u32) -> Option<Place> {
+        None
+    }
+
+    /// Reads the numbers at `places`, which it told.
+    ///
+    /// # Errors
+    ///
+    /// As above; also where it tells none.
+    fn read(&mut self, _places: &[Place], _values: &mut [f64]) -> Result<(), Error> {
+        Err(Error::broken(self.name(), "tells no places to read"))
+    }
+
+    /// Writes numbers to `places`, which it told as those of inputs.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn write(&mut self, _places: &[Place], _values: &[f64]) -> Result<(), Error> {
+        Err(Error::broken(self.name(), "tells no places to write"))
+    }
 
     /// Writes a text, or all texts of an array.
     ///
@@ -214,7 +241,7 @@ macro_rules! calls {
     )*};
 }
 
-/// All calls but `reset`.
+/// All calls but `reset` and those by places.
 macro_rules! calls_of_a_run {
     () => {
         calls! {
@@ -237,9 +264,17 @@ impl Participant for Box<dyn Participant> {
         self.as_ref().name()
     }
 
-    calls! { reset(); }
+    calls! {
+        reset();
+        read(places: &[Place], values: &mut [f64]);
+        write(places: &[Place], values: &[f64]);
+    }
 
     calls_of_a_run! {}
+
+    fn place(&self, causality: Causality, of: DataType, reference: u32) -> Option<Place> {
+        self.as_ref().place(causality, of, reference)
+    }
 
     fn asks_to_end(&self) -> bool {
         self.as_ref().asks_to_end()

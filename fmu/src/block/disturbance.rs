@@ -38,9 +38,19 @@ impl Disturbance {
         }
     }
 
+    /// Whether it changes the inputs.
+    pub(super) fn is_of_inputs(&self) -> bool {
+        !self.inputs.is_empty()
+    }
+
     /// Adds to the inputs `u` the disturbance in force at time `t` (s) under `seed`.
     pub(super) fn push(&self, seed: f64, t: f64, u: &mut [f64]) {
         self.add(Kind::Input, &self.inputs, seed, t, u);
+    }
+
+    /// Whether it changes the measurements.
+    pub(super) fn is_of_measurements(&self) -> bool {
+        !self.measurements.is_empty()
     }
 
     /// Adds to the measurements `x` the disturbance in force at time `t` (s) under `seed`.

@@ -4,7 +4,7 @@ use punctual_core::filter::{BarrierReport, NoDerivative, SampleDerivative, Stand
 use punctual_core::lie::Direction;
 use punctual_core::plan::Failure;
 
-use super::{Block, BlockState, Values};
+use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading};
 use crate::{FilterLoop, LoopState};
@@ -22,8 +22,6 @@ pub(super) struct FilterBlock {
     noticed: Option<Standing>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
     kept: LoopState,
-    /// Scratch: the safe input.
-    u: Vec<f64>,
     /// Scratch: the derivative of a sample.
     change: SampleDerivative,
 }
@@ -35,22 +33,11 @@ impl FilterBlock {
     ) -> Result<Self, ConfigurationError> {
         let (layout, enumerated) = (product.layout, product.enumerated().collect());
         let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
-        let (kept, u) = (filter.state(), vec![0.0; layout.inputs]);
+        let kept = filter.state();
         let change = SampleDerivative::default();
         let noticed = None;
         let rearm_seen = false;
-        Ok(Self {
-            configuration,
-            parameters,
-            layout,
-            enumerated,
-            filter,
-            rearm_seen,
-            noticed,
-            kept,
-            u,
-            change,
-        })
+        Ok(Self { configuration, parameters, layout, enumerated, filter, rearm_seen, noticed, kept, change })
     }
 
     fn rearm_index(&self) -> usize {
@@ -61,6 +48,12 @@ impl FilterBlock {
     fn inputs<'a>(&self, reals: &'a [f64]) -> [&'a [f64]; 2] {
         let (x, rest) = reals.split_at(self.layout.states);
         [x, &rest[..self.layout.inputs]]
+    }
+
+    /// The same, and the place of the safe input.
+    fn inputs_and_u<'a>(&self, reals: &'a mut [f64]) -> ([&'a [f64]; 2], &'a mut [f64]) {
+        let (inputs, outputs) = reals.split_at_mut(self.layout.outputs);
+        (self.inputs(inputs), &mut outputs[..self.layout.inputs])
     }
 
     /// Re-arms where `values` has a rising edge; returns whether it did. The state before is in `kept`.
@@ -76,32 +69,6 @@ impl FilterBlock {
     /// Expected time in s for which the input is held, where no step gives it.
     fn hold(&self) -> f64 {
         self.filter.last_hold().unwrap_or(self.configuration.experiment.step_size)
-    }
-
-    /// Computes one sample at `t`. With the length of a step it is remembered, else only looked at.
-    fn sample(&mut self, t: f64, step: Option<f64>, values: &mut Values) -> Result<(), String> {
-        let rising = self.rearm(values);
-        let hold = step.filter(|h| *h > 0.0).unwrap_or_else(|| self.hold());
-        let [x, u_ref] = self.inputs(&values.reals);
-        let (filter, u) = (&mut self.filter, &mut self.u);
-        let before = filter.integrated();
-        let done = match step {
-            None => filter.peek(t, hold, x, u_ref, u),
-            Some(h) => {
-                let stepped = filter.step(t, hold, x, u_ref, u).map(drop);
-                if h == 0.0 {
-                    filter.set_integrated(before);
-                }
-                stepped.map(|()| filter.integrated())
-            }
-        };
-        let written = done.map(|integrated| self.write(t, values, integrated)).map_err(|e| e.to_string());
-        if step.is_some() {
-            self.rearm_seen = values.booleans[self.rearm_index()];
-        } else if rising {
-            self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
-        }
-        written
     }
 
     /// Where the promise stands, where plans are followed. They are not where a parameter that was set since asks for what
@@ -154,15 +121,12 @@ impl FilterBlock {
         }
     }
 
-    /// Writes the last sample to the outputs, in the order of the variable table.
+    /// Writes the last sample to the outputs after the safe input, in the order of the variable table.
     fn write(&self, t: f64, values: &mut Values, integrated: f64) {
         let report = self.filter.filter().report();
-        let mut at = self.layout.outputs;
-        values.reals[at..][..self.u.len()].copy_from_slice(&self.u);
-        at += self.u.len();
+        let at = self.layout.outputs + self.layout.inputs;
         values.integers[at] = report.status as i32;
-        at += 1;
-        write_barriers(&report.barriers, at, values);
+        write_barriers(&report.barriers, at + 1, values);
         if let Some((standing, _)) = self.standing() {
             self.write_standing(standing, t, values);
         }
@@ -185,9 +149,19 @@ impl Block for FilterBlock {
     }
 
     fn output(&mut self, t: f64, values: &mut Values) {
+        let rising = self.rearm(values);
+        let hold = self.hold();
+        let ([x, u_ref], u) = self.inputs_and_u(&mut values.reals);
         // The lengths are those of the filter by construction, since the table was built from it.
-        let sampled = self.sample(t, None, values);
-        debug_assert!(sampled.is_ok(), "{sampled:?}");
+        let peeked = self.filter.peek(t, hold, x, u_ref, u);
+        debug_assert!(peeked.is_ok(), "{peeked:?}");
+        if let Ok(integrated) = peeked {
+            self.write(t, values, integrated);
+        }
+        if rising {
+            let restored = self.filter.restore(&self.kept);
+            debug_assert!(restored.is_ok(), "{restored:?}");
+        }
     }
 
     fn differentiate(
@@ -228,7 +202,18 @@ impl Block for FilterBlock {
     }
 
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
-        self.sample(t, Some(h), values)
+        self.rearm(values);
+        let hold = if h > 0.0 { h } else { self.hold() };
+        let ([x, u_ref], u) = self.inputs_and_u(&mut values.reals);
+        let before = self.filter.integrated();
+        let stepped = self.filter.step(t, hold, x, u_ref, u).map(drop).map_err(|e| in_words(&e));
+        if h == 0.0 {
+            self.filter.set_integrated(before);
+        }
+        self.rearm_seen = values.booleans[self.rearm_index()];
+        stepped?;
+        self.write(t, values, self.filter.integrated());
+        Ok(())
     }
 
     fn notice(&mut self) -> Option<String> {
@@ -262,7 +247,6 @@ impl Block for FilterBlock {
             enumerated: _,
             noticed: _,
             kept: _,
-            u: _,
             change: _,
         } = self;
         match state {
@@ -325,10 +309,12 @@ impl Block for FilterBlock {
 /// Writes the outputs of `reports`, one barrier after another from index `at` on.
 fn write_barriers(reports: &[BarrierReport], at: usize, values: &mut Values) {
     const LEN: usize = BARRIER_OUTPUTS.len();
-    let (reals, _) = values.reals[at..].as_chunks_mut();
-    let (integers, _) = values.integers[at..].as_chunks_mut();
-    let (booleans, _) = values.booleans[at..].as_chunks_mut();
-    for (((b, reals), integers), booleans) in reports.iter().zip(reals).zip(integers).zip(booleans) {
+    for (i, b) in reports.iter().enumerate() {
+        let at = at + i * LEN;
+        let reals = values.reals[at..].first_chunk_mut();
+        let integers = values.integers[at..].first_chunk_mut();
+        let booleans = values.booleans[at..].first_chunk_mut();
+        let (Some(reals), Some(integers), Some(booleans)) = (reals, integers, booleans) else { return };
         // Each row of the table is known where this is compiled, so that reading it costs nothing.
         macro_rules! write_rows {
             ($($row:literal)*) => {

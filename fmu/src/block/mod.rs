@@ -162,6 +162,12 @@ pub trait Block: Send {
     fn show_refusal(&self, values: &mut Values);
 }
 
+/// The reason why the core refuses a step. Out of the way, since it does so where it is misused alone.
+#[cold]
+fn in_words(error: &punctual_core::Error) -> String {
+    error.to_string()
+}
+
 /// The block of a product, configured with its start values.
 ///
 /// # Errors

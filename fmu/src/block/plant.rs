@@ -5,7 +5,7 @@ use punctual_core::jet::Tangent;
 use punctual_models::Functions;
 
 use super::disturbance::Disturbance;
-use super::{Block, BlockState, Values};
+use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, PlantSection, updated};
 use crate::product::Layout;
 
@@ -62,6 +62,60 @@ impl PlantBlock {
     fn seed(&self, values: &Values) -> f64 {
         self.seed.map_or(0.0, |place| values.reals[self.layout.parameters + place])
     }
+
+    /// The reason why there is no step from `t` (s) under the inputs `u`, of which one is not finite.
+    #[cold]
+    fn refused_input(&self, u: &[f64], t: f64) -> String {
+        let i = not_finite(u);
+        let name = self.configuration.plant.input_name(i);
+        format!("u.{name} is {}, must be finite for a step from t = {t}", u[i])
+    }
+
+    /// The reason why there is no step of `h` s, which would take so many inner ones.
+    #[cold]
+    fn too_many(&self, substeps: f64, h: f64) -> String {
+        let inner = self.configuration.integration.inner_step;
+        format!(
+            "the step of {h} s needs {substeps} inner steps of {inner} s, must be at most {MOST_SUBSTEPS}"
+        )
+    }
+
+    /// The reason why the step from `t` by `h` (s) fails, after which one of the states is not finite.
+    #[cold]
+    fn lost_state(&self, t: f64, h: f64) -> String {
+        let i = not_finite(&self.next);
+        let name = self.configuration.plant.state_name(i);
+        let place = match &self.configuration.plant {
+            PlantSection::Expressions(own) => own.derivatives.get(name),
+            _ => None,
+        };
+        let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
+        format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i])
+    }
+
+    /// The first output that is not finite at time `t` (s) in the next state.
+    #[inline]
+    fn not_finite_output(&mut self, t: f64) -> Option<(usize, f64)> {
+        let at = |outputs: &mut Functions<f64>| {
+            outputs.at(t, |i| self.next[i]).enumerate().find(|(_, value)| !value.is_finite())
+        };
+        self.outputs.as_mut().and_then(at)
+    }
+
+    /// The reason why that step fails, after which the output `i` is not finite.
+    #[cold]
+    fn lost_output(&self, i: usize, value: f64, t: f64, h: f64) -> String {
+        let output = &self.configuration.output[i];
+        format!(
+            "y.{} becomes {value} in the step from t = {t} by {h} s; it is {:?}",
+            output.name, output.expression
+        )
+    }
+}
+
+/// The first of `numbers` that is not finite; one of them is not.
+fn not_finite(numbers: &[f64]) -> usize {
+    numbers.iter().position(|v| !v.is_finite()).unwrap_or(0)
 }
 
 impl Block for PlantBlock {
@@ -83,7 +137,9 @@ impl Block for PlantBlock {
         let told = &mut values.reals[self.layout.outputs..self.layout.parameters];
         let (measured, others) = told.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
-        self.disturbance.blur(seed, t, measured);
+        if self.disturbance.is_of_measurements() {
+            self.disturbance.blur(seed, t, measured);
+        }
         if let Some(outputs) = &mut self.outputs {
             others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
         }
@@ -102,42 +158,31 @@ impl Block for PlantBlock {
 
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
         let u = &values.reals[..self.layout.inputs];
-        if let Some(i) = u.iter().position(|v| !v.is_finite()) {
-            let name = self.configuration.plant.input_name(i);
-            return Err(format!("u.{name} is {}, must be finite for a step from t = {t}", u[i]));
+        if !u.iter().all(|v| v.is_finite()) {
+            return Err(self.refused_input(u, t));
         }
         let substeps = self.configuration.integration.substeps(h);
         if substeps > MOST_SUBSTEPS {
-            return Err(format!(
-                "the step of {h} s needs {substeps} inner steps of {} s, must be at most {MOST_SUBSTEPS}",
-                self.configuration.integration.inner_step
-            ));
+            return Err(self.too_many(substeps, h));
         }
         self.next.copy_from_slice(&self.x);
-        let (inner, seed) = (h / substeps, self.seed(values));
-        for k in 0..substeps as u64 {
-            self.u.copy_from_slice(u);
-            self.disturbance.push(seed, t + k as f64 * inner, &mut self.u);
-            self.plant.rk4_step(&mut self.next, &self.u, inner).map_err(|e| e.to_string())?;
-        }
-        if let Some(i) = self.next.iter().position(|v| !v.is_finite()) {
-            let name = self.configuration.plant.state_name(i);
-            let place = match &self.configuration.plant {
-                PlantSection::Expressions(own) => own.derivatives.get(name),
-                _ => None,
+        let (inner, mut k) = (h / substeps, 0.0);
+        while k < substeps {
+            let held = if self.disturbance.is_of_inputs() {
+                self.u.copy_from_slice(u);
+                self.disturbance.push(self.seed(values), t + k * inner, &mut self.u);
+                &self.u
+            } else {
+                u
             };
-            let from = place.map_or_else(String::new, |e| format!("; its derivative is {e:?}"));
-            return Err(format!("x.{name} becomes {} in the step from t = {t} by {h} s{from}", self.next[i]));
+            self.plant.rk4_step(&mut self.next, held, inner).map_err(|e| in_words(&e))?;
+            k += 1.0;
         }
-        if let Some(outputs) = &mut self.outputs
-            && let Some((i, value)) =
-                outputs.at(t + h, |i| self.next[i]).enumerate().find(|(_, v)| !v.is_finite())
-        {
-            let output = &self.configuration.output[i];
-            return Err(format!(
-                "y.{} becomes {value} in the step from t = {t} by {h} s; it is {:?}",
-                output.name, output.expression
-            ));
+        if !self.next.iter().all(|v| v.is_finite()) {
+            return Err(self.lost_state(t, h));
+        }
+        if let Some((i, value)) = self.not_finite_output(t + h) {
+            return Err(self.lost_output(i, value, t, h));
         }
         std::mem::swap(&mut self.x, &mut self.next);
         self.output(t + h, values);
