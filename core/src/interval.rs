@@ -66,7 +66,7 @@ impl Interval {
 
     /// Whether it has a number `at` + k · 2π.
     fn turns_through(self, at: f64) -> bool {
-        ((self.low - at) / TAU).ceil() * TAU + at <= self.high
+        libm::ceil((self.low - at) / TAU) * TAU + at <= self.high
     }
 }
 

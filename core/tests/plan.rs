@@ -1381,3 +1381,25 @@ fn small_things_on_a_long_way_are_seen() {
     println!("{assured} of {seeds} ways have a plan");
     assert!(assured > 0);
 }
+
+/// A deadline by which no input arrives is not promised, however little it lies beside a sample.
+#[test]
+fn a_deadline_beside_a_sample_is_looked_at() {
+    const PERIOD: f64 = 0.1;
+    let random = &mut Random(5);
+    for _ in 0..16 {
+        let beside = random.between(-1.0, 1.0) * 10.0_f64.powf(random.between(-12.0, -6.0));
+        let deadline = 2.0 + 1e-6 * PERIOD + beside;
+        // From rest 20 m are all that 10 m/s² allow until then.
+        let goal = StateBound::at_least(0, 20.5).expect("valid bound");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[-10.0; 2], &[10.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let assurance = *filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("dimensions");
+        assert_eq!(assurance.standing, Standing::Refused, "{deadline}");
+    }
+}

@@ -274,8 +274,8 @@ impl<'a> Walk<'a> {
     fn move_to(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         // Requirements begin and end at nodes.
         while self.t < end {
-            let ahead = self.t + 1e-9 * (end - self.t);
-            let event = |node: f64, time: f64| if ahead < time && time < node { time } else { node };
+            let now = self.t;
+            let event = |node: f64, time: f64| if now < time && time < node { time } else { node };
             let node = self.requirements.iter().fold(end, |node, r| event(event(node, r.from), r.until));
             while self.t < node {
                 self.advance(u, node)?;
