@@ -111,6 +111,47 @@ impl MeasurementErrors {
     }
 }
 
+/// What h may fall short of its prediction by: errors η_j of h⁽ʲ⁾ at the sample, and a disturbance of h⁽ⁿ⁾ from there on up to
+/// W. τ s later it is Σ_{j<n} η_j τʲ/j! + W τⁿ/n!, exactly so where h is linear and the plant a chain of integrators
+/// (`docs/theory.md#between-samples`).
+#[derive(Clone, Copy)]
+pub(super) struct Shortfall {
+    coefficients: [f64; MAX_RELATIVE_DEGREE + 1],
+    /// The time in s between the sample and the instant from which the input acts.
+    delay: f64,
+}
+
+impl Shortfall {
+    /// `None` where nothing is off.
+    #[inline]
+    pub(super) fn new(errors: &[f64], disturbance: f64, delay: f64) -> Option<Self> {
+        if disturbance == 0.0 && errors.iter().all(|error| *error == 0.0) {
+            return None;
+        }
+        let mut coefficients = [0.0; MAX_RELATIVE_DEGREE + 1];
+        let mut factorial = 1.0;
+        for (j, (c, off)) in coefficients.iter_mut().zip(errors.iter().chain([&disturbance])).enumerate() {
+            factorial *= j.max(1) as f64;
+            *c = off / factorial;
+        }
+        Some(Self { coefficients, delay })
+    }
+
+    /// The part of the disturbance of h⁽ⁿ⁾ in it, `at` s after the input begins to act.
+    pub(super) fn of_disturbance(&self, n: usize, at: f64) -> f64 {
+        (0..n).fold(self.coefficients[n], |product, _| product * (at + self.delay))
+    }
+
+    /// It, and its slope, `at` s after the input begins to act.
+    pub(super) fn at(&self, at: f64) -> [f64; 2] {
+        let after = at + self.delay;
+        self.coefficients
+            .iter()
+            .rev()
+            .fold([0.0; 2], |[value, slope], c| [value * after + c, slope * after + value])
+    }
+}
+
 /// Whether `source` gives derivatives along a direction, a moment ahead too.
 pub(super) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
     if source.directional().is_some() && source.predict_directional().is_some() {

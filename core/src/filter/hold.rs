@@ -9,6 +9,7 @@
 //! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What [`MOST`]
 //! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
 
+use super::errors::Shortfall;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::elementary;
 use crate::lie::Predict;
@@ -59,6 +60,8 @@ pub(super) struct Hold<'a> {
     pub(super) t: f64,
     pub(super) x: &'a [f64],
     pub(super) u: &'a [f64],
+    /// What is taken off the predicted h.
+    pub(super) shortfall: Option<&'a Shortfall>,
 }
 
 impl Hold<'_> {
@@ -121,7 +124,8 @@ impl Hold<'_> {
     /// η and η̇ at the instant `at`, at which the state is `x`.
     fn node(&self, source: &dyn Predict, x: &[f64], at: f64) -> Node {
         let ahead = self.ahead(source, x, at, 0.0);
-        Node { at, h: ahead[0], slope: ahead[1] }
+        let [less, slope] = self.shortfall.map_or([0.0; 2], |shortfall| shortfall.at(at));
+        Node { at, h: ahead[0] - less, slope: ahead[1] - slope }
     }
 
     /// Derivatives of h `later` s after the instant `at`, at which the state is `x`.

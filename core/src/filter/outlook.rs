@@ -1,6 +1,7 @@
 //! The outlook of a sample: whether the held input keeps the promise at every instant until the next sample
 //! (`docs/theory.md#between-samples`).
 
+use super::errors::Shortfall;
 use super::hold::{Hold, Lowest};
 use super::search::Requirement;
 use super::{FixedTimeState, Phase, SAME_PERIOD};
@@ -15,6 +16,8 @@ pub(super) struct Outlook<'a> {
     pub(super) n: usize,
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, then L_fⁿh.
     pub(super) drift: &'a [f64; MAX_RELATIVE_DEGREE + 1],
+    /// What h may fall short of it by.
+    pub(super) shortfall: Option<&'a Shortfall>,
 }
 
 /// From when until when (s after the sample at `t`) a promise has h ≥ 0 while an input is held for `hold` s, if it has
@@ -37,6 +40,11 @@ impl Outlook<'_> {
     fn foreseen(&self, j: usize, highest: f64, s: f64) -> f64 {
         // Horner's scheme.
         (j..self.n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
+    }
+
+    /// The shortfall `s` seconds later.
+    fn short(&self, s: f64) -> f64 {
+        self.shortfall.map_or(0.0, |shortfall| shortfall.at(s)[0])
     }
 
     /// The most by which the terms of that polynomial after the first can move h.
@@ -70,7 +78,8 @@ impl Outlook<'_> {
         const ROUND_OFF: f64 = 1e-12;
         /// The part of h that must be left for the model not to be asked.
         const CLEAR: f64 = 0.5;
-        let h = self.drift[0];
+        // What is left at the end of the hold is the least: a shortfall grows.
+        let h = self.drift[0] - self.short(hold);
         let highest = self.drift[self.n] + dot(normal, held.u);
         // Far enough from the edge the model need not be asked. With n = 1 a set that moves faster than the samples
         // shows in no derivative that is known here; a turn by radians shows where the hold ends.
@@ -103,7 +112,7 @@ impl Outlook<'_> {
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)
-            .map(|i| Lowest { h: self.foreseen(0, highest, at(i)), at: at(i) })
+            .map(|i| Lowest { h: self.foreseen(0, highest, at(i)) - self.short(at(i)), at: at(i) })
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
@@ -118,10 +127,13 @@ impl Outlook<'_> {
         let ahead = lowest.map(|lowest| lowest.at).filter(|at| *at > 0.0)?;
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
         weights[0] = 1.0;
-        let floor = match promise.phase {
-            Phase::Stay => 0.5 * promise.margin.min(self.drift[0]).max(0.0),
-            _ => promise.margin,
-        };
+        // Errors of the measurement are in every row over a time.
+        let short = self.shortfall.map_or(0.0, |shortfall| shortfall.of_disturbance(self.n, ahead));
+        let floor = short
+            + match promise.phase {
+                Phase::Stay => 0.5 * promise.margin.min(self.drift[0] - short).max(0.0),
+                _ => promise.margin,
+            };
         let bound = PeriodBound { weights, floor, ..PeriodBound::ZERO };
         Some(Requirement::new(barrier, bound, ahead, self.n))
     }

@@ -5,7 +5,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use super::errors::{ErrorSlopes, MeasurementErrors};
+use super::errors::{ErrorSlopes, MeasurementErrors, Shortfall};
 use super::hold::Lowest;
 use super::outlook::Outlook;
 use super::step::Moment;
@@ -89,6 +89,8 @@ pub(super) struct SlotSample {
     pub(super) derivatives: Derivatives,
     /// Derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
     pub(super) slopes: Vec<ErrorSlopes>,
+    /// What h may fall short of its prediction by, if anything is off.
+    pub(super) shortfall: Option<Shortfall>,
     /// The least h⁽ⁿ⁾ that keeps the promise.
     pub(super) bound: DerivativeBound,
     /// The row on u that follows from it.
@@ -107,6 +109,7 @@ impl SlotSample {
             from: vec![0.0; states],
             derivatives: Derivatives::ZERO,
             slopes: Vec::new(),
+            shortfall: None,
             bound: DerivativeBound::NONE,
             row: Row::ZERO,
             enforcement: Enforcement::Hard { priority: 0 },
@@ -179,6 +182,8 @@ impl BarrierSlot {
         }
         let (promise, n) = (&mut promises[index], self.degree());
         let unsure = self.unsure(moment, errors);
+        let disturbance = self.promise.settings().disturbance;
+        self.now.shortfall = Shortfall::new(&unsure[..n], disturbance, moment.delay);
         let drift = self.now.derivatives.drift;
         let lowest: Stack = core::array::from_fn(|k| drift[k] - unsure[k]);
         let lowest = &lowest[..n];
@@ -229,7 +234,8 @@ impl BarrierSlot {
 
     /// The course of h until the next sample, as the derivatives foresee it.
     pub(super) fn outlook(&self) -> Outlook<'_> {
-        Outlook { n: self.degree(), drift: &self.now.derivatives.drift }
+        let SlotSample { derivatives, shortfall, .. } = &self.now;
+        Outlook { n: self.degree(), drift: &derivatives.drift, shortfall: shortfall.as_ref() }
     }
 
     /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.

@@ -247,7 +247,13 @@ impl SafetyFilter {
                 continue;
             }
             if let Some(span) = outlook::span(promise, moment.begin, [moment.hold, moment.long]) {
-                let held = Hold { source: slot.source.predict(), t: moment.begin, x: &slot.now.from, u };
+                let held = Hold {
+                    source: slot.source.predict(),
+                    t: moment.begin,
+                    x: &slot.now.from,
+                    u,
+                    shortfall: slot.now.shortfall.as_ref(),
+                };
                 slot.now.lowest = slot.outlook().look(promise, &held, &slot.now.row.normal, span, scratch);
                 breaks |= slot.now.lowest.is_some();
             }
