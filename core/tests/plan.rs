@@ -1403,3 +1403,32 @@ fn a_deadline_beside_a_sample_is_looked_at() {
         assert_eq!(assurance.standing, Standing::Refused, "{deadline}");
     }
 }
+
+/// Where the wanted input is no number at first, plans and rows count from different samples: what a plan no longer keeps is
+/// not called guaranteed.
+#[test]
+fn what_has_ended_is_not_guaranteed() {
+    let fence = StateBound::at_most(0, 5.0).expect("valid bound");
+    let goal = StateBound::at_least(0, 9.0).expect("valid bound");
+    let filter = SafetyFilter::builder(4, 2)
+        .barrier("fence", PointMass, fence, BarrierSettings::keeping())
+        .and_then(|b| b.window(Begin::AtOnce, End::At(3.0)))
+        .and_then(|b| b.barrier("goal", PointMass, goal, BarrierSettings::within(3.9)))
+        .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
+        .and_then(|b| b.sampling(Sampling::Period(0.1)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+    let (mut x, mut guaranteed) = ([0.0_f64; 4], 0);
+    for k in 0..45 {
+        let (mut u, wanted) = ([0.0; 2], if k < 10 { f64::NAN } else { 6.0 });
+        filter.step(0.1 * f64::from(k), &x, &[wanted, 0.0], &mut u).expect("dimensions");
+        let [fence, goal] = [0, 1].map(|i| filter.report().barriers[i].guaranteed);
+        guaranteed += u32::from(fence) + u32::from(goal);
+        assert!(!fence || x[0] <= 5.0, "{k}: {x:?}");
+        assert!(!goal || k < 40 || x[0] >= 9.0, "{k}: {x:?}");
+        x[0] += 0.1 * x[2] + 0.005 * u[0];
+        x[2] += 0.1 * u[0];
+    }
+    assert!(guaranteed > 50, "{guaranteed}");
+}

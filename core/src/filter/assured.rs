@@ -854,7 +854,9 @@ impl AssuredFilter {
                 (b.on_course, state.on_course) = (false, false);
                 b.slack = b.row.slack(u);
             }
-            if is_assured && promise.is_some() && b.phase != Phase::Released {
+            // Plans count from the first state, rows from the first sample that is whole: a promise may end before its row.
+            let stands = promise.as_ref().is_some_and(|promise| report.time < promise.until);
+            if is_assured && stands && b.phase != Phase::Released {
                 b.guaranteed = true;
                 (b.unmet_steps, state.unmet) = (0, None);
                 (b.blocked_by, b.deadlocked) = (None, false);
