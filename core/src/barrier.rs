@@ -25,8 +25,10 @@ use crate::scalar::Scalar;
 ///
 /// # Requirements
 ///
-/// h is smooth along trajectories, and its non-negative set is the one that is meant. The *shape* of h away
-/// from its zero level decides how much input the filter needs (see [`crate::barriers`]).
+/// h is smooth along trajectories, but for kinks by [`Scalar::min`], [`Scalar::max`] and [`Scalar::abs`]. A plan is checked
+/// between instants too, and sees those there, but not a branch that compares [`Scalar::value`]s ([`crate::interval`]). The
+/// non-negative set of h is the one that is meant. The *shape* of h away from its zero level decides how much input the filter
+/// needs (see [`crate::barriers`]).
 pub trait Barrier<const NX: usize> {
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S;
