@@ -187,6 +187,7 @@ fn modules_of_the_core_use_modules_above_them() {
         &["error", "real", "elementary"],
         &["scalar"],
         &["jet"],
+        &["interval"],
         &["dynamics"],
         &["barrier"],
         &["lie"],
