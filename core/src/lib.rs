@@ -46,7 +46,7 @@
 //!
 //! # Layers
 //!
-//! Each module uses only those above it: [`scalar`], [`jet`]; [`dynamics`] and [`barrier`]; [`lie`];
+//! Each module uses only those above it: [`scalar`], [`jet`], [`interval`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
 //! bounded inputs can do); `plan` (witnesses of a promise, a feature); [`filter`]. Beside it, [`barriers`] are regions and
 //! limits to use, and [`judge`] says what became of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate

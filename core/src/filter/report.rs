@@ -17,7 +17,8 @@ const DEADLOCK_TIME: f64 = 0.1;
 #[non_exhaustive]
 #[repr(u8)]
 pub enum Status {
-    /// u_ref satisfies every constraint; the input is u_ref, bit for bit.
+    /// u_ref satisfies every constraint; the input is u_ref, bit for bit. Where an input is integrated, that is its rate: the
+    /// input itself then differs from its u_ref as far as the integral does.
     #[default]
     Unchanged = 0,
     /// The input is the point nearest to u_ref that satisfies every constraint.
@@ -121,7 +122,8 @@ pub struct BarrierReport {
     pub h: f64,
     /// The phase of the barrier's promise.
     pub phase: Phase,
-    /// The lower bound on h that the constraint promises at this time, in the unit of h.
+    /// The value that the constraint aims to keep h above at this time, in the unit of h: the profile with the margin on top.
+    /// Held inputs use the margin up, so what is promised is this less [`Self::margin`].
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub profile: f64,
     /// Time to the deadline in s, 0 from the deadline on.
