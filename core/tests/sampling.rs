@@ -426,3 +426,39 @@ fn every_answer_is_optimal() {
         assert_eq!(filter.residuals(&[0.0; 2], u.as_slice()), Ok(None), "nothing was solved");
     }
 }
+
+/// A disturbance takes off h until the deadline too, where that lies within a hold: what is on course has h ≥ 0 under the
+/// worst one, at every instant from the deadline on. q' = u + w, so the motion is a line.
+#[test]
+fn what_is_on_course_stands_a_disturbance_between_samples() {
+    let mut on_course = 0;
+    for case in 0..60_u32 {
+        let part = |of: u32| f64::from(case * of % 61) / 61.0;
+        let (push, period, deadline) = (0.2 + 2.0 * part(7), 0.02 + 0.18 * part(23), 1.0 + 3.0 * part(37));
+        let settings = BarrierSettings {
+            disturbance: push,
+            margin: 0.05 * part(11),
+            ..BarrierSettings::within(deadline)
+        };
+        let mut filter = SafetyFilter::builder(1, 1)
+            .barrier("goal", Integrator::<1>, NonNegative, settings)
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut q = -1.0 - 8.0 * part(53);
+        for k in 0..(2.0 * deadline / period) as u32 {
+            let (t, mut u) = (f64::from(k) * period, [0.0]);
+            filter.step(t, &[q], &[-5.0], &mut u).expect("right dimensions");
+            let speaks = filter.report().barriers[0].on_course;
+            on_course += u32::from(speaks);
+            for i in 0..=40 {
+                let s = period * f64::from(i) / 40.0;
+                let h = q + (u[0] - push) * s;
+                // Round-off of numbers up to 10, and rows that are met to 1e-9.
+                assert!(!speaks || t + s < deadline || h > -1e-8, "case {case}, {s} s after {t} s: {h}");
+            }
+            q += (u[0] - push) * period;
+        }
+    }
+    assert!(on_course > 1000, "{on_course}");
+}
