@@ -174,8 +174,8 @@ impl Zeros {
     /// How much farther the state goes at once, from zeros, than in the next step, where the zeros were none of the plant.
     const JUMP: f64 = 10.0;
 
-    /// Takes the state `x` at `time` (s) until it is known how far that moved. `is_valid` says whether the sample there, or where outputs come late that of the
-    /// point before, is one that deadlines count from.
+    /// Takes the state `x` at `time` (s), until it is known how far that moved. `is_valid` says whether the sample there, or
+    /// where outputs come late that of the point before, is one that deadlines count from.
     fn see(&mut self, time: f64, x: impl Iterator<Item = f64> + Clone, is_valid: bool, prompt: bool) {
         self.first.get_or_insert(time);
         match &self.after {

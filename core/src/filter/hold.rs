@@ -1,10 +1,10 @@
 //! h between two samples, while an input is held (`docs/theory.md#between-samples`).
 //!
-//! Let η(σ) = h(t + σ) along the model under the held input. The model walks through the hold in parts, and η and η̇
-//! are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer two foresees η and η̇ at the
-//! middle one. Its error there bounds what the cubics of the two halves leave open: less than an eighth of it where η
-//! is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in twice as many
-//! parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
+//! Let η(σ) = h(t + σ) along the model under the held input, less what disturbances and errors may take off. The model walks
+//! through the hold in parts, and η and η̇ are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer two
+//! foresees η and η̇ at the middle one. Its error there bounds what the cubics of the two halves leave open: less than an
+//! eighth of it where η is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in
+//! twice as many parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
 //!
 //! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What [`MOST`]
 //! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
