@@ -41,8 +41,24 @@ impl Interval {
 
     /// From `low` to `high`; all numbers where one of them is not a number.
     #[must_use]
+    #[inline]
     pub fn new(low: f64, high: f64) -> Self {
-        if low.is_nan() || high.is_nan() { Self::ALL } else { Self { low, high } }
+        if low.is_nan() || high.is_nan() { Self::unknown() } else { Self { low, high } }
+    }
+
+    /// All numbers, out of the way of what is common.
+    #[cold]
+    fn unknown() -> Self {
+        Self::ALL
+    }
+
+    /// The product where a bound may be infinite. Nothing times anything is nothing, however large that may be.
+    #[cold]
+    fn product(self, other: Self) -> Self {
+        let product = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
+        let all = |a: f64| [product(a, other.low), product(a, other.high)];
+        let [[a, b], [c, d]] = [all(self.low), all(self.high)];
+        Self::around([a, b, c, d])
     }
 
     /// Whether `number` is among them.
@@ -55,13 +71,11 @@ impl Interval {
         Self::new(function(self.low), function(self.high))
     }
 
-    /// From the least to the largest of four.
+    /// From the least to the largest of four numbers.
+    #[inline]
     fn around(four: [f64; 4]) -> Self {
-        let all = |start: f64, pick: fn(f64, f64) -> f64| four.into_iter().fold(start, pick);
-        if four.iter().any(|v| v.is_nan()) {
-            return Self::ALL;
-        }
-        Self { low: all(f64::INFINITY, f64::min), high: all(f64::NEG_INFINITY, f64::max) }
+        let [a, b, c, d] = four;
+        Self { low: least(least(a, b), least(c, d)), high: largest(largest(a, b), largest(c, d)) }
     }
 
     /// Whether it has a number `at` + k · 2π.
@@ -70,7 +84,20 @@ impl Interval {
     }
 }
 
+/// The lesser of two numbers: one instruction, where one that looks for not-a-number has several.
+#[inline]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers.
+#[inline]
+fn largest(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 impl From<f64> for Interval {
+    #[inline]
     fn from(value: f64) -> Self {
         Self::new(value, value)
     }
@@ -78,6 +105,7 @@ impl From<f64> for Interval {
 
 impl Neg for Interval {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self { low: -self.high, high: -self.low }
     }
@@ -85,6 +113,7 @@ impl Neg for Interval {
 
 impl Add for Interval {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::new(self.low + other.low, self.high + other.high)
     }
@@ -92,6 +121,7 @@ impl Add for Interval {
 
 impl Sub for Interval {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -99,16 +129,12 @@ impl Sub for Interval {
 
 impl Mul for Interval {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
-        // Nothing times anything is nothing, however large that may be.
-        let product = |a: f64, b: f64| if a == 0.0 || b == 0.0 { 0.0 } else { a * b };
-        let [a, b] = [self.low, self.high];
-        Self::around([
-            product(a, other.low),
-            product(a, other.high),
-            product(b, other.low),
-            product(b, other.high),
-        ])
+        let [a, b] = [self.low * other.low, self.low * other.high];
+        let [c, d] = [self.high * other.low, self.high * other.high];
+        // Finite but where one of them is not, or near the largest numbers.
+        if ((a + b) + (c + d)).is_finite() { Self::around([a, b, c, d]) } else { self.product(other) }
     }
 }
 
@@ -127,13 +153,27 @@ macro_rules! with_numbers {
     ($($operator:ident $method:ident;)*) => {$(
         impl $operator<f64> for Interval {
             type Output = Self;
+            #[inline]
             fn $method(self, other: f64) -> Self {
                 self.$method(Self::from(other))
             }
         }
     )*};
 }
-with_numbers! { Add add; Sub sub; Mul mul; Div div; }
+with_numbers! { Add add; Sub sub; Div div; }
+
+impl Mul<f64> for Interval {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: f64) -> Self {
+        let [a, b] = [self.low * other, self.high * other];
+        if (a + b).is_finite() {
+            Self { low: least(a, b), high: largest(a, b) }
+        } else {
+            self.product(other.into())
+        }
+    }
+}
 
 derived_operators!([] Interval);
 
@@ -217,12 +257,13 @@ impl Scalar for Interval {
             return any;
         }
         let angle = elementary::atan2;
-        Self::around([
+        let four = [
             angle(self.low, x.low),
             angle(self.low, x.high),
             angle(self.high, x.low),
             angle(self.high, x.high),
-        ])
+        ];
+        if four.iter().any(|v| v.is_nan()) { any } else { Self::around(four) }
     }
 
     fn squared(self) -> Self {

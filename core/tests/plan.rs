@@ -2,9 +2,10 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc, StateBound};
+use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
     IntegratedFilter, Integration, Phase, SafetyFilter, SampleDerivative, Sampling, Standing, Status,
@@ -1380,6 +1381,67 @@ fn small_things_on_a_long_way_are_seen() {
     }
     println!("{assured} of {seeds} ways have a plan");
     assert!(assured > 0);
+}
+
+/// A point on a line (m, m/s) that its input accelerates, with a wind that blows against it at a place, so far, and so hard:
+/// in m, m and m/s².
+#[derive(Clone, Copy, Debug)]
+struct Windy([f64; 3]);
+
+impl ControlAffine<2, 1> for Windy {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        let Self([at, width, force]) = *self;
+        SVector::from([x[1], -((-((x[0] - at) / width).squared()).exp() * force)])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), S::one()]])
+    }
+}
+
+/// A force on a stretch of the way that is short beside that of a hold is in the plan, wherever it is: no promise is given
+/// that it breaks, and none that is given is lost, since the plant is the model.
+#[test]
+fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
+    const PERIOD: f64 = 0.1;
+    let seeds = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 300 } else { 24 };
+    let mut outcomes = [0; 2];
+    for seed in 1..=seeds {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let width = random.between(0.1, 2.0);
+        // Some take more speed than there is, some little of it.
+        let plant = Windy([random.between(60.0, 500.0), width, random.between(1.0, 60.0) / width]);
+        let goal = StateBound::at_least(0, 550.0).expect("valid bound");
+        let deadline = random.between(40.0, 60.0);
+        let filter = SafetyFilter::builder(2, 1)
+            .barrier("goal", plant, goal, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[-0.5], &[0.5]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut x = SVector::from([0.0, random.between(8.0, 16.0)]);
+        let (mut k, mut refused) = (0, false);
+        while PERIOD * f64::from(k) < deadline && !refused {
+            let (t, u_ref) = (PERIOD * f64::from(k), [0.0, 0.3, -x[1]][seed as usize % 3]);
+            let mut u = [0.0];
+            let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
+            refused = k == 0 && standing == Standing::Refused;
+            assert!(
+                refused || standing == Standing::Assured,
+                "seed {seed} at {t} s: {standing:?}, {plant:?}"
+            );
+            // Some steps on the width of any wind.
+            for _ in 0..200 {
+                x = rk4_step(&plant, &x, &u.into(), PERIOD / 200.0);
+            }
+            k += 1;
+        }
+        outcomes[usize::from(refused)] += 1;
+        assert!(refused || x[0] >= 550.0 - 1e-6, "seed {seed}: {x:?}, {plant:?}");
+    }
+    println!("{outcomes:?} are assured and refused");
+    assert!(outcomes.iter().all(|n| *n > 0), "{outcomes:?}");
 }
 
 /// A deadline by which no input arrives is not promised, however little it lies beside a sample.

@@ -7,8 +7,8 @@ use punctual_core::dynamics::DynPlant;
 use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
-    self, Ahead, COURSE, Coefficients, Course, DerivativeSource, Derivatives, Direction, Directional,
-    Predict, PredictDirectional, RelativeDegree, SUBSTEPS,
+    self, Ahead, COURSE, Coefficients, Course, CourseOver, DerivativeSource, Derivatives, Direction,
+    Directional, Predict, PredictDirectional, RateOver, RelativeDegree, SUBSTEPS,
 };
 use punctual_core::scalar::Scalar;
 
@@ -455,11 +455,28 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         *out = std::array::from_fn(|k| courses.series.get(courses.h, k));
     }
 
-    fn value_over(&self, time: Interval, x: &[Interval]) -> Option<Interval> {
-        Some(self.work.borrow_mut().value_over.follow(time, |i, _| x[i]))
+    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+        let Along { equations, series, .. } = &mut self.work.borrow_mut().courses_over;
+        for (register, &value) in (path.len()..).zip(u) {
+            series.set(register, 0, Interval::from(value));
+        }
+        for k in 0..orders {
+            for (i, course) in path.iter().enumerate() {
+                series.set(i, k, course[k]);
+            }
+            equations.advance(series, k);
+            for (i, out) in out.iter_mut().enumerate() {
+                out[k] = series.get(equations.derivative(i), k);
+            }
+        }
+        true
     }
 
-    fn last_over(&self, time: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+    fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+        Some(self.work.borrow_mut().value_over.follow(time, |i, _| path[i][0]))
+    }
+
+    fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
         let courses = &mut self.work.borrow_mut().courses_over;
         courses.follow(time, |i, k| path[i][k]);
         Some(courses.series.get(courses.h, COURSE - 1))

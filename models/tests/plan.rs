@@ -293,3 +293,60 @@ fn a_quadrotor_in_a_plane_gets_there_below_the_ceiling() {
         assert!(case.is_kept(&start, 0.5, |_, _| push.to_vec()), "{push:?}: refused");
     }
 }
+
+/// A point on a line against a wind on a stretch of its way that is short beside that of a hold. Some winds take more speed
+/// than there is.
+#[test]
+fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
+    let mut outcomes = [0; 2];
+    for seed in 1..=16_u64 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let width = random.between(0.3, 2.0);
+        let (at, force) = (random.between(30.0, 170.0), random.between(1.0, 60.0) / width);
+        let parameters = [("at", at), ("w", width), ("force", force)];
+        let wind = "a - force * exp(-((p - at) / w)^2)";
+        let case = Case {
+            period: 0.1,
+            deadline: random.between(14.0, 20.0),
+            states: 2,
+            model: Model::new(&["p", "v"], &["a"], &parameters, &["v", wind]).expect("a model"),
+            barriers: &[("p - 180", 2, true)],
+            bounds: &[[-0.5, 0.5]],
+            rate: &|x, u| vec![x[1], u[0] - force * (-((x[0] - at) / width).powi(2)).exp()],
+            h: &|x| vec![x[0] - 180.0 + 1e-6],
+        };
+        let speed = random.between(8.0, 16.0);
+        let wanted = |_, x: &[f64]| vec![[0.0, 0.5, -x[1]][seed as usize % 3]];
+        outcomes[usize::from(case.is_kept(&[0.0, speed], 1.0, wanted))] += 1;
+    }
+    assert!(outcomes.iter().all(|n| *n > 0), "{outcomes:?}");
+}
+
+/// A point on a line that turns around, against drags with a kink where it does: nothing is known of what comes after a rate
+/// there, and its piece still ends.
+#[test]
+fn a_drag_with_a_kink_is_passed() {
+    let drags: [(&str, fn(f64) -> f64); 4] = [
+        ("0.1 * v * abs(v)", |v| 0.1 * v * v.abs()),
+        ("0.5 * abs(v)", |v| 0.5 * v.abs()),
+        ("max(v, 0.2)", |v| v.max(0.2)),
+        ("tanh(40 * v)", |v| (40.0 * v).tanh()),
+    ];
+    for (seed, (name, drag)) in (1..).zip(drags) {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let case = Case {
+            period: 0.05,
+            deadline: random.between(8.0, 10.0),
+            states: 2,
+            model: Model::new(&["p", "v"], &["a"], &[], &["v", &format!("a - {name}")]).expect("a model"),
+            barriers: &[("p - 4", 2, true), ("6 - p", 2, false)],
+            bounds: &[[-4.0, 4.0]],
+            rate: &|x, u| vec![x[1], u[0] - drag(x[1])],
+            h: &|x| vec![x[0] - 4.0 + 1e-6, 6.0 - x[0]],
+        };
+        for push in [0.0, 4.0, -4.0] {
+            let start = [random.between(-2.0, 2.0), random.between(-3.0, -1.0)];
+            assert!(case.is_kept(&start, 1.0, |_, _| vec![push]), "{name}, {push}: refused");
+        }
+    }
+}

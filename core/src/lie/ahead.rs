@@ -15,7 +15,7 @@
 
 use nalgebra::SVector;
 
-use super::{COURSE, Course, Direction};
+use super::{COURSE, Course, CourseOver, Direction, RateOver};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, rk4};
 use crate::interval::Interval;
@@ -276,22 +276,40 @@ where
     barrier.value(Taylor::time(t), &states).coefficients
 }
 
-/// `barrier` on enclosures of time and states. Once for a barrier.
+/// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the courses of the states. Once for a
+/// plant.
 #[inline(never)]
-pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, x: &[Interval]) -> Interval
+pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
+    path: &[CourseOver],
+    u: &[f64],
+    out: &mut [RateOver],
+) where
+    P: ControlAffine<NX, NU>,
+{
+    let series = |course: CourseOver| Taylor { coefficients: course }.truncated::<K>();
+    let states = SVector::<_, NX>::from_fn(|i, _| series(path[i]));
+    let (f, g) = (plant.drift(&states), plant.input_map(&states));
+    for (i, out) in out.iter_mut().enumerate() {
+        for (k, out) in out.iter_mut().enumerate().take(K) {
+            let driven = u.iter().enumerate().map(|(m, &u)| g[(i, m)].coefficients[k] * u);
+            *out = driven.fold(f[i].coefficients[k], |sum, term| sum + term);
+        }
+    }
+}
+
+/// `barrier` on enclosures of time and of the courses of the states. Once for a barrier.
+#[inline(never)]
+pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
 where
     B: Barrier<NX>,
 {
-    barrier.value(time, &SVector::from_column_slice(x))
+    barrier.value(time, &SVector::from_fn(|i, _| path[i][0]))
 }
 
 /// The last coefficient of the course of `barrier` on enclosures of time and of those of the states. Once for a barrier.
 #[inline(never)]
-pub(super) fn last_over<B, const NX: usize>(
-    barrier: &B,
-    time: Interval,
-    path: &[[Interval; COURSE]],
-) -> Interval
+pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
 where
     B: Barrier<NX>,
 {

@@ -4,7 +4,8 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::{
-    Ahead, COURSE, Course, DerivativeSource, Derivatives, Direction, Directional, Predict, PredictDirectional,
+    Ahead, COURSE, Course, CourseOver, DerivativeSource, Derivatives, Direction, Directional, Predict,
+    PredictDirectional, RateOver,
 };
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length};
@@ -25,6 +26,15 @@ impl Embedded {
         let mut own = [0.0; MAX_PICKED];
         for (slot, &pick) in own.iter_mut().zip(&self.picks) {
             *slot = x[pick];
+        }
+        own
+    }
+
+    /// The same of enclosures, and nothing known after them.
+    fn picked_over(&self, path: &[CourseOver]) -> [CourseOver; MAX_PICKED] {
+        let mut own = [[Interval::ALL; COURSE]; MAX_PICKED];
+        for (own, &pick) in own.iter_mut().zip(&self.picks) {
+            *own = path[pick];
         }
         own
     }
@@ -134,20 +144,24 @@ impl Predict for Embedded {
         }
     }
 
-    fn value_over(&self, time: Interval, x: &[Interval]) -> Option<Interval> {
-        let mut own = [Interval::ALL; MAX_PICKED];
-        for (own, &pick) in own.iter_mut().zip(&self.picks) {
-            *own = x[pick];
+    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+        let Some(source) = self.source.predict() else { return false };
+        let mut own = [[Interval::ALL; COURSE - 1]; MAX_PICKED];
+        let n = self.picks.len();
+        let known = source.rates_over(&self.picked_over(path)[..n], u, orders, &mut own[..n]);
+        out.fill([Interval::from(0.0); COURSE - 1]);
+        for (&pick, own) in self.picks.iter().zip(own) {
+            out[pick] = own;
         }
-        self.source.predict()?.value_over(time, &own[..self.picks.len()])
+        known
     }
 
-    fn last_over(&self, time: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
-        let mut own = [[Interval::ALL; COURSE]; MAX_PICKED];
-        for (own, &pick) in own.iter_mut().zip(&self.picks) {
-            *own = path[pick];
-        }
-        self.source.predict()?.last_over(time, &own[..self.picks.len()])
+    fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+        self.source.predict()?.value_over(time, &self.picked_over(path)[..self.picks.len()])
+    }
+
+    fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+        self.source.predict()?.last_over(time, &self.picked_over(path)[..self.picks.len()])
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {

@@ -103,14 +103,21 @@ pub trait Predict {
     /// Writes the course of h along `path`, the courses of all states from `t` on.
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
 
-    /// An enclosure of h on a stretch of a path, by those of the time (s) and of each state there. The default has none: then
-    /// what bends h between the instants at which it is looked at is not seen.
-    fn value_over(&self, _time: Interval, _x: &[Interval]) -> Option<Interval> {
+    /// Writes enclosures of the first `orders` coefficients, 1 to [`COURSE`] − 1, of ẋ under `u`: as a series in time that
+    /// begins anywhere on a stretch of a path, by those of the courses of all states that begin there. Says whether it did:
+    /// the default has none, and then what bends the plant between the instants at which it is looked at is not seen.
+    fn rates_over(&self, _path: &[CourseOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
+        false
+    }
+
+    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what bends h between the
+    /// instants at which it is looked at is not seen.
+    fn value_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
         None
     }
 
     /// The same for the last coefficient of the course of h that begins anywhere on that stretch.
-    fn last_over(&self, _time: Interval, _path: &[[Interval; COURSE]]) -> Option<Interval> {
+    fn last_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
         None
     }
 
@@ -122,6 +129,12 @@ pub trait Predict {
 
 /// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …
 pub type Course = [f64; COURSE];
+
+/// What the coefficients of a [`Course`] are within, wherever on a stretch of time it begins.
+pub type CourseOver = [Interval; COURSE];
+
+/// The same for its rate, which has one coefficient less.
+pub type RateOver = [Interval; COURSE - 1];
 
 /// Number of coefficients of a [`Course`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
 pub const COURSE: usize = 10;

@@ -1,13 +1,14 @@
 //! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
 //!
 //! Under one input, state and h are followed by their Taylor [courses](crate::lie::Course) in pieces. A piece ends where the
-//! last terms of a state no longer vanish, and is halved while the course of a state is not a solution in its middle or at its
-//! end. So it is assumed that what bends the plant on a piece shows there.
+//! last terms of a state no longer vanish, and is halved until the course of every state is a solution on all of it: by
+//! [enclosures](crate::interval) of the plant's rate there. Where a source has none, in its middle and at its end, and it is
+//! assumed that what bends the plant shows there.
 //!
 //! On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
 //! less its last terms and less four times what the course misses h by at four instants. What bends h between them shows in
-//! [enclosures](crate::interval): of h on the piece, or of the last coefficient of a course that begins anywhere on it, which
-//! by Taylor's theorem is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
+//! enclosures: of h on the piece, or of the last coefficient of a course that begins anywhere on it, which by Taylor's theorem
+//! is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
 //! source has no enclosures, it is assumed that h bends as those instants show.
 
 use alloc::vec;
@@ -19,7 +20,7 @@ use super::model::Model;
 use super::{Integral, Requirement};
 use crate::MAX_INPUTS;
 use crate::interval::Interval;
-use crate::lie::{COURSE, Course};
+use crate::lie::{COURSE, Course, CourseOver, RateOver};
 use crate::scalar::all_finite;
 
 /// Most pieces of a roll-out.
@@ -28,6 +29,8 @@ const MOST_PIECES: u32 = 100_000;
 const TRUNCATED: f64 = 1e-10;
 /// By how much the course of a state may miss being a solution, over the piece and as a part of its size.
 const RESIDUAL: f64 = 1e-8;
+/// Coefficients of the rate of the states that bound this: first few, then all.
+const ORDERS: [usize; 2] = [4, COURSE - 1];
 /// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
 const HALVINGS: u32 = 14;
 const SHARPER: u32 = 3;
@@ -160,9 +163,9 @@ pub(super) struct Walk<'a> {
     path: Vec<Course>,
     point: Vec<f64>,
     rate: Vec<f64>,
-    /// Enclosures of states and of their courses on a piece.
-    states: Vec<Interval>,
-    courses: Vec<[Interval; COURSE]>,
+    /// Enclosures of those courses and of the rate on a piece.
+    over: Vec<CourseOver>,
+    rate_over: Vec<RateOver>,
     pieces: u32,
     witness: Witness,
     started: f64,
@@ -188,8 +191,8 @@ impl<'a> Walk<'a> {
             path: vec![[0.0; COURSE]; x.len()],
             point: x.to_vec(),
             rate: x.to_vec(),
-            states: Vec::with_capacity(x.len()),
-            courses: Vec::with_capacity(x.len()),
+            over: Vec::with_capacity(x.len()),
+            rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
             pieces: 0,
             witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
             started: t,
@@ -322,7 +325,7 @@ impl<'a> Walk<'a> {
         }
         let whole = node - self.t;
         let mut dt = self.path.iter().fold(whole, |dt, c| course::reach(c, TRUNCATED * size(c), dt));
-        while !(self.is_solution(u, 0.5 * dt) && self.is_solution(u, dt)) {
+        while !self.is_solution(u, dt) {
             dt *= 0.5;
             if self.t + dt <= self.t {
                 return Err(Failure::Singular);
@@ -333,46 +336,63 @@ impl<'a> Walk<'a> {
         if end <= self.t {
             return Err(Failure::TooLong);
         }
-        for (greatest, (c, rate)) in self.witness.rates.iter_mut().zip(self.path.iter().zip(&self.rate)) {
-            *greatest = greatest.max(c[1].abs()).max(rate.abs());
+        for (greatest, c) in self.witness.rates.iter_mut().zip(&self.path) {
+            *greatest = greatest.max(c[1].abs()).max(course::slope(c, dt).abs());
         }
-        let from = self.t;
-        for i in 0..self.requirements.len() {
-            if self.requirements[i].is_in_force(from) {
-                let path = core::mem::take(&mut self.path);
-                let least = self.least(i, &path, (from, dt), HALVINGS);
-                self.path = path;
-                self.note(i, from, least)?;
+        let (from, path, over) = (self.t, core::mem::take(&mut self.path), core::mem::take(&mut self.over));
+        let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
+        let met = in_force.try_for_each(|i| {
+            let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
+            self.note(i, from, least)
+        });
+        for (x, c) in self.x.iter_mut().zip(&path) {
+            *x = at(c, dt);
+        }
+        (self.t, self.path, self.over) = (end, path, over);
+        met
+    }
+
+    /// Whether the courses of the states are a solution until `dt` s after their begin. Leaves what encloses them.
+    fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
+        let plant = self.model.plant;
+        // Not-a-number is not small.
+        let is_small = |missed: f64, c: &Course| missed * dt <= RESIDUAL * size(c);
+        self.over.clear();
+        self.over.extend(self.path.iter().map(|c| course::over(c, dt)));
+        for orders in ORDERS {
+            if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
+                return [0.5 * dt, dt].into_iter().all(|after| {
+                    for (x, c) in self.point.iter_mut().zip(&self.path) {
+                        *x = at(c, after);
+                    }
+                    plant.rate(&self.point, u, &mut self.rate);
+                    let mut rates = self.path.iter().zip(&self.rate);
+                    rates.all(|(c, rate)| is_small((course::slope(c, after) - rate).abs(), c))
+                });
+            }
+            let mut rates = self.rate_over.iter().zip(&self.over).zip(&self.path);
+            if rates.all(|((rate, over), c)| is_small(course::missed(&rate[..orders], over, dt), c)) {
+                return true;
             }
         }
-        for (x, c) in self.x.iter_mut().zip(&self.path) {
-            *x = at(c, dt);
-        }
-        self.t = end;
-        Ok(())
+        false
     }
 
-    /// Whether the courses of the states are a solution `dt` s after their begin. Leaves state and rate there.
-    fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
-        for (x, c) in self.point.iter_mut().zip(&self.path) {
-            *x = at(c, dt);
-        }
-        self.model.plant.rate(&self.point, u, &mut self.rate);
-        let misses = |(c, rate): (&Course, &f64)| (course::slope(c, dt) - rate).abs() * dt;
-        // Not-a-number is none.
-        self.path.iter().zip(&self.rate).all(|both| misses(both) <= RESIDUAL * size(both.0))
-    }
-
-    /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from`.
-    fn least(&mut self, i: usize, path: &[Course], (from, dt): (f64, f64), halvings: u32) -> f64 {
+    /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from` and is
+    /// enclosed by `over`.
+    fn least(
+        &mut self,
+        i: usize,
+        (path, over): (&[Course], &[CourseOver]),
+        (from, dt): (f64, f64),
+        halvings: u32,
+    ) -> f64 {
         let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
         let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
         // Far from its edge no more need be known.
         let time = Interval::new(from, from + dt);
-        self.states.clear();
-        self.states.extend(path.iter().map(|c| course::over(c, dt, 1)[0]));
-        let over = model.value_over(time, &self.states).map(|over| over.low);
-        if let Some(low) = over.filter(|low| *low >= needed && low - margin >= tightest) {
+        let lowest = model.value_over(time, over).map(|h| h.low);
+        if let Some(low) = lowest.filter(|low| *low >= needed && low - margin >= tightest) {
             return low;
         }
         let mut h = [0.0; COURSE];
@@ -398,11 +418,8 @@ impl<'a> Walk<'a> {
         }
         if bound >= needed && is_sharp || halvings == 0 {
             // Whatever bends h between these instants: by what it takes on the piece, or by Taylor's theorem.
-            let enclosed = over.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
-                self.courses.clear();
-                self.courses.extend(path.iter().map(|c| course::over(c, dt, COURSE)));
-                h[COURSE - 1] =
-                    model.last_over(time, &self.courses).map_or(f64::NEG_INFINITY, |last| last.low);
+            let enclosed = lowest.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
+                h[COURSE - 1] = model.last_over(time, over).map_or(f64::NEG_INFINITY, |last| last.low);
                 low.max(course::least(&h, dt))
             });
             if enclosed >= needed || halvings == 0 {
@@ -410,12 +427,13 @@ impl<'a> Walk<'a> {
             }
         }
         let half = 0.5 * dt;
-        let left = self.least(i, path, (from, half), halvings - 1);
+        let enclosed = |path: &[Course]| path.iter().map(|c| course::over(c, half)).collect::<Vec<_>>();
+        let left = self.least(i, (path, &enclosed(path)), (from, half), halvings - 1);
         if left < needed {
             return left;
         }
         let path: Vec<Course> = path.iter().map(|c| shifted(c, half)).collect();
-        left.min(self.least(i, &path, (from + half, half), halvings - 1))
+        left.min(self.least(i, (&path, &enclosed(&path)), (from + half, half), halvings - 1))
     }
 
     /// Follows the rest of `reference`.

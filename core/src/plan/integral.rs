@@ -1,7 +1,7 @@
 //! Plans behind an integrator: the plant is given the mean of an integral over each period.
 
 use crate::interval::Interval;
-use crate::lie::{Ahead, COURSE, Course, Predict};
+use crate::lie::{Ahead, COURSE, Course, CourseOver, Predict, RateOver};
 
 /// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
 #[derive(Clone, Copy, Debug)]
@@ -46,11 +46,15 @@ impl Predict for Limit<'_> {
         out[0] -= self.sign * self.limit;
     }
 
-    fn value_over(&self, _: Interval, x: &[Interval]) -> Option<Interval> {
-        Some((x[self.state] - self.limit) * self.sign)
+    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+        self.plant.rates_over(path, u, orders, out)
     }
 
-    fn last_over(&self, _: Interval, path: &[[Interval; COURSE]]) -> Option<Interval> {
+    fn value_over(&self, _: Interval, path: &[CourseOver]) -> Option<Interval> {
+        Some((path[self.state][0] - self.limit) * self.sign)
+    }
+
+    fn last_over(&self, _: Interval, path: &[CourseOver]) -> Option<Interval> {
         Some(path[self.state][COURSE - 1] * self.sign)
     }
 }
