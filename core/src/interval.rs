@@ -220,7 +220,14 @@ impl Scalar for Interval {
     }
 
     fn powf(self, exponent: f64) -> Self {
-        let Self { low, high } = self.max(Self::from(0.0)).rising(|v| elementary::powf(v, exponent));
+        // Whole powers are those of negative numbers too.
+        let base = match exponent % 2.0 {
+            0.0 => self.abs(),
+            part if part.abs() == 1.0 && (exponent > 0.0 || !self.contains(0.0)) => self,
+            part if part.abs() == 1.0 => return Self::ALL,
+            _ => self.max(Self::from(0.0)),
+        };
+        let Self { low, high } = base.rising(|v| elementary::powf(v, exponent));
         Self { low: low.min(high), high: low.max(high) }
     }
 
@@ -284,7 +291,7 @@ mod tests {
     use crate::jet::Taylor;
 
     /// Operations on two numbers, `b` > 0.
-    fn operations<S: Scalar>(a: S, b: S) -> [S; 20] {
+    fn operations<S: Scalar>(a: S, b: S) -> [S; 23] {
         let (sin, cos) = a.sin_cos();
         [
             a + b,
@@ -302,6 +309,9 @@ mod tests {
             a.atan(),
             a.tanh(),
             b.powf(1.7),
+            a.powf(4.0),
+            a.powf(3.0),
+            a.powf(-3.0),
             a.abs(),
             a.min(b),
             a.max(b),
@@ -324,7 +334,7 @@ mod tests {
             let (a, b) = (8.0 * draw(&mut seed) - 4.0, 0.1 + 4.0 * draw(&mut seed));
             let (wide, long) = (3.0 * draw(&mut seed).powi(3), 3.0 * draw(&mut seed).powi(3));
             let found = operations(Interval::new(a, a + wide), Interval::new(b, b + long));
-            let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); 20];
+            let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); 23];
             const PARTS: u32 = 24;
             for (i, j) in (0..=PARTS).flat_map(|i| (0..=PARTS).map(move |j| (i, j))) {
                 let part = |from: f64, all: f64, k: u32| from + all * f64::from(k) / f64::from(PARTS);
@@ -341,7 +351,7 @@ mod tests {
             for (k, (low, high)) in seen.into_iter().enumerate() {
                 // a⁻² has no bound at 0, and a turning point lies between two parts: half a part's square at most.
                 let slack = 1e-9 + 0.05 * (high - low);
-                let bounded = k != 6 || a > 0.0 || a + wide < 0.0;
+                let bounded = ![6, 17].contains(&k) || a > 0.0 || a + wide < 0.0;
                 let fits = found[k].low >= low - slack && found[k].high <= high + slack;
                 assert!(!bounded || fits, "{k}: {:?} {low} {high}", found[k]);
             }

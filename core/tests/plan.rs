@@ -10,7 +10,7 @@ use punctual_core::filter::{
     AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
     IntegratedFilter, Integration, Phase, SafetyFilter, SampleDerivative, Sampling, Standing, Status,
 };
-use punctual_core::lie::Direction;
+use punctual_core::lie::{Direction, along};
 use punctual_core::plan::Failure;
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::{MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
@@ -1442,6 +1442,115 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
     }
     println!("{outcomes:?} are assured and refused");
     assert!(outcomes.iter().all(|n| *n > 0), "{outcomes:?}");
+}
+
+/// Functions of a position with what series and enclosures easily miss: a jump, and powers of negative numbers.
+#[derive(Clone, Copy, Debug)]
+enum Odd {
+    /// The angle of a point, less than −2 rad beyond its jump.
+    Angle,
+    /// To a power that is whole, up to 5 m from 0.
+    Power(f64),
+}
+
+impl Barrier<2> for Odd {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+        match *self {
+            Self::Angle => x[0].atan2(S::from(-3.0)) + 2.0,
+            Self::Power(exponent) => -(x[0] / 5.0).powf(exponent) + 1.0,
+        }
+    }
+}
+
+#[test]
+fn jumps_and_powers_of_negative_numbers_are_seen() {
+    const PERIOD: f64 = 0.2;
+    let random = &mut Random(3);
+    let mut assured = 0;
+    for round in 0..40 {
+        let exponent = [2.0, 4.0, 6.0, 66.0][round % 4];
+        let (odd, edge) = if round < 16 { (Odd::Angle, 0.0) } else { (Odd::Power(exponent), -5.0) };
+        let plant = Windy([0.0, 1.0, 0.0]);
+        let filter = SafetyFilter::builder(2, 1)
+            .barrier("odd", plant, odd, BarrierSettings::keeping())
+            .and_then(|b| b.bounds(&[-1.0], &[1.0]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut x = [edge + random.between(0.1, 1.0), -random.between(0.1, 1.2)];
+        if round < 6 {
+            // From here the jump was between the instants that are looked at.
+            x = [0.3, if round < 3 { -0.45 } else { -0.3 }];
+        }
+        for k in 0..40 {
+            let (t, u_ref, mut u) = (PERIOD * f64::from(k), [0.0, -1.0, -x[1]][round % 3], [0.0]);
+            let standing = filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").standing;
+            if k == 0 && standing == Standing::Refused {
+                break;
+            }
+            assert_eq!(standing, Standing::Assured, "{odd:?} at {t} s: {x:?}");
+            assured += u32::from(k == 0);
+            for part in 1..=200 {
+                let s = PERIOD * f64::from(part) / 200.0;
+                let h = odd.value(0.0, &[x[0] + s * x[1] + s * s / 2.0 * u[0], 0.0].into());
+                assert!(h >= -1e-12, "{odd:?}, {s} s after {t} s: {h}");
+            }
+            x = [x[0] + PERIOD * x[1] + PERIOD * PERIOD / 2.0 * u[0], x[1] + PERIOD * u[0]];
+        }
+    }
+    assert!(assured > 20, "{assured}");
+}
+
+/// A point whose inputs are its velocity, which something lifts by a centimetre where it passes the place.
+#[derive(Clone, Copy, Debug)]
+struct Lifted(f64);
+
+impl ControlAffine<2, 2> for Lifted {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([S::zero(), (-((x[0] - self.0) / 0.002).squared()).exp() * 3.0])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
+        SMatrix::identity()
+    }
+}
+
+/// What is small is seen far from the origin as near to it.
+#[test]
+fn small_things_are_seen_far_from_the_origin() {
+    const PERIOD: f64 = 0.1;
+    let mut assured = 0;
+    for (round, far) in [0.0, 1e5, 1e6, 5e6].into_iter().enumerate() {
+        let plant = Lifted(far + 1.2345);
+        let ceiling = StateBound::at_most(1, far + 0.003).expect("valid bound");
+        let goal = StateBound::at_least(0, far + 2.5).expect("valid bound");
+        let filter = SafetyFilter::builder(2, 2)
+            .source("ceiling", along(plant, ceiling, 1).expect("a degree"), BarrierSettings::keeping())
+            .and_then(|b| b.barrier("goal", plant, goal, BarrierSettings::within(4.0)))
+            .and_then(|b| b.bounds(&[-1.0, -0.01], &[1.0, 0.01]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut x = SVector::from([far, far]);
+        for k in 0..50 {
+            let (t, mut u) = (PERIOD * f64::from(k), [0.0; 2]);
+            let u_ref = [[0.0; 2], [1.0, 0.01]][round % 2];
+            let standing = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("dimensions").standing;
+            if standing == Standing::Refused {
+                break;
+            }
+            assert_eq!(standing, Standing::Assured, "{far} at {t} s: {x:?}");
+            assured += 1;
+            for _ in 0..400 {
+                x = rk4_step(&plant, &x, &u.into(), PERIOD / 400.0);
+                // Round-off of the place, 400 times a period.
+                assert!(x[1] <= far + 0.003 + 1e-6, "{far}, {t} s: {x:?}");
+            }
+        }
+    }
+    assert!(assured > 0);
 }
 
 /// A deadline by which no input arrives is not promised, however little it lies beside a sample.

@@ -350,3 +350,27 @@ fn a_drag_with_a_kink_is_passed() {
         }
     }
 }
+
+/// An angle that jumps across the negative half of the axis, as the bearing of a point does.
+#[test]
+fn the_jump_of_an_angle_is_seen() {
+    let mut accepted = 0;
+    for speed in [0.2, 0.3, 0.45, 0.7] {
+        let case = Case {
+            period: 0.2,
+            deadline: 0.0,
+            states: 4,
+            model: Model::new(&["x", "y", "vx", "vy"], &["p", "q"], &[], &["vx", "vy", "p", "q"])
+                .expect("a model"),
+            barriers: &[("2 + atan2(y, x)", 2, false)],
+            bounds: &[[-1.0, 1.0], [-1.0, 1.0]],
+            rate: &|x, u| vec![x[2], x[3], u[0], u[1]],
+            h: &|x| vec![2.0 + x[1].atan2(x[0])],
+        };
+        for push in [0.0, -1.0] {
+            let is_kept = case.is_kept(&[-3.0, 0.3, 0.0, -speed], 6.0, |_, _| vec![0.0, push]);
+            accepted += u32::from(is_kept);
+        }
+    }
+    assert!(accepted > 0);
+}

@@ -65,7 +65,7 @@ impl<C: Scalar, const K: usize> Taylor<C, K> {
         self.coefficients[k] * (1..=k).map(|i| i as f64).product::<f64>()
     }
 
-    /// The value at a kink, of whose derivatives nothing is known.
+    /// The value at a kink or a jump, of whose derivatives nothing is known.
     fn kinked(value: C) -> Self {
         Self { coefficients: from_fn(|k| if k == 0 { value } else { C::from(f64::NAN) }) }
     }
@@ -226,6 +226,11 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
     /// Of the two quotients the one that does not exceed 1.
     #[inline]
     fn atan2(self, x: Self) -> Self {
+        // Across the negative half of the axis the angle jumps.
+        let side = |s: Self| s.coefficients[0].compare(C::zero());
+        if side(self).is_none() && side(x) != Some(Ordering::Greater) {
+            return Self::kinked(self.coefficients[0].atan2(x.coefficients[0]));
+        }
         let by_y = self.coefficients[0].abs().compare(x.coefficients[0].abs()) == Some(Ordering::Greater);
         let mut angle = if by_y { -(x / self).atan() } else { (self / x).atan() };
         angle.coefficients[0] = self.coefficients[0].atan2(x.coefficients[0]);

@@ -27,7 +27,7 @@ use crate::scalar::all_finite;
 const MOST_PIECES: u32 = 100_000;
 /// The last terms of a state's course at the end of a piece, as a part of its size.
 const TRUNCATED: f64 = 1e-10;
-/// By how much the course of a state may miss being a solution, over the piece and as a part of its size.
+/// By how much the course of a state may miss being a solution over the piece, as a part of its change there and beside 1.
 const RESIDUAL: f64 = 1e-8;
 /// Coefficients of the rate of the states that bound this: first few, then all.
 const ORDERS: [usize; 2] = [4, COURSE - 1];
@@ -355,10 +355,10 @@ impl<'a> Walk<'a> {
     /// Whether the courses of the states are a solution until `dt` s after their begin. Leaves what encloses them.
     fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
         let plant = self.model.plant;
-        // Not-a-number is not small.
-        let is_small = |missed: f64, c: &Course| missed * dt <= RESIDUAL * size(c);
         self.over.clear();
         self.over.extend(self.path.iter().map(|c| course::over(c, dt)));
+        // Not-a-number is not small.
+        let is_small = |missed: f64, over: &CourseOver| missed * dt <= allowed(over[0]);
         for orders in ORDERS {
             if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
                 return [0.5 * dt, dt].into_iter().all(|after| {
@@ -366,12 +366,12 @@ impl<'a> Walk<'a> {
                         *x = at(c, after);
                     }
                     plant.rate(&self.point, u, &mut self.rate);
-                    let mut rates = self.path.iter().zip(&self.rate);
-                    rates.all(|(c, rate)| is_small((course::slope(c, after) - rate).abs(), c))
+                    let mut rates = self.path.iter().zip(&self.rate).zip(&self.over);
+                    rates.all(|((c, rate), over)| is_small((course::slope(c, after) - rate).abs(), over))
                 });
             }
-            let mut rates = self.rate_over.iter().zip(&self.over).zip(&self.path);
-            if rates.all(|((rate, over), c)| is_small(course::missed(&rate[..orders], over, dt), c)) {
+            let mut rates = self.rate_over.iter().zip(&self.over);
+            if rates.all(|(rate, over)| is_small(course::missed(&rate[..orders], over, dt), over)) {
                 return true;
             }
         }
@@ -531,18 +531,22 @@ impl<'a> Walk<'a> {
                 self.note(i, begin, here.min(there))?;
                 continue;
             }
-            if requirement.until == f64::INFINITY || requirement.from > self.t {
-                let mut course = [0.0; COURSE];
-                requirement.model.value_along(self.t, &self.path, &mut course);
-                let drift = course[1].abs() * DRIFT * hold;
-                self.note(i, self.t.max(requirement.from), h - drift)?;
-            }
+            let mut course = [0.0; COURSE];
+            requirement.model.value_along(self.t, &self.path, &mut course);
+            let drift = course[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
+            self.note(i, self.t.max(requirement.from), h - drift)?;
         }
         Ok(true)
     }
 }
 
-/// The size of a state, by which its errors are measured.
+/// The error that a state may have on a piece where it is within `over`: far from the origin no more of it than near, but for
+/// round-off.
+fn allowed(over: Interval) -> f64 {
+    RESIDUAL * (1.0 + (over.high - over.low)) + ROUND_OFF * over.low.abs()
+}
+
+/// The size of a state, by which the last terms of its course are measured.
 fn size(course: &Course) -> f64 {
     1.0 + course[0].abs()
 }
