@@ -375,27 +375,3 @@ fn the_jump_of_an_angle_is_seen() {
     }
     assert!(accepted > 0);
 }
-
-/// What creeps too slowly to show beside the way, and for ever, is no rest: a limit that it comes to is not promised, one
-/// that it stays below is.
-#[test]
-fn a_creep_is_no_rest() {
-    for (limit, is_within) in [(12.0, false), (20.0, false), (70.0, true)] {
-        let below = format!("{limit} - z");
-        let case = Case {
-            period: 0.01,
-            deadline: 3.0,
-            states: 3,
-            model: Model::new(&["s", "v", "z"], &["a"], &[], &["v", "a", "v^2 - 5e-7 * (z - 60)"])
-                .expect("a model"),
-            barriers: &[("1 - (s - 3)^2", 2, true), (&below, 2, false)],
-            bounds: &[[-20.0, 20.0]],
-            rate: &|x, u| vec![x[1], u[0], x[1] * x[1] - 5e-7 * (x[2] - 60.0)],
-            h: &|x| vec![1.0 - (x[0] - 3.0).powi(2), limit - x[2]],
-        };
-        let random = &mut Random(9);
-        let is_kept =
-            case.is_kept(&[0.0, 5.0, 0.0], 3.0, |_, _| vec![20.0 * random.between(-1.0, 1.0).signum()]);
-        assert_eq!(is_kept, is_within, "{limit}");
-    }
-}

@@ -45,8 +45,6 @@ const AT_REST: f64 = 1e-6;
 pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// Number of holds for which a drift at rest has to leave every set where it is.
 const DRIFT: f64 = 1e3;
-/// Time in s for which a drift at rest has to leave every set where it is, where it does not die away.
-const FOR_EVER: f64 = 1e6;
 /// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
 pub(crate) const ON_TIME: f64 = 1e-6;
 /// Most holds of the braking law after a reference.
@@ -535,10 +533,7 @@ impl<'a> Walk<'a> {
             }
             let mut course = [0.0; COURSE];
             requirement.model.value_along(self.t, &self.path, &mut course);
-            // It goes on until it has died away at its present pace, if it does.
-            let decay = -2.0 * course[2] / course[1];
-            let lasts = if decay > 0.0 { (1.0 / decay).min(FOR_EVER) } else { FOR_EVER };
-            let drift = course[1].abs() * lasts.max(DRIFT * hold).min(requirement.until - self.t);
+            let drift = course[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
             self.note(i, self.t.max(requirement.from), h - drift)?;
         }
         Ok(true)
