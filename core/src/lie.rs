@@ -42,6 +42,7 @@ pub use crate::error::RelativeDegree;
 pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
 pub use embedded::embedded;
 pub use external::external;
+pub(crate) use source::FEW_ORDERS;
 pub use source::{
     COURSE, Course, CourseOver, DerivativeSource, Direction, Directional, Predict, PredictDirectional,
     RateOver,
@@ -252,9 +253,8 @@ where
     }
 
     fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
-        // Few do for most of the way of a plan, at a fifth of the cost.
-        if orders <= 4 {
-            ahead::rates_over::<P, NX, NU, 4>(&self.plant, path, u, out);
+        if orders <= FEW_ORDERS {
+            ahead::rates_over::<P, NX, NU, FEW_ORDERS>(&self.plant, path, u, out);
         } else {
             ahead::rates_over::<P, NX, NU, { COURSE - 1 }>(&self.plant, path, u, out);
         }

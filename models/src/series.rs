@@ -168,7 +168,6 @@ impl<C: Scalar> Series<C> {
                 value
             }
             O::Atan(a, slope) => (at(a) - self.integral(to, slope, k, k - 1)) / start(slope),
-            // (x² + y²) y' = x y' − y x'.
             // Across the negative half of the axis the angle jumps.
             O::Atan2(y, x, _)
                 if start(y).compare(C::zero()).is_none()
@@ -176,6 +175,7 @@ impl<C: Scalar> Series<C> {
             {
                 unknown
             }
+            // (x² + y²) y' = x y' − y x'.
             O::Atan2(y, x, radius) => {
                 let turned = self.integral(y, x, k, k) - self.integral(x, y, k, k);
                 (turned - self.integral(to, radius, k, k - 1)) / start(radius)

@@ -136,6 +136,9 @@ pub type CourseOver = [Interval; COURSE];
 /// The same for its rate, which has one coefficient less.
 pub type RateOver = [Interval; COURSE - 1];
 
+/// Coefficients of a rate that do for most of the way of a plan, at a fifth of the cost of all.
+pub(crate) const FEW_ORDERS: usize = 4;
+
 /// Number of coefficients of a [`Course`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
 pub const COURSE: usize = 10;
 

@@ -8,8 +8,8 @@
 //! On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
 //! less its last terms and less four times what the course misses h by at four instants. What bends h between them shows in
 //! enclosures: of h on the piece, or of the last coefficient of a course that begins anywhere on it, which by Taylor's theorem
-//! is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
-//! source has no enclosures, it is assumed that h bends as those instants show.
+//! is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a source has no
+//! enclosures, it is assumed that h bends as those instants show.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -20,7 +20,7 @@ use super::model::Model;
 use super::{Integral, Requirement};
 use crate::MAX_INPUTS;
 use crate::interval::Interval;
-use crate::lie::{COURSE, Course, CourseOver, RateOver};
+use crate::lie::{COURSE, Course, CourseOver, FEW_ORDERS, RateOver};
 use crate::scalar::all_finite;
 
 /// Most pieces of a roll-out.
@@ -30,7 +30,7 @@ const TRUNCATED: f64 = 1e-10;
 /// By how much the course of a state may miss being a solution over the piece, as a part of its change there and beside 1.
 const RESIDUAL: f64 = 1e-8;
 /// Coefficients of the rate of the states that bound this: first few, then all.
-const ORDERS: [usize; 2] = [4, COURSE - 1];
+const ORDERS: [usize; 2] = [FEW_ORDERS, COURSE - 1];
 /// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
 const HALVINGS: u32 = 14;
 const SHARPER: u32 = 3;
