@@ -25,11 +25,15 @@ use crate::scalar::Scalar;
 ///
 /// # Requirements
 ///
-/// h is smooth along trajectories, but for kinks by [`Scalar::min`], [`Scalar::max`] and [`Scalar::abs`]. A plan is checked
-/// between instants too, and sees those there, but not a branch that compares [`Scalar::value`]s ([`crate::interval`]). The
+/// h is smooth along trajectories, but for kinks by [`Scalar::min`], [`Scalar::max`] and [`Scalar::abs`]. Plans and steps are
+/// checked between instants too, and see those there, but not a branch that compares [`Scalar::value`]s ([`crate::interval`]). The
 /// non-negative set of h is the one that is meant. The *shape* of h away from its zero level decides how much input the filter
 /// needs (see [`crate::barriers`]).
 pub trait Barrier<const NX: usize> {
+    /// Whether h is concave in (t, x), or convex, as all [`barriers`](crate::barriers) of this crate are: then nothing narrow can
+    /// hide between two samples, and a step need not look for it. With the default, `false`, it does.
+    const BENDS_ONE_WAY: bool = false;
+
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S;
 

@@ -19,6 +19,7 @@
 mod ahead;
 mod degree;
 mod embedded;
+mod enclosure;
 mod external;
 mod source;
 
@@ -41,6 +42,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 pub use crate::error::RelativeDegree;
 pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
 pub use embedded::embedded;
+pub use enclosure::{enclose, sharper};
 pub use external::external;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
@@ -267,6 +269,15 @@ where
 
     fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
         Some(ahead::last_over::<B, NX>(&self.barrier, time, path))
+    }
+
+    fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
+        // With n > 1 the derivatives at the ends of a hold tell as much of such an h, for less.
+        if B::BENDS_ONE_WAY && K > 2 {
+            return None;
+        }
+        let model = (&self.plant, &self.barrier);
+        Some(ahead::lowest_held::<P, B, NX, NU>(model, (t, duration), x, u, wanted))
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {

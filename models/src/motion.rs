@@ -94,8 +94,10 @@ pub(crate) fn source<E: Equations>(
             flow_tangent: Flow::new(plant),
             courses: Along::new(plant, along, COURSE - 1),
             value: Along::new(plant, along, 1),
-            value_over: Along::new(plant, along, 1),
+            few_over: Along::new(plant, along, 1),
             courses_over: Along::new(plant, along, COURSE - 1),
+            held: vec![[Interval::ALL; 2]; plant.states()],
+            rate: vec![0.0; plant.states()],
         };
         let (states, inputs) = (plant.states(), plant.inputs());
         Box::new(Source { work: RefCell::new(work), states, inputs, n })
@@ -246,6 +248,18 @@ fn moved<E: Equations>(flow: &mut Flow<E, f64>, x: &mut [f64], u: &[f64], durati
     }
 }
 
+/// Writes ẋ at `x` under `u`.
+fn rates_at<E: Equations>(flow: &mut Flow<E, f64>, x: &[f64], u: &[f64], out: &mut [f64]) {
+    let Flow { equations, series, .. } = flow;
+    for (register, &value) in x.iter().chain(u).enumerate() {
+        series.set(register, 0, value);
+    }
+    equations.advance(series, 0);
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = series.get(equations.derivative(i), 0);
+    }
+}
+
 /// Series of h along the plant.
 struct Along<E, C> {
     flow: Flow<E, C>,
@@ -352,8 +366,12 @@ struct Work<E, const M: usize> {
     flow_tangent: Flow<E, Tangent<f64>>,
     courses: Along<E, f64>,
     value: Along<E, f64>,
-    value_over: Along<E, Interval>,
+    /// Enclosures of h, and of it and its rate.
+    few_over: Along<E, Interval>,
     courses_over: Along<E, Interval>,
+    /// The states and their rates while an input is held, and the rates at its begin.
+    held: Vec<[Interval; 2]>,
+    rate: Vec<f64>,
 }
 
 impl<E, const M: usize> Source<E, M> {
@@ -424,14 +442,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        let Flow { equations, series, .. } = &mut self.work.borrow_mut().courses.flow;
-        for (register, &value) in x.iter().chain(u).enumerate() {
-            series.set(register, 0, value);
-        }
-        equations.advance(series, 0);
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = series.get(equations.derivative(i), 0);
-        }
+        rates_at(&mut self.work.borrow_mut().courses.flow, x, u, out);
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
@@ -473,7 +484,34 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     }
 
     fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
-        Some(self.work.borrow_mut().value_over.follow(time, |i, _| path[i][0]))
+        Some(self.work.borrow_mut().few_over.follow(time, |i, _| path[i][0]))
+    }
+
+    fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
+        let Work { value, few_over, held, rate, .. } = &mut *self.work.borrow_mut();
+        rates_at(&mut value.flow, x, u, rate);
+        let Along { equations, series, .. } = few_over;
+        for (register, &value) in (x.len()..).zip(u) {
+            series.set(register, 0, Interval::from(value));
+        }
+        let known = lie::enclose(x, duration, rate, held, |held| {
+            for (i, [state, _]) in held.iter().enumerate() {
+                series.set(i, 0, *state);
+            }
+            equations.advance(series, 0);
+            for (i, [_, rate]) in held.iter_mut().enumerate() {
+                *rate = series.get(equations.derivative(i), 0);
+            }
+        });
+        if !known {
+            return Some(f64::NEG_INFINITY);
+        }
+        let low = few_over.follow(Interval::new(t, t + duration), |i, k| held[i][k]).low;
+        if low >= wanted {
+            return Some(low);
+        }
+        let slope = few_over.series.get(few_over.h, 1);
+        Some(lie::sharper(low, value.follow(t, |i, _| x[i]), slope, duration))
     }
 
     fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {

@@ -110,6 +110,8 @@ impl QuadraticDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
+    const BENDS_ONE_WAY: bool = true;
+
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
@@ -170,6 +172,8 @@ impl DistanceDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
+    const BENDS_ONE_WAY: bool = true;
+
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level

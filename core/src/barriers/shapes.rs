@@ -43,6 +43,8 @@ impl HalfPlane {
 }
 
 impl<const NX: usize> Barrier<NX> for HalfPlane {
+    const BENDS_ONE_WAY: bool = true;
+
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         (x[0] - self.point[0]) * self.normal[0] + (x[1] - self.point[1]) * self.normal[1]
     }
@@ -106,6 +108,8 @@ impl Ellipse {
 }
 
 impl<const NX: usize> Barrier<NX> for Ellipse {
+    const BENDS_ONE_WAY: bool = true;
+
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_axes;
@@ -149,6 +153,8 @@ impl Rectangle {
 }
 
 impl<const NX: usize> Barrier<NX> for Rectangle {
+    const BENDS_ONE_WAY: bool = true;
+
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_sides;
@@ -192,6 +198,8 @@ impl StateBound {
 }
 
 impl<const NX: usize> Barrier<NX> for StateBound {
+    const BENDS_ONE_WAY: bool = true;
+
     /// Not a number for a state that the plant does not have.
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         match x.get(self.state) {
@@ -236,6 +244,8 @@ impl NormBound {
 }
 
 impl<const NX: usize> Barrier<NX> for NormBound {
+    const BENDS_ONE_WAY: bool = true;
+
     /// Not a number for states that the plant does not have.
     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
         let smoothing = 0.5 * self.limit;

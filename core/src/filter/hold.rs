@@ -6,6 +6,9 @@
 //! eighth of it where η is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in
 //! twice as many parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
 //!
+//! What is narrower than a part does not show in a walk. So η is enclosed too, where the source can: far from 0 on the whole
+//! hold, which does without a walk ([`Hold::floor`]), else after the walk, part by part.
+//!
 //! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What [`MOST`]
 //! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
 
@@ -24,6 +27,13 @@ const MOST: usize = 64;
 /// than 1; at a kink, such as the path past a small disc, it is 2. The difference of two walks counts as often: where
 /// they do not resolve a turn, both are off.
 const UNSURE: f64 = 4.0;
+
+/// Equal parts of a hold on which η is enclosed, one number after the other until that decides.
+const SHARPER: [u32; 4] = [1, 4, 16, 64];
+
+/// What an enclosure may leave open beside a walk, as a part of what η varies by on it. Where η is smooth, and turns where it is
+/// 0, four parts leave a quarter of it and sixteen a sixty-fourth.
+const LEFT_OPEN: f64 = 0.125;
 
 /// η and η̇ at an instant.
 #[derive(Clone, Copy)]
@@ -65,7 +75,47 @@ pub(super) struct Hold<'a> {
 }
 
 impl Hold<'_> {
-    /// A lower bound on h over `from` ≤ σ ≤ `to` (seconds after the sample), and where; `scratch` has the length
+    /// A number that η does not fall below until `to`, narrow things included; at its sharpest where it is negative. `None` where
+    /// the source has no enclosures.
+    pub(super) fn floor(&self, to: f64) -> Option<f64> {
+        let short = self.short(to);
+        self.source?.lowest_held(self.t, self.x, self.u, to, short).map(|h| h - short)
+    }
+
+    /// Where η may be negative between `from` and `to` though it `varies` by little at all instants looked at, by a lower bound
+    /// on it; `None` where it is not, and where nothing bounds it.
+    fn narrow(
+        &self,
+        source: &dyn Predict,
+        [from, to]: [f64; 2],
+        varies: f64,
+        x: &mut [f64],
+    ) -> Option<Lowest> {
+        let mut lowest = LARGEST;
+        for parts in SHARPER {
+            lowest = LARGEST;
+            x.copy_from_slice(self.x);
+            source.flow(x, self.u, from);
+            for k in 0..parts {
+                let [at, next] = [k, k + 1].map(|k| from + (to - from) * f64::from(k) / f64::from(parts));
+                let short = self.short(next);
+                let h = source.lowest_held(self.t + at, x, self.u, next - at, short)? - short;
+                lowest = lowest.or(Lowest { h, at: 0.5 * (at + next) });
+                source.flow(x, self.u, next - at);
+            }
+            if lowest.h >= -LEFT_OPEN * varies {
+                return None;
+            }
+        }
+        lowest.h.is_finite().then_some(lowest)
+    }
+
+    /// What is taken off h at an instant.
+    fn short(&self, at: f64) -> f64 {
+        self.shortfall.map_or(0.0, |shortfall| shortfall.at(at)[0])
+    }
+
+    /// A lower bound on η over `from` ≤ σ ≤ `to` (seconds after the sample), and where; `scratch` has the length
     /// of the state. `None` where the source cannot predict.
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
         let (mut coarse, mut fine) = ([Node::ZERO; MOST + 1], [Node::ZERO; MOST + 1]);
@@ -88,7 +138,11 @@ impl Hold<'_> {
                 seen = seen.or(Lowest { h: found.h + unsure, ..found });
             }
             parts *= 2;
-            if sure.h >= 0.0 || seen.h < 0.0 || parts == MOST {
+            if sure.h >= 0.0 {
+                let varies = fine[..=parts].windows(2).map(|two| (two[1].h - two[0].h).abs()).sum();
+                return self.narrow(source, [from, to], varies, scratch).or(Some(sure));
+            }
+            if seen.h < 0.0 || parts == MOST {
                 return Some(sure);
             }
             core::mem::swap(&mut coarse, &mut fine);

@@ -10,6 +10,9 @@ use crate::elementary::dot;
 use crate::qp::Row;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
+/// The part of h that must be left for it to be far from its edge.
+const CLEAR: f64 = 0.5;
+
 /// The course of h until the next sample, as the derivatives at a sample foresee it.
 #[derive(Clone, Copy)]
 pub(super) struct Outlook<'a> {
@@ -76,35 +79,34 @@ impl Outlook<'_> {
     ) -> Option<Lowest> {
         /// Round-off, as a part of the size of h.
         const ROUND_OFF: f64 = 1e-12;
-        /// The part of h that must be left for the model not to be asked.
-        const CLEAR: f64 = 0.5;
         // What is left at the end of the hold is the least: a shortfall grows.
         let h = self.drift[0] - self.short(hold);
         let highest = self.drift[self.n] + dot(normal, held.u);
-        // Far enough from the edge the model need not be asked. With n = 1 a set that moves faster than the samples
-        // shows in no derivative that is known here; a turn by radians shows where the hold ends.
-        let is_clear = || {
-            let agrees = |end: [f64; MAX_RELATIVE_DEGREE + 1]| {
-                let mut power = 1.0;
-                (0..=self.n).all(|k| {
-                    power *= if k == 0 { 1.0 } else { hold / k as f64 };
-                    power * (end[k] - self.foreseen(k, highest, hold)).abs() <= 0.5 * CLEAR * h
-                })
-            };
-            self.n > 1
-                && h > 0.0
-                && self.moved(highest, hold) <= (1.0 - CLEAR) * h
-                && held.derivatives(hold).is_none_or(agrees)
-        };
-        if is_clear() {
+        let is_far = h > 0.0 && self.moved(highest, hold) <= (1.0 - CLEAR) * h;
+        let floor = if is_far { held.floor(hold) } else { None };
+        if floor.map_or(is_far && self.agrees(held, highest, h, hold), |floor| floor >= 0.0) {
             return None;
         }
+        let size = promise.anchor[0].abs() + promise.margin + h.abs();
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
-        let size = promise.anchor[0].abs() + promise.margin + h.abs();
         // Not-a-number keeps no promise.
         (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
+    }
+
+    /// Whether the derivatives at the end of the hold, where h is far from its edge, are those foreseen: for sources without
+    /// enclosures. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
+    /// radians shows where the hold ends.
+    fn agrees(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
+        let is_near = |end: [f64; MAX_RELATIVE_DEGREE + 1]| {
+            let mut power = 1.0;
+            (0..=self.n).all(|k| {
+                power *= if k == 0 { 1.0 } else { hold / k as f64 };
+                power * (end[k] - self.foreseen(k, highest, hold)).abs() <= 0.5 * CLEAR * h
+            })
+        };
+        self.n > 1 && held.derivatives(hold).is_none_or(is_near)
     }
 
     /// The lowest h without a model, to the order n.

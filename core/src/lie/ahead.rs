@@ -15,7 +15,7 @@
 
 use nalgebra::SVector;
 
-use super::{COURSE, Course, CourseOver, Direction, RateOver};
+use super::{COURSE, Course, CourseOver, Direction, RateOver, enclosure};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, rk4};
 use crate::interval::Interval;
@@ -276,6 +276,12 @@ where
     barrier.value(Taylor::time(t), &states).coefficients
 }
 
+/// The first `K` coefficients of the courses of the states.
+#[inline(always)]
+fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> SVector<Taylor<Interval, K>, NX> {
+    SVector::from_fn(|i, _| Taylor { coefficients: core::array::from_fn(|k| path[i][k]) })
+}
+
 /// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the courses of the states. Once for a
 /// plant.
 #[inline(never)]
@@ -287,8 +293,7 @@ pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let series = |course: CourseOver| Taylor { coefficients: course }.truncated::<K>();
-    let states = SVector::<_, NX>::from_fn(|i, _| series(path[i]));
+    let states = first_over::<NX, K>(path);
     let (f, g) = (plant.drift(&states), plant.input_map(&states));
     for (i, out) in out.iter_mut().enumerate() {
         for (k, out) in out.iter_mut().enumerate().take(K) {
@@ -313,10 +318,54 @@ pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &
 where
     B: Barrier<NX>,
 {
-    let states = SVector::<Taylor<Interval, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
-    let mut course = Taylor::<Interval, COURSE>::time(0.0);
+    let states = first_over::<NX, COURSE>(path);
+    barrier.value(time_over(time), &states).coefficients[COURSE - 1]
+}
+
+/// Time from anywhere in `time` on.
+#[inline(always)]
+fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
+    let mut course = Taylor::time(0.0);
     course.coefficients[0] = time;
-    barrier.value(course, &states).coefficients[COURSE - 1]
+    course
+}
+
+/// A number that h does not fall below until `dt` s after `t` and `x` under the held input `u`: sharper where it would be less
+/// than `wanted`.
+#[inline(never)]
+pub(super) fn lowest_held<P, B, const NX: usize, const NU: usize>(
+    (plant, barrier): (&P, &B),
+    (t, dt): (f64, f64),
+    x: &[f64],
+    u: &[f64],
+    wanted: f64,
+) -> f64
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    let (x, u) = (SVector::<f64, NX>::from_column_slice(x), SVector::<f64, NU>::from_column_slice(u));
+    let mut states = [[Interval::ALL; 2]; NX];
+    let known =
+        enclosure::enclose(x.as_slice(), dt, plant.derivative(&x, &u).as_slice(), &mut states, |states| {
+            let over = SVector::<_, NX>::from_fn(|i, _| states[i][0]);
+            let (f, g) = (plant.drift(&over), plant.input_map(&over));
+            for (i, [_, rate]) in states.iter_mut().enumerate() {
+                let inputs = (0..NU).filter(|m| g[(i, *m)] != Interval::from(0.0));
+                *rate = inputs.fold(f[i], |sum, m| sum + g[(i, m)] * u[m]);
+            }
+        });
+    if !known {
+        return f64::NEG_INFINITY;
+    }
+    let time = Interval::new(t, t + dt);
+    let low = barrier.value(time, &SVector::from_fn(|i, _| states[i][0])).low;
+    if low >= wanted {
+        return low;
+    }
+    let course = SVector::<_, NX>::from_fn(|i, _| Taylor { coefficients: states[i] });
+    let slope = barrier.value(time_over::<2>(time), &course).coefficients[1];
+    enclosure::sharper(low, barrier.value(t, &x), slope, dt)
 }
 
 /// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead, for k < `K`. Leaves the

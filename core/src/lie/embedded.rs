@@ -164,6 +164,11 @@ impl Predict for Embedded {
         self.source.predict()?.last_over(time, &self.picked_over(path)[..self.picks.len()])
     }
 
+    fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
+        let own = &self.picked(x)[..self.picks.len()];
+        self.source.predict()?.lowest_held(t, own, u, duration, wanted)
+    }
+
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
         self.source.predict()?.lowest_from(t, &self.picked(x)[..self.picks.len()])
     }

@@ -121,6 +121,13 @@ pub trait Predict {
         None
     }
 
+    /// A number that h does not fall below until `duration` s after `t` and `x` under the held input `u`, narrow things in
+    /// between included; one below `wanted` is as near to the least value as can be had. −∞ where nothing bounds it. The default
+    /// knows none.
+    fn lowest_held(&self, _t: f64, _x: &[f64], _u: &[f64], _duration: f64, _wanted: f64) -> Option<f64> {
+        None
+    }
+
     /// The least value of h from `t` on while the state stays `x`; for sets that move. The default knows none.
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
         None

@@ -1,0 +1,53 @@
+//! Everything that a held input leads to within a time, enclosed.
+
+use crate::interval::Interval;
+
+/// Most trials. The second knows which states begin to move, the others what those move.
+const TRIALS: u32 = 8;
+
+/// Encloses the states until `dt` s after `x`, where their rate is `rate`, and their rates on the way: `[i][0]` and `[i][1]` of
+/// `states`. `rates` writes the latter to `[i][1]` for the former. Returns whether it did.
+///
+/// A box that holds all that its own rates lead to, x + \[0, dt\] ẋ(box), holds the path (Picard and Lindelöf).
+///
+/// Source: R. E. Moore, R. B. Kearfott and M. J. Cloud, *Introduction to Interval Analysis*, SIAM (2009), section 10.4.
+#[inline(always)]
+pub fn enclose(
+    x: &[f64],
+    dt: f64,
+    rate: &[f64],
+    states: &mut [[Interval; 2]],
+    mut rates: impl FnMut(&mut [[Interval; 2]]),
+) -> bool {
+    /// Part of the way by which a trial is wider at either end.
+    const WIDER: f64 = 0.5;
+    for ((state, x), rate) in states.iter_mut().zip(x).zip(rate) {
+        state[0] = Interval::new(-WIDER, 1.0 + WIDER) * (rate * dt) + *x;
+    }
+    for _ in 0..TRIALS {
+        rates(states);
+        let mut holds = true;
+        for ([state, rate], x) in states.iter_mut().zip(x) {
+            let (low, high) = (x + dt * rate.low.min(0.0), x + dt * rate.high.max(0.0));
+            holds &= state.low <= low && high <= state.high;
+            *state = Interval::new(low, high);
+        }
+        if holds {
+            return true;
+        }
+        for [state, _] in states.iter_mut() {
+            let wider = WIDER * (state.high - state.low);
+            *state = Interval::new(state.low - wider, state.high + wider);
+        }
+    }
+    false
+}
+
+/// The greater of two lower bounds on what begins as `h` and has its values from `low` up and its rate in `slope` for `dt` s. By
+/// the mean value theorem, where much of what moves h cancels, the second is.
+#[inline(always)]
+pub fn sharper(low: f64, h: f64, slope: Interval, dt: f64) -> f64 {
+    let risen = h + dt * slope.low.min(0.0);
+    // Not-a-number is no bound.
+    if risen > low { risen } else { low }
+}
