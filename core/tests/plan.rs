@@ -1603,3 +1603,50 @@ fn what_has_ended_is_not_guaranteed() {
     }
     assert!(guaranteed > 50, "{guaranteed}");
 }
+
+/// A speed (m/s) with drag, and a level (m) that rises with it and creeps towards 60 m, at a rate per second.
+#[derive(Clone, Copy, Debug)]
+struct Filling(f64);
+
+impl ControlAffine<2, 1> for Filling {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[0] * -0.5, x[0].max(S::zero()) - (x[1] - 60.0) * self.0])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::one(), S::zero()]])
+    }
+}
+
+/// What goes on to creep, however slowly, is no rest: no promise is given that is lost later. Without a creep there are some.
+#[test]
+fn what_creeps_on_is_no_rest() {
+    let random = &mut Random(5);
+    let mut assured = [0; 2];
+    for round in 0..120 {
+        let creeps = round % 4 != 0;
+        let plant = Filling(if creeps { 10.0_f64.powf(random.between(-8.0, -3.0)) } else { 0.0 });
+        let level = StateBound::at_most(1, random.between(5.0, 80.0)).expect("valid bound");
+        let source = along(plant, level, 2).expect("a degree");
+        let filter = SafetyFilter::builder(2, 1)
+            .source("level", source, BarrierSettings::keeping())
+            .and_then(|b| b.bounds(&[-2.0], &[2.0]))
+            .and_then(|b| b.sampling(Sampling::Period(0.1)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+        let mut x = SVector::from([random.between(0.0, 4.0), random.between(0.0, 60.0)]);
+        for k in 0..1500 {
+            let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
+            let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
+            if k == 0 && standing == Standing::Refused {
+                break;
+            }
+            assured[usize::from(creeps)] += u32::from(k == 0);
+            assert_eq!(standing, Standing::Assured, "{plant:?} at {t} s: {x:?}");
+            x = rk4_step(&plant, &x, &u.into(), 0.1);
+        }
+    }
+    println!("{assured:?} are assured at rest and creeping");
+    assert!(assured[0] > 10, "{assured:?}");
+}

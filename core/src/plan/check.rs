@@ -47,6 +47,10 @@ pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 const DRIFT: f64 = 1e3;
 /// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
 pub(crate) const ON_TIME: f64 = 1e-6;
+/// Holds of the braking law from a rest on after which what is left dies away slowly or not at all.
+const SETTLING: usize = 4;
+/// What h varies by in as many more for that to be round-off, as a part of what it is made of.
+const SETTLED: f64 = 64.0 * f64::EPSILON;
 /// Most holds of the braking law after a reference.
 const BRAKING: usize = 200;
 /// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
@@ -459,7 +463,8 @@ impl<'a> Walk<'a> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = brake.hold.max(self.grid.period);
         for _ in 0..BRAKING {
-            let rests = self.is_still(brake, hold, &mut u) && self.rests(&u, hold)?;
+            let rests =
+                self.is_still(brake, hold, &mut u) && self.rests(&u, hold)? && self.settles(brake, hold);
             self.hold_until(&u, self.t + hold)?;
             if rests {
                 return Ok(Witness { until: f64::INFINITY, ..self.witness });
@@ -489,7 +494,9 @@ impl<'a> Walk<'a> {
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
         let hold = brake.hold.max(self.grid.period);
-        let ends = self.is_still(brake, hold, &mut u) && matches!(self.rests(&u, hold), Ok(true));
+        let ends = self.is_still(brake, hold, &mut u)
+            && matches!(self.rests(&u, hold), Ok(true))
+            && self.settles(brake, hold);
         self.witness.tightest = tightest;
         ends
     }
@@ -500,6 +507,37 @@ impl<'a> Walk<'a> {
         self.model.plant.rate(&self.x, u, &mut self.rate);
         self.rate.iter().enumerate().all(|(i, rate)| {
             rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
+        })
+    }
+
+    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law: what h varies by in some holds
+    /// of it and in as many after them is taken for the begin of a geometric series.
+    fn settles(&self, brake: &Brake, hold: f64) -> bool {
+        let mut u = vec![0.0; self.model.inputs()];
+        let mut way = vec![self.x.clone()];
+        for k in 0..2 * SETTLING {
+            let mut x = way[k].clone();
+            brake.input(&self.model, &x, &mut u);
+            self.model.flow(&mut x, &u, hold);
+            way.push(x);
+        }
+        let size = way[SETTLING].iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        self.requirements.iter().enumerate().filter(|(_, r)| r.until > self.t).all(|(i, requirement)| {
+            let (model, begin) = (requirement.model, self.t.max(requirement.from));
+            let [before, now] = [&way[..=SETTLING], &way[SETTLING..]].map(|way| {
+                let h =
+                    way.iter().map(|x| model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x)));
+                h.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)])
+            });
+            let least = now[0].min(before[0]);
+            let [before, now] = [before, now].map(|[low, high]| high - low);
+            let round_off = SETTLED * (size + least.abs());
+            let to_come = match () {
+                () if now <= round_off => 0.0,
+                () if now < before - round_off => now * now / (before - now - round_off),
+                () => now * (requirement.until - self.t) / (SETTLING as f64 * hold),
+            };
+            least - to_come >= self.least_of(i)
         })
     }
 
