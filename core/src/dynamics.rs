@@ -287,6 +287,12 @@ pub trait DynPlant: Send {
     fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error>;
 }
 
+/// The first `N` of the numbers `x`. Where `N` is known to the compiler, it calls no function that copies any number of them.
+#[inline(always)]
+pub(crate) fn column<T: Scalar, const N: usize>(x: &[T]) -> SVector<T, N> {
+    SVector::from(*x.first_chunk().expect("a number for each component"))
+}
+
 /// Checks the lengths of a state and an input.
 ///
 /// # Errors
@@ -315,7 +321,7 @@ where
 
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error> {
         check_lengths((x, NX), (u, NU))?;
-        let next = rk4_step(&self.0, &SVector::from_column_slice(x), &SVector::from_column_slice(u), dt);
+        let next = rk4_step(&self.0, &column(x), &column(u), dt);
         x.copy_from_slice(next.as_slice());
         Ok(())
     }
@@ -323,7 +329,7 @@ where
     fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error> {
         check_lengths((x, NX), (u, NU))?;
         length("rates", rates.len(), NX)?;
-        let (x, u) = (SVector::from_column_slice(x), SVector::from_column_slice(u));
+        let (x, u) = (column(x), column(u));
         rates.copy_from_slice(self.0.derivative(&x, &u).as_slice());
         Ok(())
     }

@@ -32,7 +32,7 @@ use core::marker::PhantomData;
 use nalgebra::SVector;
 
 use crate::barrier::Barrier;
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, column};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
 use crate::jet::{Response, Taylor};
@@ -144,7 +144,7 @@ where
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        let x = SVector::from_column_slice(x);
+        let x = column(x);
         let h: Response<NU, K> = barrier_series(&self.plant, &self.barrier, t, &x);
         *out = Derivatives::ZERO;
         let mut factorial = 1.0;
@@ -174,7 +174,7 @@ where
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
-        let region = self.plant.region(&SVector::from_column_slice(x), bounds, time)?;
+        let region = self.plant.region(&column(x), bounds, time)?;
         self.barrier.highest(time.map(|after| t + after), &region)
     }
 }
@@ -185,7 +185,7 @@ where
     B: Barrier<NX>,
 {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
-        let (from, held) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
+        let (from, held) = (column::<f64, NX>(x), column(u));
         x.copy_from_slice(flow(&self.plant, &from, &held, duration, SUBSTEPS).as_slice());
     }
 
@@ -237,17 +237,17 @@ where
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        let (x, u) = (SVector::<f64, NX>::from_column_slice(x), SVector::from_column_slice(u));
+        let (x, u) = (column::<f64, NX>(x), column(u));
         out.copy_from_slice(self.plant.derivative(&x, &u).as_slice());
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
-        let x = SVector::<f64, NX>::from_column_slice(x);
+        let x = column::<f64, NX>(x);
         ahead::path::<P, NX, NU>(&self.plant, &x, u, out);
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
-        self.barrier.value(t, &SVector::from_column_slice(x))
+        self.barrier.value(t, &column(x))
     }
 
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
@@ -281,7 +281,7 @@ where
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
-        self.barrier.range_from(t, &SVector::from_column_slice(x)).map(|[least, _]| least)
+        self.barrier.range_from(t, &column(x)).map(|[least, _]| least)
     }
 }
 

@@ -17,7 +17,7 @@ use nalgebra::SVector;
 
 use super::{COURSE, Course, CourseOver, Direction, RateOver, enclosure};
 use crate::barrier::Barrier;
-use crate::dynamics::{ControlAffine, rk4};
+use crate::dynamics::{ControlAffine, column, rk4};
 use crate::interval::Interval;
 use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
@@ -87,11 +87,11 @@ const EVEN: f64 = 1e-4;
 /// Whether the rates at the four stages of a Runge-Kutta step, state by state, bend so little that one step does.
 #[inline(always)]
 pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
-    let (mut bend, mut largest) = (0.0, 0.0);
+    let (mut bend, mut largest) = (0.0_f64, 0.0_f64);
     for (((k1, k2), k3), k4) in k1.iter().zip(k2).zip(k3).zip(k4) {
         let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(|k| k.value());
-        bend = f64::max(bend, (k1 - k2 - k3 + k4).abs());
-        largest = f64::max(largest, k1.abs().max(k4.abs()));
+        bend = bend.max((k1 - k2 - k3 + k4).abs());
+        largest = largest.max(k1.abs()).max(k4.abs());
     }
     // Not-a-number is not even.
     bend <= EVEN * largest
@@ -206,7 +206,11 @@ where
     S: Scalar,
 {
     const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
-    let mut series = SVector::<Taylor<S, K>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
+    // In place, since the compiler moves what a closure makes.
+    let mut series = SVector::from([Taylor { coefficients: [S::zero(); K] }; NX]);
+    for i in 0..NX {
+        series[i].coefficients[0] = x[i];
+    }
     macro_rules! extend_to {
         ($($j:literal),*) => {
             $(if const { $j < K } {
@@ -382,7 +386,7 @@ pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
     B: Barrier<NX>,
 {
     let held: [f64; NU] = core::array::from_fn(|i| u[i]);
-    let x = arrival(plant, &SVector::from_column_slice(x), &held, duration);
+    let x = arrival(plant, &column(x), &held, duration);
     let u = SVector::<Dual<NU>, NU>::from_fn(|i, _| Dual::variable(held[i], i));
     let h: Taylor<_, K> = series((plant, barrier), t + duration, &x, &u);
     for k in 0..K {
@@ -404,8 +408,8 @@ pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let u = SVector::<f64, NU>::from_column_slice(u);
-    let x = arrival_alone(plant, &SVector::from_column_slice(x), &u, duration);
+    let u = column::<f64, NU>(u);
+    let x = arrival_alone(plant, &column(x), &u, duration);
     let h: Taylor<_, K> = series((plant, barrier), t + duration, &x, &u);
     for (k, out) in out[..K].iter_mut().enumerate() {
         *out = h.derivative(k);
