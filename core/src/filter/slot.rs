@@ -184,7 +184,7 @@ impl BarrierSlot {
         let unsure = self.unsure(moment, errors);
         let disturbance = self.promise.settings().disturbance;
         self.now.shortfall = Shortfall::new(&unsure[..n], disturbance, moment.delay);
-        let drift = self.now.derivatives.drift;
+        let drift = &self.now.derivatives.drift;
         let lowest: Stack = core::array::from_fn(|k| drift[k] - unsure[k]);
         let lowest = &lowest[..n];
         self.anchor(promise, moment, lowest);
@@ -217,8 +217,9 @@ impl BarrierSlot {
             .period
             .and_then(|period| self.promise.over_period(promise, moment.begin, &drift[..n], period));
         self.now.row = Row { normal: *normal, floor };
+        let is_sampled = bound.is_some();
         self.now.period_bound = bound.unwrap_or(PeriodBound::ZERO);
-        bound.is_some()
+        is_sampled
     }
 
     /// (S) over another `duration` in s, `None` where the barrier is not in force or has none.
@@ -256,7 +257,7 @@ impl BarrierSlot {
             let a = row[i];
             square += a * a;
             if a != 0.0 {
-                reach += f64::max(a * bounds.min[i], a * bounds.max[i]);
+                reach += a * if a > 0.0 { bounds.max[i] } else { bounds.min[i] };
             }
         }
         let size = elementary::sqrt(square);

@@ -7,7 +7,6 @@ use crate::convergence::{FixedTimeState, Unmet};
 use crate::elementary;
 use crate::error::{Error, length};
 use crate::qp::{Enforcement, Outcome, Problem, Solution};
-use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// Most times that a sample adds the instants at which its answer breaks a promise, and is solved again.
@@ -58,7 +57,7 @@ impl SafetyFilter {
         self.workspace.next.clone_from(&self.state);
         self.workspace.report.reset(t);
         self.note_start(t);
-        if !t.is_finite() || !all_finite(x) || !all_finite(u_ref) {
+        if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
             self.workspace.report.barriers.fill(BarrierReport::BLANK);
             self.abstain(Status::InvalidInput, u);
             return Ok(());
@@ -111,7 +110,8 @@ impl SafetyFilter {
         requirements.clear();
         let (mut found, mut is_sampled) = (Ok(()), moment.period.is_some());
         let promises = &mut next.barriers[..];
-        for (i, (slot, report)) in self.slots.iter_mut().zip(&mut report.barriers).enumerate() {
+        for (i, slot) in self.slots.iter_mut().enumerate() {
+            let report = &mut report.barriers[i];
             let h = slot.evaluate(moment, &acting[..moment.u_ref.len()]);
             let deadline_unreachable = match slot.advance(promises, i, h, moment, &self.bounds, &self.errors)
             {

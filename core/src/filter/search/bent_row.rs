@@ -283,18 +283,16 @@ impl PeriodProblem<'_> {
         let mut row = Bent { value: at_reference.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
-        let kept = self.bend.filter(|bend| bend.barrier as usize == requirement.barrier).filter(|bend| {
+        let mut kept = self.bend.filter(|bend| bend.barrier as usize == requirement.barrier);
+        if let Some(bend) = kept {
             row.hessian = bend.over(requirement.ahead);
-            let Some((way, lambda)) = row.nearest(&[0.0; M]) else { return false };
+            let (way, lambda) = row.nearest(&[0.0; M]).unwrap_or(([0.0; M], 0.0));
             let target: [f64; M] = core::array::from_fn(|i| u_ref[i] + way[i]);
-            let leads = lambda > 0.0 && self.bounds.contain_all(&target);
-            if leads {
+            if lambda > 0.0 && self.bounds.contain_all(&target) {
                 (u, step, length) = (target, way, largest(&way));
+            } else {
+                (row.hessian, kept) = ([[0.0; M]; M], None);
             }
-            leads
-        });
-        if kept.is_none() {
-            row.hessian = [[0.0; M]; M];
         }
         let (mut way, mut turned) = ([0.0; M], [0.0; M]);
         let (mut bends_aside, mut rounds) = (false, 0);
@@ -310,7 +308,7 @@ impl PeriodProblem<'_> {
                 // The part of the step aside of the way from u_ref, with the part of the turn that is its own.
                 let along = product(&step, &way) / product(&way, &way);
                 let aside = core::array::from_fn(|i| step[i] - along * way[i]);
-                let tells = largest(&step) >= TELLING * largest(&u).max(1.0);
+                let tells = largest(&step) >= TELLING * 1.0_f64.max(largest(&u));
                 if tells && product(&aside, &aside) >= ASIDE_OF_STEP * product(&step, &step) {
                     row.learn(&aside, &core::array::from_fn(|i| change[i] - along * turned[i]));
                     bends_aside = true;
@@ -327,7 +325,7 @@ impl PeriodProblem<'_> {
             if !self.bounds.contain_all(&target) || lambda <= 0.0 {
                 return None;
             }
-            let (shortened, size) = (largest(&step) / length, largest(&u).max(largest(&target)).max(1.0));
+            let (shortened, size) = (largest(&step) / length, 1.0_f64.max(largest(&u)).max(largest(&target)));
             let before_length = length;
             let from = core::mem::replace(&mut u, target);
             length = largest(&step);
@@ -372,8 +370,8 @@ impl PeriodProblem<'_> {
             return None;
         }
         let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
-        let limit = last.map_or(0.0, |last| last.iter().fold(0.0, |s: f64, v| s.max(v.abs())));
-        let limit = limit.max(largest(u_ref)).max(1.0);
+        let known = 1.0_f64.max(largest(u_ref));
+        let limit = last.unwrap_or_default().iter().fold(known, |s, v| s.max(v.abs()));
         if distance > (FAR * limit).min(self.correction_limit) {
             return None;
         }
