@@ -287,7 +287,7 @@ pub trait DynPlant: Send {
     fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error>;
 }
 
-/// The first `N` of the numbers `x`. Where `N` is known to the compiler, it calls no function that copies any number of them.
+/// The first `N` of the numbers `x`, as an array has them: nalgebra's own function copies a number that is not known beforehand.
 #[inline(always)]
 pub(crate) fn column<T: Scalar, const N: usize>(x: &[T]) -> SVector<T, N> {
     SVector::from(*x.first_chunk().expect("a number for each component"))

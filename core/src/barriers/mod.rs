@@ -35,7 +35,7 @@ pub struct Outside<B>(pub B);
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     const BENDS_ONE_WAY: bool = B::BENDS_ONE_WAY;
 
-    #[inline]
+    #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
         -self.0.value(t, x)
     }

@@ -24,7 +24,7 @@
 
 use core::array::from_fn;
 
-use super::comparison::{Stack, lower_terms, scaled_coefficient};
+use super::comparison::{lower_terms, scaled_coefficient};
 use super::condition::{AnchorChange, Bound, Condition, Rates, Sample};
 use super::polynomial::first_near;
 use super::profile::Derivatives;
@@ -68,6 +68,7 @@ pub fn smallest_rate(e: &[f64]) -> Option<f64> {
 
 /// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative where none ≥ 0 does. `h` holds
 /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
+#[inline]
 pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     let (mut least, mut power) = (h[0], 1.0);
     for k in 1..h.len() {
@@ -138,7 +139,7 @@ const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 /// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.
-pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
+pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means) -> Keep {
     let by_hold = LARGEST_RATE_TIMES_HOLD / means.hold;
     let limit = if means.hold > 0.0 { by_hold.max(base) } else { base * LARGEST_RATE_OVER_BASE };
     // 1. The gentle rate, with the margin that it affords. Small dips into the margin do not change the rate.
@@ -146,10 +147,9 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
     let kept = affordable.clamp(0.0, if is_gentle { margin } else { ENOUGH * margin });
-    let mut own = [0.0; MAX_RELATIVE_DEGREE];
-    own[..h.len()].copy_from_slice(h);
-    own[0] -= kept;
-    let e = &own[..h.len()];
+    let mut e = *h;
+    e[0] -= kept;
+    let e = &e;
     let is_invariant = affordable >= 0.0;
     if !is_invariant {
         // Not even the largest rate affords a margin ≥ 0: as hard as it must be, where a rate does it at all.
@@ -157,7 +157,7 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
         return Keep { rate, margin: kept, pull: 0.0, is_invariant };
     }
     // 2. The smallest rate that will do, where the gentle one does not.
-    let over_smallest = if h.len() == 2 { OVER_SMALLEST } else { 1.0 };
+    let over_smallest = if N == 2 { OVER_SMALLEST } else { 1.0 };
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
     let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
@@ -174,14 +174,13 @@ pub fn keep(h: &[f64], margin: f64, base: f64, means: &Means) -> Keep {
         gentle
     } else {
         // It has to stay that low for a part of the hold: the larger a part, the less h follows an input.
-        let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { own };
-        let ahead = &ahead[..h.len()];
-        let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, ahead)) <= most;
-        let guess = rate_of_floor(most, e).max(rate_of_floor(most, ahead));
+        let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { *e };
+        let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead)) <= most;
+        let guess = rate_of_floor(most, e).max(rate_of_floor(most, &ahead));
         if is_met(limit) { first_near(guess, gentle, limit, is_met) } else { limit }
     };
     // 4. The gentle rate with all of the margin, as far as that is possible.
-    let back = -lower_terms(base, e) + elementary::powi(base, h.len() as i32) * (margin - kept);
+    let back = -lower_terms(base, e) + elementary::powi(base, N as i32) * (margin - kept);
     let pull = if kept < margin { (eased(back).min(possible) - floor(rate)).max(0.0) } else { 0.0 };
     Keep { rate, margin: kept, pull, is_invariant }
 }
@@ -287,6 +286,7 @@ impl Condition for Stay<'_> {
 }
 
 /// The part of e that is being lost, for n = 2: 0 where ė ≥ a e, 1 where ė ≤ 0. For other n it is 1.
+#[inline]
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
     // Not `clamp`, which keeps not-a-number: 0/0 at rest on the boundary.
@@ -304,13 +304,9 @@ fn rate_of_floor(floor: f64, e: &[f64]) -> f64 {
 }
 
 /// The derivatives `e`, `hold` s later, with e⁽ⁿ⁾ = `highest`.
-fn ahead(e: &[f64], highest: f64, hold: f64) -> Stack {
-    let mut ahead = [0.0; MAX_RELATIVE_DEGREE];
-    for j in 0..e.len() {
-        // Horner's scheme, from the highest derivative.
-        ahead[j] = (j..e.len()).rev().fold(highest, |sum, i| e[i] + sum * hold / (i + 1 - j) as f64);
-    }
-    ahead
+fn ahead<const N: usize>(e: &[f64; N], highest: f64, hold: f64) -> [f64; N] {
+    // Horner's scheme, from the highest derivative.
+    from_fn(|j| (j..N).rev().fold(highest, |sum, i| e[i] + sum * hold / (i + 1 - j) as f64))
 }
 
 #[cfg(test)]

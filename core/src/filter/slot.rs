@@ -217,9 +217,8 @@ impl BarrierSlot {
             .period
             .and_then(|period| self.promise.over_period(promise, moment.begin, &drift[..n], period));
         self.now.row = Row { normal: *normal, floor };
-        let is_sampled = bound.is_some();
         self.now.period_bound = bound.unwrap_or(PeriodBound::ZERO);
-        is_sampled
+        bound.is_some()
     }
 
     /// (S) over another `duration` in s, `None` where the barrier is not in force or has none.

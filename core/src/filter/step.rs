@@ -57,7 +57,8 @@ impl SafetyFilter {
         self.workspace.next.clone_from(&self.state);
         self.workspace.report.reset(t);
         self.note_start(t);
-        if !t.is_finite() || !x.iter().chain(u_ref).all(|v| v.is_finite()) {
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        if !t.is_finite() || !finite(x) || !finite(u_ref) {
             self.workspace.report.barriers.fill(BarrierReport::BLANK);
             self.abstain(Status::InvalidInput, u);
             return Ok(());
