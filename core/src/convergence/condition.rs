@@ -12,6 +12,7 @@ use super::comparison::Stack;
 use super::fixed_time::Refusal;
 use super::operator::Operator;
 use super::profile::Derivatives;
+use super::sampled::{self, PeriodBound};
 use crate::MAX_RELATIVE_DEGREE;
 
 /// No error of any derivative.
@@ -207,7 +208,7 @@ pub trait Condition {
     }
 
     /// The operator, where φ is linear: Π (D + a_i)(h − μ − r) ≥ pull. Such a condition has a form for inputs that are
-    /// held ([`sampled`](super::sampled)).
+    /// held ([`sampled`]).
     fn rates(&self, _at: &Sample) -> Option<Rates> {
         None
     }
@@ -215,6 +216,13 @@ pub trait Condition {
     /// r of [`rates`](Self::rates) and its derivatives, `elapsed` s after the anchor.
     fn profile(&self, _at: &Sample, _elapsed: f64) -> Derivatives {
         [0.0; MAX_RELATIVE_DEGREE + 1]
+    }
+
+    /// (S) of [`sampled`] from the sample `at`, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and h⁽ⁿ⁾ is disturbed by up to `disturbance`,
+    /// over `period` > 0 seconds; `None` where φ is not linear. It follows from [`rates`](Self::rates) and
+    /// [`profile`](Self::profile), so that there is nothing to define. It stands here to be compiled with them.
+    fn over_period(&self, at: &Sample, h: &[f64], period: f64, disturbance: f64) -> Option<PeriodBound> {
+        sampled::over_period(self, at, h, period, disturbance)
     }
 
     /// The derivative of what [`anchor`](Self::anchor) chose where h (`h[0]`) moves along `h[1]`; `None` where it is

@@ -10,7 +10,7 @@ use super::condition::{Anchored, Anchoring, Condition, EXACT, Sample};
 use super::phase::{Phase, Seen};
 use super::profile::{Profile, ProfileError};
 use super::repeated_root::NoAdmissibleRate;
-use super::sampled::{self, PeriodBound};
+use super::sampled::PeriodBound;
 use super::settings::FixedTimeSettings;
 use super::state::FixedTimeState;
 use super::stay::{Means, Stay};
@@ -319,7 +319,7 @@ impl FixedTime {
     /// approach of the first-order condition, and under most of a user's own.
     pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> Option<PeriodBound> {
         self.in_force(state, t, h, |condition, at| {
-            sampled::over_period(condition, at, h, period, self.settings.disturbance)
+            condition.over_period(at, h, period, self.settings.disturbance)
         })
     }
 

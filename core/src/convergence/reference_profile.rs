@@ -80,11 +80,7 @@ impl Condition for ReferenceProfile {
     #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
         let n = at.e.len();
-        let r = match (&self.own, self.kind) {
-            // As below, with n known to the compiler.
-            (None, ProfileKind::Hermite) => Hermite.evaluate(at.anchor, at.deadline, at.elapsed),
-            _ => self.profile(at, at.elapsed),
-        };
+        let r = self.profile(at, at.elapsed);
         let (mut error, mut lowest) = ([0.0; MAX_RELATIVE_DEGREE], [0.0; MAX_RELATIVE_DEGREE]);
         for k in 0..n {
             error[k] = at.e[k] - r[k];
@@ -130,15 +126,19 @@ impl Condition for ReferenceProfile {
         profile::check(&**own, at.anchor, at.deadline).err().map(Refusal::Profile)
     }
 
+    #[inline(always)]
     fn rates(&self, at: &Sample) -> Option<Rates> {
         Some(self.rates.map_or(Rates::Repeated(at.rate), Rates::Each))
     }
 
+    #[inline(always)]
     fn profile(&self, at: &Sample, elapsed: f64) -> Derivatives {
-        if !at.has_time() {
-            return [0.0; MAX_RELATIVE_DEGREE + 1];
+        match (&self.own, self.kind) {
+            _ if !at.has_time() => [0.0; MAX_RELATIVE_DEGREE + 1],
+            // As below, with n known to the compiler.
+            (None, ProfileKind::Hermite) => Hermite.evaluate(at.anchor, at.deadline, elapsed),
+            _ => self.in_force(at).evaluate(at.anchor, at.deadline, elapsed),
         }
-        self.in_force(at).evaluate(at.anchor, at.deadline, elapsed)
     }
 
     fn anchor_change(&self, at: &Sample, [h, dh]: [&[f64]; 2], period: f64) -> Option<AnchorChange> {

@@ -229,10 +229,9 @@ impl Cascade {
     }
 }
 
-/// (S) of a linear `condition` over `period` > 0 seconds from the sample `at`, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and h⁽ⁿ⁾ is
-/// disturbed by up to `disturbance`; `None` where the condition is not linear.
-pub(super) fn over_period(
-    condition: &dyn Condition,
+/// [`Condition::over_period`].
+pub(super) fn over_period<C: Condition + ?Sized>(
+    condition: &C,
     at: &Sample,
     h: &[f64],
     period: f64,
@@ -240,26 +239,27 @@ pub(super) fn over_period(
 ) -> Option<PeriodBound> {
     // With n known to the compiler the short loops unroll.
     match at.degree() {
-        1 => over_period_of_degree::<1>(condition, at, h, period, disturbance),
-        2 => over_period_of_degree::<2>(condition, at, h, period, disturbance),
-        3 => over_period_of_degree::<3>(condition, at, h, period, disturbance),
-        4 => over_period_of_degree::<4>(condition, at, h, period, disturbance),
-        5 => over_period_of_degree::<5>(condition, at, h, period, disturbance),
-        6 => over_period_of_degree::<6>(condition, at, h, period, disturbance),
-        7 => over_period_of_degree::<7>(condition, at, h, period, disturbance),
-        _ => over_period_of_degree::<8>(condition, at, h, period, disturbance),
+        1 => over_period_of_degree::<C, 1>(condition, at, h, period, disturbance),
+        2 => over_period_of_degree::<C, 2>(condition, at, h, period, disturbance),
+        3 => over_period_of_degree::<C, 3>(condition, at, h, period, disturbance),
+        4 => over_period_of_degree::<C, 4>(condition, at, h, period, disturbance),
+        5 => over_period_of_degree::<C, 5>(condition, at, h, period, disturbance),
+        6 => over_period_of_degree::<C, 6>(condition, at, h, period, disturbance),
+        7 => over_period_of_degree::<C, 7>(condition, at, h, period, disturbance),
+        _ => over_period_of_degree::<C, 8>(condition, at, h, period, disturbance),
     }
 }
 
 /// [`over_period`] for n = `N`.
-fn over_period_of_degree<const N: usize>(
-    condition: &dyn Condition,
+fn over_period_of_degree<C: Condition + ?Sized, const N: usize>(
+    condition: &C,
     at: &Sample,
     h: &[f64],
     period: f64,
     disturbance: f64,
 ) -> Option<PeriodBound> {
     let h: &[f64; N] = h.first_chunk()?;
+    let at = &Sample { anchor: at.anchor.first_chunk::<N>()?, ..*at };
     let cascade = Cascade::of(&condition.rates(at)?, N, at.time_left(period));
     // The target of h: μ + r and its derivatives.
     let target = |elapsed: f64| {
