@@ -226,9 +226,9 @@ impl Stay<'_> {
 
     /// Whether the gentle rate keeps h ≥ `margin` from the derivatives `h`.
     pub(super) fn can_keep<const N: usize>(&self, h: &[f64; N], margin: f64, means: &Means) -> bool {
-        let base = self.base_rate(h, means);
-        let e: [f64; N] = from_fn(|k| if k == 0 { h[0] - margin } else { h[k] });
-        h[0] >= 0.0 && is_invariant(base, &e)
+        let mut e = *h;
+        e[0] -= margin;
+        h[0] >= 0.0 && is_invariant(self.base_rate(h, means), &e)
     }
 
     /// Whether rate and margin in `state` are constants that do not depend on the sample.
