@@ -348,7 +348,7 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let (x, u) = (SVector::<f64, NX>::from_column_slice(x), SVector::<f64, NU>::from_column_slice(u));
+    let (x, u) = (column::<f64, NX>(x), column::<f64, NU>(u));
     let mut states = [[Interval::ALL; 2]; NX];
     let known =
         enclosure::enclose(x.as_slice(), dt, plant.derivative(&x, &u).as_slice(), &mut states, |states| {

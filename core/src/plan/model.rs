@@ -14,8 +14,6 @@ use crate::qp::Bounds;
 const DIFFERENCE: f64 = 1e-6;
 /// Most Gauss-Newton steps to a state of rest.
 const TO_REST: u32 = 30;
-/// Rate of a state per s at which one more of them ends in a state of rest.
-const NEAR: f64 = 1e-9;
 /// Least singular value that counts, as a part of the largest.
 const RANK: f64 = 1e-9;
 
@@ -113,23 +111,14 @@ impl Model<'_> {
         let (nx, nu) = (self.states(), self.inputs());
         let (mut at, mut u) = (x.to_vec(), vec![0.0; nu]);
         self.clamp(&mut u);
-        let mut nearest = None;
         for _ in 0..TO_REST {
             let rate = self.rate(&at, &u, duration);
             if !rate.iter().all(|r| r.is_finite()) {
-                return nearest;
+                return None;
             }
-            let is_within = |least: f64| {
-                let still = |(x, r): (&f64, &f64)| r.abs() <= least + ROUND_OFF * x.abs() / duration;
-                at.iter().zip(rate.iter()).all(still)
-            };
-            // Near enough, but what is left over would move the plant for ever.
-            if is_within(NEAR) {
-                let is_last = nearest.is_some() || is_within(ROUND_OFF);
-                nearest = Some((at.clone(), u.clone()));
-                if is_last {
-                    return nearest;
-                }
+            let still = |(x, r): (&f64, &f64)| r.abs() <= 1e-9 + ROUND_OFF * x.abs() / duration;
+            if at.iter().zip(rate.iter()).all(still) {
+                return Some((at, u));
             }
             let Linear { a, b } = self.linear(&at, &u, duration);
             let mut jacobian = DMatrix::zeros(nx, nx + nu);
@@ -145,6 +134,6 @@ impl Model<'_> {
             }
             self.clamp(&mut u);
         }
-        nearest
+        None
     }
 }
