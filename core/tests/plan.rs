@@ -1623,7 +1623,7 @@ impl ControlAffine<2, 1> for Filling {
 fn what_creeps_on_is_no_rest() {
     let random = &mut Random(5);
     let mut assured = [0; 2];
-    for round in 0..120 {
+    for round in 0..60 {
         let creeps = round % 4 != 0;
         let plant = Filling(if creeps { 10.0_f64.powf(random.between(-8.0, -3.0)) } else { 0.0 });
         let level = StateBound::at_most(1, random.between(5.0, 80.0)).expect("valid bound");
@@ -1636,7 +1636,7 @@ fn what_creeps_on_is_no_rest() {
             .expect("valid filter");
         let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
         let mut x = SVector::from([random.between(0.0, 4.0), random.between(0.0, 60.0)]);
-        for k in 0..1500 {
+        for k in 0..900 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
             let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
             if k == 0 && standing == Standing::Refused {
@@ -1648,5 +1648,5 @@ fn what_creeps_on_is_no_rest() {
         }
     }
     println!("{assured:?} are assured at rest and creeping");
-    assert!(assured[0] > 10, "{assured:?}");
+    assert!(assured[0] > 5, "{assured:?}");
 }
