@@ -314,7 +314,7 @@ impl FixedTime {
         }
     }
 
-    /// (S) of [`sampled`] from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and
+    /// (S) of [`sampled`](super::sampled) from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and
     /// where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e: on the
     /// approach of the first-order condition, and under most of a user's own.
     pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> Option<PeriodBound> {
