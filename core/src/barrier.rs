@@ -30,8 +30,9 @@ use crate::scalar::Scalar;
 /// non-negative set of h is the one that is meant. The *shape* of h away from its zero level decides how much input the filter
 /// needs (see [`crate::barriers`]).
 pub trait Barrier<const NX: usize> {
-    /// Whether h is concave in (t, x), or convex, as all [`barriers`](crate::barriers) of this crate are: then nothing narrow can
-    /// hide between two samples, and a step need not look for it. With the default, `false`, it does.
+    /// Whether h is concave in (t, x), or convex, as all [`barriers`](crate::barriers) of this crate are: then it
+    /// hides nothing narrow between two samples of a plant that is smooth, and with n > 1 a step does not look for it. With the
+    /// default, `false`, it does, and for gusts in the plant too.
     const BENDS_ONE_WAY: bool = false;
 
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.

@@ -514,7 +514,7 @@ fn ditches_crossed<const N: usize>(source: impl Fn(Ditch) -> Box<dyn DerivativeS
 fn what_is_on_course_crosses_nothing_narrow() {
     let along = |ditch| lie::along(Integrator::<2>, ditch, 2).expect("in range");
     let [on_course, crossed, samples] = ditches_crossed::<2>(along);
-    // Half of them or so have more than one way to be missed; one sample in a hundred is at a ditch.
+    // One sample in a hundred or so is at a ditch.
     assert!(crossed > 60 && on_course * 100 > 95 * samples, "{on_course} {crossed} {samples}");
     let along = |ditch| lie::along(Integrator::<1>, ditch, 1).expect("in range");
     let [on_course, crossed, samples] = ditches_crossed::<1>(along);
