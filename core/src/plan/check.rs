@@ -47,12 +47,11 @@ pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 const DRIFT: f64 = 1e3;
 /// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
 pub(crate) const ON_TIME: f64 = 1e-6;
-/// Windows of so many holds of the braking law each in which what is left at a rest is followed.
-const WINDOWS: usize = 32;
-const WINDOW: usize = 4;
-/// What h varies by in one of them for that to be round-off, as a part of what it is made of.
+/// Holds of the braking law in which what is left at a rest is followed.
+const SETTLING: usize = 128;
+/// What h changes by in one of them for that to be round-off, as a part of what it is made of.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
-/// Change of the ratio of two windows to that of the two before for it to be the ratio of a series.
+/// Change of the ratio of two holds to that of the two before for it to be the ratio of a series.
 const STEADY: f64 = 0.01;
 /// The time in s for which what does not die away has to leave every set where it is.
 const LONG: f64 = 1e5;
@@ -515,39 +514,32 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law: what h varies by over some
-    /// holds of it is a geometric series once its ratio no longer changes, and till then is taken to go on as it is.
+    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law: what h changes by from one
+    /// hold of it to the next is a geometric series once its ratio no longer changes, and till then is taken to go on as it is.
     fn settles(&self, brake: &Brake, hold: f64) -> bool {
-        let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
-        // Of each the least h, and what it varied by in the last three windows.
-        let mut seen: Vec<_> = asked.map(|i| (i, f64::INFINITY, [f64::INFINITY; 3])).collect();
         let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
-        let mut bounds = Vec::with_capacity(seen.len());
-        for _ in 0..WINDOWS {
-            bounds.clear();
-            bounds.resize(seen.len(), [f64::INFINITY, f64::NEG_INFINITY]);
-            for k in 0..=WINDOW {
-                if k > 0 {
-                    brake.input(&self.model, &x, &mut u);
-                    self.model.flow(&mut x, &u, hold);
-                }
-                for ((i, ..), [low, high]) in seen.iter().zip(&mut bounds) {
-                    let Requirement { model, from, .. } = self.requirements[*i];
-                    let begin = self.t.max(from);
-                    let h = model.lowest_from(begin, &x).unwrap_or_else(|| model.value(begin, &x));
-                    (*low, *high) = (low.min(h), high.max(h));
-                }
-            }
+        let h = |i: usize, x: &[f64]| {
+            let Requirement { model, from, .. } = self.requirements[i];
+            let begin = self.t.max(from);
+            model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x))
+        };
+        let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
+        // Of each its last h, the least, and what it changed by in the last three holds.
+        let mut seen: Vec<_> = asked.map(|i| (i, h(i, &x), h(i, &x), [f64::INFINITY; 3])).collect();
+        for _ in 0..SETTLING {
+            brake.input(&self.model, &x, &mut u);
+            self.model.flow(&mut x, &u, hold);
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-            let stay = seen.iter_mut().zip(&bounds).fold(true, |stay, ((i, least, varied), [low, high])| {
-                *least = least.min(*low);
-                *varied = [varied[1], varied[2], high - low];
+            let mut stay = true;
+            for (i, last, least, changes) in &mut seen {
+                let now = h(*i, &x);
+                *changes = [changes[1], changes[2], (now - *last).abs()];
+                (*last, *least) = (now, least.min(now));
                 let round_off = SETTLED * (size + least.abs());
                 // The rest of a plan is asked for half as long, so that time may pass.
                 let time = (self.requirements[*i].until - self.t).min(LONG * self.strictness);
-                let to_come = to_come(*varied, round_off, time / (WINDOW as f64 * hold));
-                stay && *least - to_come >= self.least_of(*i)
-            });
+                stay &= *least - to_come(*changes, round_off, time / hold) >= self.least_of(*i);
+            }
             if stay {
                 return true;
             }
@@ -592,17 +584,17 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// What a number changes by in so many `windows` to come that `varied` by this in the last three.
-fn to_come([first, before, now]: [f64; 3], round_off: f64, windows: f64) -> f64 {
+/// What a number changes by in so many `holds` to come that changed by this in the last three.
+fn to_come([first, before, now]: [f64; 3], round_off: f64, holds: f64) -> f64 {
     let (ratio, settles) = (now / before, before - now - round_off);
     match () {
         () if now <= round_off => 0.0,
         // Not known yet, or growing.
         () if before == f64::INFINITY || now > before + round_off => f64::INFINITY,
         () if settles > 0.0 && (ratio - before / first).abs() <= STEADY * ratio => {
-            (now * now / settles).min(now * windows)
+            (now * now / settles).min(now * holds)
         }
-        () => now * windows,
+        () => now * holds,
     }
 }
 
