@@ -10,7 +10,7 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::elementary::powf;
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
-use punctual_core::nalgebra::{SVector, vector};
+use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
@@ -519,4 +519,66 @@ fn what_is_on_course_crosses_nothing_narrow() {
     let along = |ditch| lie::along(Integrator::<1>, ditch, 1).expect("in range");
     let [on_course, crossed, samples] = ditches_crossed::<1>(along);
     assert!(on_course * 100 > 95 * samples, "{on_course} {crossed} {samples}");
+}
+
+/// A double integrator with a gust that lasts as long as a hold: q' = u − K (6.3 σ − 12 σ²) with σ the part of a hold that has
+/// passed. It moves p by −K σ³ (1.05 − σ) holds², which is most before the end, and shows in no derivative at the begin.
+struct Gusty {
+    strength: f64,
+    hold: f64,
+}
+
+impl ControlAffine<3, 1> for Gusty {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        let part = x[2] / self.hold;
+        vector![x[1], (part.squared() * 12.0 - part * 6.3) * self.strength, S::one()]
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
+        vector![S::zero(), S::one(), S::zero()]
+    }
+}
+
+/// p ≥ 0, said to bend one way, so that nothing narrow is looked for in between.
+struct Wall;
+
+impl Barrier<3> for Wall {
+    const BENDS_ONE_WAY: bool = true;
+
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 3>) -> S {
+        x[0]
+    }
+}
+
+/// A gust within one hold shows where the hold ends, by what it has moved and hurried.
+#[test]
+fn what_a_gust_leaves_at_the_end_of_a_hold_is_looked_at() {
+    let [mut on_course, mut broken] = [0; 2];
+    for case in 0..500_u32 {
+        let part = |of: u32| f64::from(case * of % 503) / 503.0;
+        let (hold, h, speed) = (0.02 + 0.5 * part(29), 0.1 + 3.0 * part(131), part(57) - 0.5);
+        let gust = Gusty { strength: 20.0 * part(211) * h / (hold * hold), hold };
+        let strength = gust.strength;
+        let mut filter = SafetyFilter::builder(3, 1)
+            .barrier("wall", gust, Wall, BarrierSettings::keeping())
+            .and_then(|b| b.sampling(Sampling::Period(hold)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let (wanted, mut u) = (part(97) - 0.5, [0.0]);
+        filter.step(0.0, &[h, speed, 0.0], &[wanted], &mut u).expect("right dimensions");
+        let lowest = (0..=200)
+            .map(|i| f64::from(i) / 200.0)
+            .map(|part| {
+                let s = part * hold;
+                let moved = hold * hold * strength * part.powi(3) * (1.05 - part);
+                h + s * (speed + s * u[0] / 2.0) - moved
+            })
+            .fold(f64::INFINITY, f64::min);
+        let speaks = filter.report().barriers[0].on_course;
+        // Round-off, and the error of the prediction at two steps to the hold.
+        assert!(!speaks || lowest > -1e-3 * h, "case {case}: {lowest}");
+        on_course += u32::from(speaks);
+        broken += u32::from(lowest < 0.0);
+    }
+    assert!(on_course > 150 && broken > 200, "{on_course} {broken}");
 }

@@ -21,6 +21,8 @@ pub(super) struct Outlook<'a> {
     pub(super) drift: &'a [f64; MAX_RELATIVE_DEGREE + 1],
     /// What h may fall short of it by.
     pub(super) shortfall: Option<&'a Shortfall>,
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ so many seconds later under the held input, by the model, where they are known.
+    pub(super) known: Option<(f64, &'a [f64; MAX_RELATIVE_DEGREE])>,
 }
 
 /// From when until when (s after the sample at `t`) a promise has h ≥ 0 while an input is held for `hold` s, if it has
@@ -96,17 +98,33 @@ impl Outlook<'_> {
     }
 
     /// Whether the derivatives at the end of the hold, where h is far from its edge, are those foreseen: for sources without
-    /// enclosures. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
+    /// enclosures. So are they where known ones before are, as far as what they are off by grows with the power n + 1 of the
+    /// time. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
     /// radians shows where the hold ends.
+    #[inline(always)]
     fn agrees(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
-        let is_near = |end: [f64; MAX_RELATIVE_DEGREE + 1]| {
-            let mut power = 1.0;
-            (0..=self.n).all(|k| {
-                power *= if k == 0 { 1.0 } else { hold / k as f64 };
-                power * (end[k] - self.foreseen(k, highest, hold)).abs() <= 0.5 * CLEAR * h
-            })
-        };
-        self.n > 1 && held.derivatives(hold).is_none_or(is_near)
+        if self.n == 1 {
+            return false;
+        }
+        let allowed = 0.5 * CLEAR * h;
+        if let Some((s, known)) = self.known.filter(|(s, _)| *s <= hold) {
+            let part = s / hold;
+            let allowed = (0..self.n).fold(allowed * part, |allowed, _| allowed * part);
+            if self.is_near(&known[..self.n], s, highest, allowed) {
+                return true;
+            }
+        }
+        held.derivatives(hold).is_none_or(|end| self.is_near(&end[..=self.n], hold, highest, allowed))
+    }
+
+    /// Whether `derivatives` of h are those foreseen `s` seconds later, but for what moves h by so much `allowed`.
+    #[inline(always)]
+    fn is_near(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
+        let mut power = 1.0;
+        derivatives.iter().enumerate().all(|(k, h)| {
+            power *= if k == 0 { 1.0 } else { s / k as f64 };
+            power * (h - self.foreseen(k, highest, s)).abs() <= allowed
+        })
     }
 
     /// The lowest h without a model, to the order n.

@@ -235,7 +235,8 @@ impl BarrierSlot {
     /// The course of h until the next sample, as the derivatives foresee it.
     pub(super) fn outlook(&self) -> Outlook<'_> {
         let SlotSample { derivatives, shortfall, .. } = &self.now;
-        Outlook { n: self.degree(), drift: &derivatives.drift, shortfall: shortfall.as_ref() }
+        let (n, drift) = (self.degree(), &derivatives.drift);
+        Outlook { n, drift, shortfall: shortfall.as_ref(), known: None }
     }
 
     /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.

@@ -1,8 +1,9 @@
 //! One sample, in the order of the mathematics: evaluate, advance, rows, solve, report.
 
 use super::hold::Hold;
+use super::outlook::{self, Outlook};
 use super::search::{PeriodProblem, Requirement};
-use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace, outlook};
+use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace};
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::elementary;
 use crate::error::{Error, length};
@@ -198,7 +199,7 @@ impl SafetyFilter {
     /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
         let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
-        search.bend = None;
+        search.clear();
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
         // Over the period.
         if !requirements.is_empty() {
@@ -240,9 +241,9 @@ impl SafetyFilter {
 
     /// Looks at every instant until the next sample under the held input `u`. Returns whether a promise is broken at one.
     fn look(&mut self, moment: &Moment, u: &[f64]) -> bool {
-        let Workspace { next, scratch, .. } = &mut self.workspace;
+        let Workspace { next, scratch, search, .. } = &mut self.workspace;
         let mut breaks = false;
-        for (slot, promise) in self.slots.iter_mut().zip(&next.barriers) {
+        for (i, (slot, promise)) in self.slots.iter_mut().zip(&next.barriers).enumerate() {
             slot.now.lowest = None;
             if !slot.now.in_force {
                 continue;
@@ -255,7 +256,9 @@ impl SafetyFilter {
                     u,
                     shortfall: slot.now.shortfall.as_ref(),
                 };
-                slot.now.lowest = slot.outlook().look(promise, &held, &slot.now.row.normal, span, scratch);
+                // The first requirements are those of the barriers over the period.
+                let outlook = Outlook { known: moment.period.zip(search.foreseen(i, u)), ..slot.outlook() };
+                slot.now.lowest = outlook.look(promise, &held, &slot.now.row.normal, span, scratch);
                 breaks |= slot.now.lowest.is_some();
             }
         }
