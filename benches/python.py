@@ -1,12 +1,14 @@
 """Costs in one run: a step in Rust beside the same by hand, steps and batches in Python beside cbfpy, FMPy, campaigns.
 
-    PYTHON benches/python.py     # of an environment with the wheel and FMPy; with cbfpy and Dask too, where they are installed
+    PYTHON benches/python.py     # of an environment with the wheel and FMPy; with cbfpy, cbfkit and Dask too, where installed
 
 Single steps are the shortest of many rounds, or times of one thread on its processor, whatever else runs there. What runs
 on all cores is the shortest of many too.
 """
 
+import contextlib
 import importlib.util
+import io
 import os
 
 # What cbfpy recommends; read when JAX is loaded.
@@ -32,6 +34,13 @@ try:
     import jax.numpy as jnp
 except ImportError:
     cbfpy = None
+try:
+    from cbfkit.certificates import concatenate_certificates, rectify_relative_degree
+    from cbfkit.certificates.conditions.barrier_conditions import zeroing_barriers
+    from cbfkit.controllers.cbf_clf import vanilla_cbf_clf_qp_controller
+    from cbfkit.utils.user_types import ControllerData
+except ImportError:
+    vanilla_cbf_clf_qp_controller = None
 try:
     import distributed
 except ImportError:
@@ -168,18 +177,52 @@ def cbf(count, backend):
     return cbfpy.CBF.from_config(Discs(n=4, m=2, backend=backend, solver_tol=tolerance))
 
 
+def vanilla(count):
+    """cbfkit's vanilla controller of the same, with a linear class K function."""
+
+    def dynamics(z):
+        drift = jnp.array([z[3] * jnp.cos(z[2]), z[3] * jnp.sin(z[2]), 0.0, 0.0])
+        return drift, jnp.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+
+    def disc(centre, sign):
+        def h(state_and_time):
+            away = state_and_time[:2] - jnp.array(centre)
+            return sign * (jnp.sqrt(8.0) - jnp.sqrt(away @ away + 4.0))
+
+        condition = zeroing_barriers.linear_class_k(1.0)
+        return rectify_relative_degree(h, dynamics, 4, form="high-order", certificate_conditions=condition)
+
+    discs = [disc(GOAL["centre"], 1.0), *(disc(rock["centre"], -1.0) for rock in obstacles(count))]
+    barriers, limits = concatenate_certificates(*discs), jnp.array([1e3, 1e3])
+    controller = vanilla_cbf_clf_qp_controller(control_limits=limits, dynamics_func=dynamics, barriers=barriers)
+    key = jax.random.PRNGKey(0)
+    return lambda x, u_ref: controller(0.0, x, u_ref, key, ControllerData(sub_data={}))[0]
+
+
+def in_turn(safe):
+    """The filter of many rows, one after the other within one jitted loop."""
+    return jax.jit(lambda x, u_ref: jax.lax.map(lambda pair: safe(*pair), (x, u_ref)))
+
+
 def rivals():
-    """cbfpy's filters by name: for each number of obstacles and each of its QP solvers."""
+    """The filters of others by name, with how they take many rows: for each number of obstacles and each QP solver."""
     if cbfpy is None:
         print("cbfpy is not installed: pip install cbfpy elastiqp")
         return
+    for count in [0, 10]:
+        if vanilla_cbf_clf_qp_controller is None:
+            print("cbfkit is not installed: https://github.com/bardhh/cbfkit")
+            break
+        # Under vmap it writes every message that it has for every row, which takes milliseconds.
+        yield f"cbfkit, in a loop, {count} obstacles", vanilla(count), in_turn
     for count in [0, 10]:
         for backend in ["qpax", "elastiqp"]:
             # cbfpy itself misses a solver at the first step alone.
             if importlib.util.find_spec(backend) is None:
                 print(f"cbfpy ({backend}): not installed: pip install {backend}")
                 continue
-            yield f"cbfpy ({backend}), {count} obstacles", cbf(count, backend).safety_filter
+            safe = cbf(count, backend).safety_filter
+            yield f"cbfpy ({backend}), {count} obstacles", safe, lambda safe: jax.jit(jax.vmap(safe))
 
 
 def single_steps():
@@ -198,17 +241,17 @@ def single_steps():
             print(f"  Filter.step, {sampling}, {count} obstacles: {1e6 * shortest(loop) / len(samples):.2f}")
     samples = recorded(FILTER, 1, 0.01, 50)
     x, u_ref = (jnp.array([s[i][0] for s in samples]) for i in (1, 2)) if cbfpy else (None, None)
-    for name, safe in rivals():
-        one = jax.jit(safe)
-        in_turn = jax.jit(lambda x, u_ref, safe=safe: jax.lax.map(lambda pair: safe(*pair), (x, u_ref)))
-
+    for name, safe, _ in rivals():
+        one, many = jax.jit(safe), in_turn(safe)
         pairs = [(x[k], u_ref[k]) for k in range(len(samples))]
 
         def calls():
             for pair in pairs:
                 one(*pair).block_until_ready()
 
-        times = [shortest(calls), shortest(lambda: in_turn(x, u_ref).block_until_ready())]
+        # cbfkit tells of every row that its solver gave up.
+        with contextlib.redirect_stdout(io.StringIO()):
+            times = [shortest(calls), shortest(lambda: many(x, u_ref).block_until_ready())]
         called, within = (1e6 * time / len(samples) for time in times)
         print(f"  {name}: {called:.1f} a jitted call, {within:.1f} within a jitted loop")
 
@@ -219,12 +262,13 @@ def batches(n=4096, period=0.02, first=10, steps=60, rounds=20):
         f" the first {first} samples of an episode, and the {steps - first} after them"
     )
 
-    def told(name, step, reset=lambda: None):
+    def told(name, step, reset=lambda: None, rounds=rounds):
         # The shortest of each sample: what disturbs one of them in one round does not in another.
         best = np.full((2, steps), np.inf)
-        for _ in range(rounds):
-            reset()
-            for k in range(steps):
+        for k in [k for _ in range(rounds) for k in range(steps)]:
+            if k == 0:
+                reset()
+            with contextlib.redirect_stdout(io.StringIO()):
                 begin = time.perf_counter(), time.process_time()
                 step(k)
                 spent = time.perf_counter() - begin[0], time.process_time() - begin[1]
@@ -239,10 +283,11 @@ def batches(n=4096, period=0.02, first=10, steps=60, rounds=20):
             samples = recorded(configuration, n, period, steps)
             batch = punctual.FilterBatch(configuration, n)
             told(f"FilterBatch, {sampling}, {count} obstacles", lambda k: batch.step(*samples[k]), batch.reset)
-    for name, safe in rivals():
-        many = jax.jit(jax.vmap(safe))
+    for name, safe, together in rivals():
+        many = together(safe)
         arrays = [(jnp.array(x), jnp.array(u_ref)) for _, x, u_ref in recorded(FILTER, n, period, steps)]
-        told(name, lambda k: many(*arrays[k]).block_until_ready())
+        # Rows that take a tenth of a millisecond need no twenty rounds.
+        told(name, lambda k: many(*arrays[k]).block_until_ready(), rounds=2 if together is in_turn else rounds)
 
 
 def memory(n=100_000):
