@@ -114,30 +114,31 @@ pub(super) struct PeriodProblem<'a> {
 pub(super) struct Scratch {
     violations: [f64; MAX_ROWS],
     ahead: Ahead,
-    foreseen: Foreseen,
+    predicted: Predicted,
     /// How the only active row of the last answer bends, where the search knows it.
     pub(super) bend: Option<Bend>,
 }
 
 impl Scratch {
     pub(super) const fn new() -> Self {
-        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO, foreseen: Foreseen::NOTHING, bend: None }
+        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO, predicted: Predicted::NOTHING, bend: None }
     }
 
     /// Forgets the last answer.
     pub(super) fn clear(&mut self) {
-        (self.foreseen.rows, self.bend) = (RowSet::EMPTY, None);
+        (self.predicted.rows, self.bend) = (RowSet::EMPTY, None);
     }
 
-    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`, and zeros; `None` where the search has not asked last.
-    pub(super) fn foreseen(&self, i: usize, u: &[f64]) -> Option<&[f64; MAX_RELATIVE_DEGREE]> {
-        let Foreseen { rows, input, values } = &self.foreseen;
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`; the rest means nothing. `None` where the search has not
+    /// predicted it last.
+    pub(super) fn predicted(&self, i: usize, u: &[f64]) -> Option<&[f64; MAX_RELATIVE_DEGREE]> {
+        let Predicted { rows, input, values } = &self.predicted;
         (rows.contains(i) && *u == input[..u.len()]).then(|| &values[i])
     }
 }
 
 /// What the predictions at one input have been.
-struct Foreseen {
+struct Predicted {
     /// The requirements that they are of.
     rows: RowSet,
     input: [f64; MAX_INPUTS],
@@ -145,7 +146,7 @@ struct Foreseen {
     values: [[f64; MAX_RELATIVE_DEGREE]; MAX_ROWS],
 }
 
-impl Foreseen {
+impl Predicted {
     const NOTHING: Self = Self {
         rows: RowSet::EMPTY,
         input: [0.0; MAX_INPUTS],
@@ -159,7 +160,7 @@ struct Linearised<'a> {
     violations: &'a mut [f64; MAX_ROWS],
     /// Room for one prediction.
     ahead: &'a mut Ahead,
-    foreseen: &'a mut Foreseen,
+    predicted: &'a mut Predicted,
     bend: &'a mut Option<Bend>,
 }
 
@@ -250,8 +251,8 @@ impl PeriodProblem<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
-        let Scratch { violations, ahead, foreseen, bend } = scratch;
-        let mut at = Linearised { rows, violations, ahead, foreseen, bend };
+        let Scratch { violations, ahead, predicted, bend } = scratch;
+        let mut at = Linearised { rows, violations, ahead, predicted, bend };
         if let Some(solution) = self.bent_row(u, last, &mut at, qp) {
             return Some(solution);
         }
@@ -401,10 +402,10 @@ impl PeriodProblem<'_> {
 
     #[inline(always)]
     fn linearise_for(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
-        let Linearised { rows, violations, ahead, foreseen, .. } = at;
-        if foreseen.input[..u.len()] != *u {
-            foreseen.rows = RowSet::EMPTY;
-            foreseen.input[..u.len()].copy_from_slice(u);
+        let Linearised { rows, violations, ahead, predicted, .. } = at;
+        if predicted.input[..u.len()] != *u {
+            predicted.rows = RowSet::EMPTY;
+            predicted.input[..u.len()].copy_from_slice(u);
         }
         let rows = rows.iter_mut().zip(violations.iter_mut());
         for (i, (requirement, (row, violation))) in self.requirements.iter().zip(rows).enumerate() {
@@ -413,9 +414,9 @@ impl PeriodProblem<'_> {
                 *row = Row::ZERO;
             } else if anew.contains(i) {
                 *violation = self.linearised(requirement, u, ahead, row)?;
-                foreseen.rows.insert(i);
+                predicted.rows.insert(i);
                 let n = self.slots[requirement.barrier].degree();
-                foreseen.values[i][..n].copy_from_slice(&ahead.value[..n]);
+                predicted.values[i][..n].copy_from_slice(&ahead.value[..n]);
             } else {
                 let (slack, terms) = (row.slack(u), row.size(u));
                 if slack < -MET * terms {

@@ -257,7 +257,7 @@ impl SafetyFilter {
                     shortfall: slot.now.shortfall.as_ref(),
                 };
                 // The first requirements are those of the barriers over the period.
-                let known = moment.period.and_then(|period| Some((period, search.foreseen(i, u)?)));
+                let known = moment.period.and_then(|period| Some((period, search.predicted(i, u)?)));
                 let outlook = Outlook { known, ..slot.outlook() };
                 slot.now.lowest = outlook.look(promise, &held, &slot.now.row.normal, span, scratch);
                 breaks |= slot.now.lowest.is_some();

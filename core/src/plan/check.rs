@@ -525,7 +525,11 @@ impl<'a> Walk<'a> {
         };
         let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
         // Of each its last h, the least, and what it changed by in the last three holds.
-        let mut seen: Vec<_> = asked.map(|i| (i, h(i, &x), h(i, &x), [f64::INFINITY; 3])).collect();
+        let begin = |i| {
+            let h = h(i, &x);
+            (i, h, h, [f64::INFINITY; 3])
+        };
+        let mut seen: Vec<_> = asked.map(begin).collect();
         for _ in 0..SETTLING {
             brake.input(&self.model, &x, &mut u);
             self.model.flow(&mut x, &u, hold);
