@@ -51,8 +51,6 @@ pub(crate) const ON_TIME: f64 = 1e-6;
 const SETTLING: usize = 128;
 /// What h changes by in one of them for that to be round-off, as a part of what it is made of.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
-/// Change of the ratio of two holds to that of the two before for it to be the ratio of a series.
-const STEADY: f64 = 0.01;
 /// The time in s for which what does not die away has to leave every set where it is.
 const LONG: f64 = 1e5;
 /// Most holds of the braking law after a reference.
@@ -466,15 +464,18 @@ impl<'a> Walk<'a> {
     pub(super) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = brake.hold.max(self.grid.period);
+        let mut failure = Failure::NoRest;
         for _ in 0..BRAKING {
-            let rests =
-                self.is_still(brake, hold, &mut u) && self.rests(&u, hold)? && self.settles(brake, hold);
+            let rest = self.is_rest(brake, hold, &mut u);
             self.hold_until(&u, self.t + hold)?;
-            if rests {
-                return Ok(Witness { until: f64::INFINITY, ..self.witness });
+            match rest {
+                Ok(true) => return Ok(Witness { until: f64::INFINITY, ..self.witness }),
+                Ok(false) => {}
+                // What still drifts out may do so no longer a hold later.
+                Err(drifts_out) => failure = drifts_out,
             }
         }
-        Err(Failure::NoRest)
+        Err(failure)
     }
 
     /// Ends where `reference` does, without a rest, if that was still ahead. Its last input is held until then where samples
@@ -497,12 +498,22 @@ impl<'a> Walk<'a> {
     /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
-        let hold = brake.hold.max(self.grid.period);
-        let ends = self.is_still(brake, hold, &mut u)
-            && matches!(self.rests(&u, hold), Ok(true))
-            && self.settles(brake, hold);
+        let ends = self.is_rest(brake, brake.hold.max(self.grid.period), &mut u);
         self.witness.tightest = tightest;
-        ends
+        matches!(ends, Ok(true))
+    }
+
+    /// The same, with the input of `brake` written to `u`, and what is tightest there noted.
+    fn is_rest(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> Result<bool, Failure> {
+        let tightest = self.witness.tightest;
+        let is_rest = match self.is_still(brake, hold, u) {
+            true => self.rests(u, hold).map(|rests| rests && self.settles(brake, hold)),
+            false => Ok(false),
+        };
+        if !matches!(is_rest, Ok(true)) {
+            self.witness.tightest = tightest;
+        }
+        is_rest
     }
 
     /// Whether the plant stands still under the input of `brake`, which is written to `u`.
@@ -514,37 +525,37 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law: what h changes by from one
-    /// hold of it to the next is a geometric series once its ratio no longer changes, and till then is taken to go on as it is.
+    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law.
     fn settles(&self, brake: &Brake, hold: f64) -> bool {
         let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
         let h = |i: usize, x: &[f64]| {
             let Requirement { model, from, .. } = self.requirements[i];
             let begin = self.t.max(from);
-            model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x))
+            let h = model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x));
+            if h.is_nan() { f64::NEG_INFINITY } else { h }
         };
         let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
-        // Of each its last h, the least, and what it changed by in the last three holds.
-        let begin = |i| {
-            let h = h(i, &x);
-            (i, h, h, [f64::INFINITY; 3])
-        };
-        let mut seen: Vec<_> = asked.map(begin).collect();
-        for _ in 0..SETTLING {
+        let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
+        for holds in 1..=SETTLING {
             brake.input(&self.model, &x, &mut u);
             self.model.flow(&mut x, &u, hold);
+            for (i, seen) in &mut seen {
+                seen.push(h(*i, &x));
+            }
+            let window = holds / 4;
+            if holds % 4 > 0 {
+                continue;
+            }
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
-            let mut stay = true;
-            for (i, last, least, changes) in &mut seen {
-                let now = h(*i, &x);
-                *changes = [changes[1], changes[2], (now - *last).abs()];
-                (*last, *least) = (now, least.min(now));
+            let stays = seen.iter().all(|(i, seen)| {
+                let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
                 let round_off = SETTLED * (size + least.abs());
                 // The rest of a plan is asked for half as long, so that time may pass.
                 let time = (self.requirements[*i].until - self.t).min(LONG * self.strictness);
-                stay &= *least - to_come(*changes, round_off, time / hold) >= self.least_of(*i);
-            }
-            if stay {
+                let last = [3, 2, 1, 0].map(|back| seen[holds - back * window]);
+                least - to_fall(last, round_off, time / (hold * window as f64)) >= self.least_of(*i)
+            });
+            if stays {
                 return true;
             }
         }
@@ -588,18 +599,23 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// What a number changes by in so many `holds` to come that changed by this in the last three.
-fn to_come([first, before, now]: [f64; 3], round_off: f64, holds: f64) -> f64 {
-    let (ratio, settles) = (now / before, before - now - round_off);
-    match () {
-        () if now <= round_off => 0.0,
-        // Not known yet, or growing.
-        () if before == f64::INFINITY || now > before + round_off => f64::INFINITY,
-        () if settles > 0.0 && (ratio - before / first).abs() <= STEADY * ratio => {
-            (now * now / settles).min(now * holds)
-        }
-        () => now * holds,
+/// The most by which a number falls in so many windows of time to come that is `last` at the ends of the last three. What it
+/// changes by in each is a geometric series and a constant creep, which these tell apart (Aitken's process).
+fn to_fall(last: [f64; 4], round_off: f64, windows: f64) -> f64 {
+    let [first, before, now] = [0, 1, 2].map(|k| last[k + 1] - last[k]);
+    let (bent, bends) = (before - first, now - before);
+    if bends.abs() <= round_off {
+        return if now.abs() <= round_off { 0.0 } else { (-now).max(0.0) * windows };
     }
+    let dies_away = bends.abs() < bent.abs();
+    if !dies_away {
+        return f64::INFINITY;
+    }
+    let ratio = bends / bent;
+    let decays = bends * ratio / (ratio - 1.0);
+    let unsure = 2.0 * round_off / ((1.0 - ratio) * (1.0 - ratio));
+    let creep = now - decays - unsure;
+    (-decays * ratio / (1.0 - ratio)).max(-decays * ratio).max(0.0) + (-creep).max(0.0) * windows
 }
 
 /// The error that a state may have on a piece where it is within `over`: far from the origin no more of it than near, but for
@@ -611,4 +627,40 @@ fn allowed(over: Interval) -> f64 {
 /// The size of a state, by which the last terms of its course are measured.
 fn size(course: &Course) -> f64 {
     1.0 + course[0].abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::to_fall;
+
+    proptest! {
+        /// Of a geometric series above a creep, both of any sign and size, the fall to come is known.
+        #[test]
+        fn a_decay_and_a_creep_are_told_apart(
+            decays in -1.0..1.0_f64,
+            creep in -1.0..1.0_f64,
+            ratio in -0.95..0.95_f64,
+            windows in 10..1000_u32,
+        ) {
+            let series = |k: u32| decays * (0..k).map(|_| ratio).product::<f64>();
+            let h = |k: u32| series(k) + creep * f64::from(k);
+            let fall = to_fall([h(0), h(1), h(2), h(3)], 1e-14, f64::from(windows));
+            let falls = (0..=windows).map(|k| h(3) - h(3 + k)).fold(0.0, f64::max);
+            prop_assert!(fall >= falls, "{fall} {falls}");
+            // No more than either by itself, and what round-off of 1e-14 hides in a creep.
+            let apart = series(3).abs() * 2.0 + (-creep).max(0.0) * f64::from(windows);
+            prop_assert!(fall <= apart + 1e-10 * f64::from(windows), "{fall} {apart}");
+        }
+    }
+
+    #[test]
+    fn what_gathers_pace_has_no_end() {
+        assert_eq!(to_fall([0.0, -1.0, -2.5, -5.0], 0.0, 1e6), f64::INFINITY);
+        assert_eq!(to_fall([0.0, 1.0, 1.0, 0.0], 0.0, 1e6), f64::INFINITY);
+        assert_eq!(to_fall([f64::NAN, 1.0, 1.5, 1.75], 0.0, 1e6), f64::INFINITY);
+        assert_eq!(to_fall([1.0, 2.0, 2.5, f64::NEG_INFINITY], 0.0, 1e6), f64::INFINITY);
+        assert_eq!(to_fall([1.0; 4], 1e-14, 1e6), 0.0);
+    }
 }
