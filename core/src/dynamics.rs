@@ -39,6 +39,11 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     /// which is one for every plant. Larger degrees are not compiled.
     const LARGEST_DEGREE: usize = NX;
 
+    /// Whether f and g vary slowly over a sampling period, wherever the state is, as those of vehicles do: then they hide
+    /// nothing narrow between two samples, and with n > 1 and a set that [bends one way](crate::barrier::Barrier::BENDS_ONE_WAY) a
+    /// step does not look for it. With the default, `false`, it does, for a gust say.
+    const BENDS_SLOWLY: bool = false;
+
     /// f(x): the rate of change of the state at u = 0, per second.
     fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX>;
 
@@ -242,6 +247,7 @@ where
 {
     /// The point moves by itself, so no input reaches it: to the plant it is what time is.
     const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
+    const BENDS_SLOWLY: bool = P::BENDS_SLOWLY;
 
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
         const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };

@@ -273,7 +273,7 @@ where
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
         // With n > 1 the derivatives at the ends of a hold tell as much of such an h, for less.
-        if B::BENDS_ONE_WAY && K > 2 {
+        if B::BENDS_ONE_WAY && P::BENDS_SLOWLY && K > 2 {
             return None;
         }
         let model = (&self.plant, &self.barrier);

@@ -59,6 +59,7 @@ impl Signals for PointMass {
 
 impl ControlAffine<4, 2> for PointMass {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
@@ -91,6 +92,7 @@ impl Signals for MovedPoint {
 
 impl ControlAffine<2, 2> for MovedPoint {
     const LARGEST_DEGREE: usize = 1;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, _x: &SVector<S, 2>) -> SVector<S, 2> {
@@ -120,6 +122,7 @@ impl Signals for Unicycle {
 
 impl ControlAffine<4, 2> for Unicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
@@ -166,6 +169,7 @@ impl Signals for Bicycle {
 
 impl ControlAffine<4, 2> for Bicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
@@ -217,6 +221,7 @@ impl Signals for SmallSlipBicycle {
 
 impl ControlAffine<4, 2> for SmallSlipBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
@@ -253,6 +258,7 @@ impl Signals for SmallSlipBicycleWithRate {
 
 impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
@@ -322,6 +328,7 @@ impl Signals for KinematicBicycle {
 
 impl ControlAffine<5, 2> for KinematicBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
+    const BENDS_SLOWLY: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
