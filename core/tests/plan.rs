@@ -1618,6 +1618,22 @@ impl ControlAffine<2, 1> for Filling {
     }
 }
 
+/// Keeps the level of `plant`, its second state, below `limit`.
+fn level_kept<P, const NX: usize>(plant: P, limit: f64) -> AssuredFilter
+where
+    P: ControlAffine<NX, 1> + Send + 'static,
+{
+    let level = StateBound::at_most(1, limit).expect("valid bound");
+    let source = along(plant, level, 2).expect("a degree");
+    let filter = SafetyFilter::builder(NX, 1)
+        .source("level", source, BarrierSettings::keeping())
+        .and_then(|b| b.bounds(&[-2.0], &[2.0]))
+        .and_then(|b| b.sampling(Sampling::Period(0.1)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    AssuredFilter::new(filter, 0.1).expect("a filter that can be assured")
+}
+
 /// What goes on to creep, however slowly, is no rest: no promise is given that is lost later. Without a creep there are some.
 #[test]
 fn what_creeps_on_is_no_rest() {
@@ -1633,15 +1649,7 @@ fn what_creeps_on_is_no_rest() {
             (plant, limit) = (Filling(7.986_311_018_272_636e-8), 31.088_444_160_762_222);
             x = SVector::from([3.071_511_322_579_002, 26.137_458_198_334_933]);
         }
-        let level = StateBound::at_most(1, limit).expect("valid bound");
-        let source = along(plant, level, 2).expect("a degree");
-        let filter = SafetyFilter::builder(2, 1)
-            .source("level", source, BarrierSettings::keeping())
-            .and_then(|b| b.bounds(&[-2.0], &[2.0]))
-            .and_then(|b| b.sampling(Sampling::Period(0.1)))
-            .and_then(FilterBuilder::build)
-            .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+        let mut filter = level_kept(plant, limit);
         for k in 0..1300 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
             let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
@@ -1698,15 +1706,7 @@ fn a_rest_that_decays_slowly_stays_one() {
     let mut assured = 0;
     for (round, (plant, speed, limit)) in cases.into_iter().enumerate() {
         let mut x = SVector::from([speed, 0.0, 0.0]);
-        let level = StateBound::at_most(1, limit).expect("valid bound");
-        let source = along(plant, level, 2).expect("a degree");
-        let filter = SafetyFilter::builder(3, 1)
-            .source("level", source, BarrierSettings::keeping())
-            .and_then(|b| b.bounds(&[-2.0], &[2.0]))
-            .and_then(|b| b.sampling(Sampling::Period(0.1)))
-            .and_then(FilterBuilder::build)
-            .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+        let mut filter = level_kept(plant, limit);
         for k in 0..4000 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
             let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;

@@ -600,8 +600,8 @@ impl<'a> Walk<'a> {
 }
 
 /// The most by which a number moves in so many windows of time to come that is `last` at the ends of the last four. What it
-/// changes by in each is a series that dies away above a creep. By what the first three and the last three say the creep to be,
-/// it is not known. One that leads inside counts too, since beneath it another series may lead out.
+/// changes by in each is a series that dies away above a creep. What the first three and the last three differ by on the creep
+/// counts as creep. One that leads inside counts too, since it may be a slow series that will end.
 fn to_come(last: [f64; 5], round_off: f64, windows: f64) -> f64 {
     let change = |k: usize| last[k + 1] - last[k];
     let [before, now] = [0, 1].map(|k| told_apart([change(k), change(k + 1), change(k + 2)], round_off));
