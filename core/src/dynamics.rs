@@ -44,6 +44,15 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     /// step does not look for it. With the default, `false`, it does, for a gust say.
     const BENDS_SLOWLY: bool = false;
 
+    /// Whether `other` has the same f and g. Barriers along the same plant share what depends on it alone. The default knows
+    /// only of plants without data that they are.
+    fn is_same(&self, _other: &Self) -> bool
+    where
+        Self: Sized,
+    {
+        size_of::<Self>() == 0
+    }
+
     /// f(x): the rate of change of the state at u = 0, per second.
     fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX>;
 
@@ -179,6 +188,10 @@ impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<E
 where
     P: ControlAffine<NX, NU>,
 {
+    fn is_same(&self, other: &Self) -> bool {
+        self.input == other.input && self.plant.is_same(&other.plant)
+    }
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
         const { assert!(EXTENDED == NX + 1, "one state more than the plant inside") };
@@ -248,6 +261,10 @@ where
     /// The point moves by itself, so no input reaches it: to the plant it is what time is.
     const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
     const BENDS_SLOWLY: bool = P::BENDS_SLOWLY;
+
+    fn is_same(&self, other: &Self) -> bool {
+        self.0.is_same(&other.0)
+    }
 
     fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
         const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };

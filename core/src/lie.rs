@@ -26,6 +26,7 @@ mod source;
 pub use ahead::{Ahead, SUBSTEPS, flow, is_even};
 
 use alloc::boxed::Box;
+use core::any::Any;
 use core::array::from_fn;
 use core::marker::PhantomData;
 
@@ -35,7 +36,7 @@ use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, column};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
-use crate::jet::{Response, Taylor};
+use crate::jet::{Dual, Response, Taylor};
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
@@ -47,7 +48,7 @@ pub use external::external;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
     COURSE, Course, CourseOver, DerivativeSource, Direction, Directional, Predict, PredictDirectional,
-    RateOver,
+    RateOver, SharedPlant,
 };
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
@@ -63,6 +64,18 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
+    barrier.value(Response::time(t), &motion(plant, x))
+}
+
+/// The Taylor series of the states from `x` on with u = 0, `K` coefficients, each with its derivatives along the inputs.
+#[inline]
+fn motion<P, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
+    x: &SVector<f64, NX>,
+) -> SVector<Response<NU, K>, NX>
+where
+    P: ControlAffine<NX, NU>,
+{
     const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
     let mut series = SVector::<Response<NU, K>, NX>::from_fn(|i, _| Response::from(x[i]));
     macro_rules! extend_to {
@@ -73,7 +86,7 @@ where
         };
     }
     extend_to!(1, 2, 3, 4, 5, 6, 7, 8);
-    barrier.value(Response::time(t), &series)
+    series
 }
 
 /// Coefficient `J` of the state from those below: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where
@@ -119,16 +132,41 @@ impl Derivatives {
     }
 }
 
-/// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken.
-struct Along<P, B, const NX: usize, const NU: usize, const K: usize> {
+/// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken, `N` = n for a row over the period.
+struct Along<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> {
     plant: P,
     barrier: B,
     dims: PhantomData<([(); NX], [(); NU])>,
 }
 
-impl<P, B, const NX: usize, const NU: usize, const K: usize> DerivativeSource for Along<P, B, NX, NU, K>
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Along<P, B, NX, NU, K, N>
 where
-    P: ControlAffine<NX, NU> + Send,
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    /// Writes the derivatives as the coefficients of `h` give them.
+    #[inline(always)]
+    fn write(h: &Response<NU, K>, out: &mut Derivatives) {
+        *out = Derivatives::ZERO;
+        let mut factorial = 1.0;
+        for k in 0..K {
+            factorial *= k.max(1) as f64;
+            let (value, gradient) = h.coefficient(k);
+            out.drift[k] = value * factorial;
+            if k == K - 1 {
+                out.row[..NU].copy_from_slice(&gradient.map(|d| d * factorial));
+            } else {
+                // A sum and not a maximum: `f64::max` would drop a NaN.
+                out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>() * factorial;
+            }
+        }
+    }
+}
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> DerivativeSource
+    for Along<P, B, NX, NU, K, N>
+where
+    P: ControlAffine<NX, NU> + Send + 'static,
     B: Barrier<NX> + Send,
 {
     fn relative_degree(&self) -> usize {
@@ -144,21 +182,7 @@ where
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        let x = column(x);
-        let h: Response<NU, K> = barrier_series(&self.plant, &self.barrier, t, &x);
-        *out = Derivatives::ZERO;
-        let mut factorial = 1.0;
-        for k in 0..K {
-            factorial *= k.max(1) as f64;
-            let (value, gradient) = h.coefficient(k);
-            out.drift[k] = value * factorial;
-            if k == K - 1 {
-                out.row[..NU].copy_from_slice(&gradient.map(|d| d * factorial));
-            } else {
-                // A sum and not a maximum: `f64::max` would drop a NaN.
-                out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>() * factorial;
-            }
-        }
+        Self::write(&barrier_series(&self.plant, &self.barrier, t, &column(x)), out);
     }
 
     fn predict(&self) -> Option<&dyn Predict> {
@@ -173,13 +197,18 @@ where
         Some(self)
     }
 
+    fn shared(&self) -> Option<&dyn SharedPlant> {
+        Some(self)
+    }
+
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
         let region = self.plant.region(&column(x), bounds, time)?;
         self.barrier.highest(time.map(|after| t + after), &region)
     }
 }
 
-impl<P, B, const NX: usize, const NU: usize, const K: usize> Predict for Along<P, B, NX, NU, K>
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Predict
+    for Along<P, B, NX, NU, K, N>
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
@@ -191,19 +220,13 @@ where
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         *out = Ahead::ZERO;
-        ahead::evaluate::<P, B, NX, NU, K>((&self.plant, &self.barrier), (t, duration), x, u, out);
+        let motion = ahead::motion::<P, NX, NU, K>(&self.plant, x, u, duration);
+        ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
     fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        let model = (&self.plant, &self.barrier);
-        macro_rules! by_degree {
-            ($($n:literal => $k:literal),*) => {
-                $(if const { K == $k } {
-                    ahead::evaluate::<P, B, NX, NU, $n>(model, (t, duration), x, u, out);
-                })*
-            };
-        }
-        by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9);
+        let motion = ahead::motion::<P, NX, NU, N>(&self.plant, x, u, duration);
+        ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
     fn values_ahead(
@@ -225,15 +248,7 @@ where
         duration: f64,
         out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
     ) {
-        let model = (&self.plant, &self.barrier);
-        macro_rules! by_degree {
-            ($($n:literal => $k:literal),*) => {
-                $(if const { K == $k } {
-                    ahead::values::<P, B, NX, NU, $n>(model, (t, duration), x, u, out);
-                })*
-            };
-        }
-        by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9);
+        ahead::values::<P, B, NX, NU, N>((&self.plant, &self.barrier), (t, duration), x, u, out);
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
@@ -285,7 +300,50 @@ where
     }
 }
 
-impl<P, B, const NX: usize, const NU: usize, const K: usize> Directional for Along<P, B, NX, NU, K>
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> SharedPlant
+    for Along<P, B, NX, NU, K, N>
+where
+    P: ControlAffine<NX, NU> + 'static,
+    B: Barrier<NX>,
+{
+    fn plant(&self) -> &dyn Any {
+        &self.plant
+    }
+
+    fn shares(&self, plant: &dyn Any) -> bool {
+        plant.downcast_ref().is_some_and(|plant| self.plant.is_same(plant))
+    }
+
+    fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
+        let motion = SVector::<Response<NU, K>, NX>::from_fn(|_, _| Response::from(0.0));
+        let ahead = SVector::<Taylor<Dual<NU>, N>, NX>::from_fn(|_, _| Taylor::from(0.0));
+        [Box::new(motion), Box::new(ahead)]
+    }
+
+    fn motion(&self, x: &[f64], room: &mut dyn Any) {
+        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&self.plant, &column(x));
+    }
+
+    fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
+        let motion: &SVector<Response<NU, K>, NX> = motion.downcast_ref().expect(ROOM);
+        Self::write(&self.barrier.value(Response::time(t), motion), out);
+    }
+
+    fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
+        *room.downcast_mut().expect(ROOM) = ahead::motion::<P, NX, NU, N>(&self.plant, x, u, duration);
+    }
+
+    fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
+        let motion: &SVector<Taylor<Dual<NU>, N>, NX> = motion.downcast_ref().expect(ROOM);
+        ahead::evaluate(&self.barrier, t, motion, out);
+    }
+}
+
+/// What a room that is not of the plant would break.
+const ROOM: &str = "a room that a source along the same plant has made";
+
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Directional
+    for Along<P, B, NX, NU, K, N>
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
@@ -295,7 +353,8 @@ where
     }
 }
 
-impl<P, B, const NX: usize, const NU: usize, const K: usize> PredictDirectional for Along<P, B, NX, NU, K>
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> PredictDirectional
+    for Along<P, B, NX, NU, K, N>
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
@@ -342,7 +401,7 @@ where
             match n {
                 // A constant condition: impossible degrees are not compiled.
                 $($n if const { $n <= P::LARGEST_DEGREE } => {
-                    Ok(Box::new(Along::<P, B, NX, NU, $k> { plant, barrier, dims: PhantomData }) as _)
+                    Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, dims: PhantomData }) as _)
                 })*
                 _ => Err(no_degree(n, P::LARGEST_DEGREE.min(MAX_RELATIVE_DEGREE))),
             }

@@ -146,7 +146,7 @@ impl ControlAffine<4, 2> for Unicycle {
 /// The simplified bicycle of the paper's simulations: x = (x_p, y_p, θ, v), u = (a, β).
 ///
 /// ẋ_p = v cos θ, ẏ_p = v sin θ, θ̇ = v β / l_r, v̇ = a. The slip angle β acts on the heading only.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bicycle {
     l_r: f64,
 }
@@ -171,6 +171,10 @@ impl ControlAffine<4, 2> for Bicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const BENDS_SLOWLY: bool = true;
 
+    fn is_same(&self, other: &Self) -> bool {
+        self == other
+    }
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
         Unicycle.drift(x)
@@ -193,7 +197,7 @@ impl ControlAffine<4, 2> for Bicycle {
 /// ẋ_p = v cos θ − vβ sin θ, ẏ_p = v sin θ + vβ cos θ, θ̇ = v β / l_r, v̇ = a. β moves the vehicle sideways at
 /// once. So it enters the *first* derivative of a barrier on the position, and a only the second. That is a mixed
 /// relative degree, which the filter refuses. [`SmallSlipBicycleWithRate`] has a uniform one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmallSlipBicycle {
     l_r: f64,
 }
@@ -222,6 +226,10 @@ impl Signals for SmallSlipBicycle {
 impl ControlAffine<4, 2> for SmallSlipBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const BENDS_SLOWLY: bool = true;
+
+    fn is_same(&self, other: &Self) -> bool {
+        self == other
+    }
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
@@ -260,6 +268,10 @@ impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const BENDS_SLOWLY: bool = true;
 
+    fn is_same(&self, other: &Self) -> bool {
+        ControlAffine::<5, 2>::is_same(&self.0, &other.0)
+    }
+
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
         self.0.drift(x)
@@ -282,7 +294,7 @@ impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
 /// The model is not affine in δ, and a filter solves for inputs that enter linearly. With δ as a state it is
 /// affine, exactly, and a barrier on the position has relative degree 2 in both inputs. |δ| must stay below π/2,
 /// where the wheel stands across, and β jumps.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KinematicBicycle {
     l_f: f64,
     l_r: f64,
@@ -329,6 +341,10 @@ impl Signals for KinematicBicycle {
 impl ControlAffine<5, 2> for KinematicBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const BENDS_SLOWLY: bool = true;
+
+    fn is_same(&self, other: &Self) -> bool {
+        self == other
+    }
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {

@@ -9,6 +9,7 @@ use nalgebra::SVector;
 
 use super::errors::{self, MeasurementErrors};
 use super::search::Scratch;
+use super::shared::SharedPlants;
 use super::{
     BarrierSettings, BarrierSlot, Begin, End, FilterState, Report, SafetyFilter, Sampling, Strictness,
     Workspace,
@@ -461,7 +462,7 @@ impl FilterBuilder {
             next: state.clone(),
             scratch: vec![0.0; state_dim],
             report: Report::new(slots.len()),
-            search: Scratch::new(),
+            search: Scratch::new(SharedPlants::of(&mut slots)),
             qp: qp::Workspace::new(backend),
         };
         let deadlines = slots.iter().map(|slot| slot.promise.deadline());

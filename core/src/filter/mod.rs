@@ -16,6 +16,7 @@ mod report;
 mod sampling;
 mod search;
 mod sensitivity;
+mod shared;
 mod slot;
 mod step;
 
@@ -42,6 +43,7 @@ use crate::lie::DerivativeSource;
 use crate::qp::{self, Bounds, Enforcement, Problem, Residuals, Row};
 use errors::MeasurementErrors;
 use search::Requirement;
+use shared::SharedPlants;
 use slot::BarrierSlot;
 
 /// The memory of a filter between samples: one promise per barrier, the times that [`Sampling`] needs, and where the search
@@ -314,6 +316,7 @@ impl SafetyFilter {
             return Err(named(Error::new(ErrorKind::RelativeDegree, "relative_degree", message)));
         }
         slot.source = source;
+        self.workspace.search.evaluations.plants = SharedPlants::of(&mut self.slots);
         self.state.barriers[index] = FixedTimeState::default();
         self.state.bends = [None; 2];
         Ok(())

@@ -35,6 +35,7 @@ mod wide;
 pub use bent_row::Bend;
 
 use super::errors::{MeasurementErrors, Uncertainty};
+use super::shared::SharedPlants;
 use super::slot::BarrierSlot;
 use crate::convergence::sampled::{PeriodBound, Weighted};
 use crate::elementary;
@@ -113,15 +114,16 @@ pub(super) struct PeriodProblem<'a> {
 /// Scratch memory of the search; its contents change no bit of the next one.
 pub(super) struct Scratch {
     violations: [f64; MAX_ROWS],
-    ahead: Ahead,
+    pub(super) evaluations: Evaluations,
     predicted: Predicted,
     /// How the only active row of the last answer bends, where the search knows it.
     pub(super) bend: Option<Bend>,
 }
 
 impl Scratch {
-    pub(super) const fn new() -> Self {
-        Self { violations: [0.0; MAX_ROWS], ahead: Ahead::ZERO, predicted: Predicted::NOTHING, bend: None }
+    pub(super) fn new(plants: SharedPlants) -> Self {
+        let evaluations = Evaluations { ahead: Ahead::ZERO, plants };
+        Self { violations: [0.0; MAX_ROWS], evaluations, predicted: Predicted::NOTHING, bend: None }
     }
 
     /// Forgets the last answer.
@@ -135,6 +137,13 @@ impl Scratch {
         let Predicted { rows, input, values } = &self.predicted;
         (rows.contains(i) && *u == input[..u.len()]).then(|| &values[i])
     }
+}
+
+/// Room for the evaluations of the sources.
+pub(super) struct Evaluations {
+    /// The last prediction.
+    ahead: Ahead,
+    pub(super) plants: SharedPlants,
 }
 
 /// What the predictions at one input have been.
@@ -158,8 +167,7 @@ impl Predicted {
 struct Linearised<'a> {
     rows: &'a mut [Row],
     violations: &'a mut [f64; MAX_ROWS],
-    /// Room for one prediction.
-    ahead: &'a mut Ahead,
+    evaluations: &'a mut Evaluations,
     predicted: &'a mut Predicted,
     bend: &'a mut Option<Bend>,
 }
@@ -251,8 +259,8 @@ impl PeriodProblem<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
-        let Scratch { violations, ahead, predicted, bend } = scratch;
-        let mut at = Linearised { rows, violations, ahead, predicted, bend };
+        let Scratch { violations, evaluations, predicted, bend } = scratch;
+        let mut at = Linearised { rows, violations, evaluations, predicted, bend };
         if let Some(solution) = self.bent_row(u, last, &mut at, qp) {
             return Some(solution);
         }
@@ -402,7 +410,7 @@ impl PeriodProblem<'_> {
 
     #[inline(always)]
     fn linearise_for(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
-        let Linearised { rows, violations, ahead, predicted, .. } = at;
+        let Linearised { rows, violations, evaluations, predicted, .. } = at;
         if predicted.input[..u.len()] != *u {
             predicted.rows = RowSet::EMPTY;
             predicted.input[..u.len()].copy_from_slice(u);
@@ -413,10 +421,10 @@ impl PeriodProblem<'_> {
             if requirement.bound.is_zero() {
                 *row = Row::ZERO;
             } else if anew.contains(i) {
-                *violation = self.linearised(requirement, u, ahead, row)?;
+                *violation = self.linearised(requirement, u, evaluations, row)?;
                 predicted.rows.insert(i);
                 let n = self.slots[requirement.barrier].degree();
-                predicted.values[i][..n].copy_from_slice(&ahead.value[..n]);
+                predicted.values[i][..n].copy_from_slice(&evaluations.ahead.value[..n]);
             } else {
                 let (slack, terms) = (row.slack(u), row.size(u));
                 if slack < -MET * terms {
@@ -429,18 +437,20 @@ impl PeriodProblem<'_> {
 
     /// A requirement under the input `u`, as a row on h⁽ⁿ⁾. `None` where there is no prediction.
     #[inline(always)]
-    fn weighted(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<Weighted> {
+    fn weighted(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<Weighted> {
         let slot = &self.slots[requirement.barrier];
-        slot.source.predict()?.ahead_of_row(self.t, &slot.now.from, u, requirement.ahead, ahead);
+        let Evaluations { ahead, plants } = room;
+        plants.ahead_of_row(slot, self.t, u, requirement.ahead, ahead)?;
         let (n, bound) = (slot.degree(), &requirement.bound);
         Some(bound.weighted(&ahead.value[..n], &ahead.gradient, u.len(), requirement.divisor))
     }
 
     /// [`Self::weighted`] without the gradient.
     #[inline(always)]
-    fn reached(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<Weighted> {
+    fn reached(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<Weighted> {
         let slot = &self.slots[requirement.barrier];
         let source = slot.source.predict()?;
+        let ahead = &mut room.ahead;
         source.values_of_row(self.t, &slot.now.from, u, requirement.ahead, &mut ahead.value);
         let (n, bound) = (slot.degree(), &requirement.bound);
         Some(bound.weighted(&ahead.value[..n], &ahead.gradient, 0, requirement.divisor))
@@ -452,10 +462,10 @@ impl PeriodProblem<'_> {
         &self,
         requirement: &Requirement,
         u: &[f64],
-        ahead: &mut Ahead,
+        room: &mut Evaluations,
         row: &mut Row,
     ) -> Option<f64> {
-        let Weighted { mut value, mut terms, mut normal } = self.weighted(requirement, u, ahead)?;
+        let Weighted { mut value, mut terms, mut normal } = self.weighted(requirement, u, room)?;
         if !self.errors.is_exact() {
             let slot = &self.slots[requirement.barrier];
             let held = (self.t, &slot.now.from[..], u, requirement.ahead);
@@ -483,12 +493,12 @@ impl PeriodProblem<'_> {
     }
 
     /// The slack at `u` of the row of a requirement. `None` where there is no prediction.
-    fn slack(&self, requirement: &Requirement, u: &[f64], ahead: &mut Ahead) -> Option<f64> {
+    fn slack(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<f64> {
         if !self.errors.is_exact() {
             let mut row = Row::ZERO;
-            return self.linearised(requirement, u, ahead, &mut row).map(|_| row.slack(u));
+            return self.linearised(requirement, u, room, &mut row).map(|_| row.slack(u));
         }
-        self.reached(requirement, u, ahead).map(|reached| reached.value)
+        self.reached(requirement, u, room).map(|reached| reached.value)
     }
 
     /// Linearises all rows at `u`, with violations that are round-off counted as met.
@@ -572,7 +582,7 @@ impl PeriodProblem<'_> {
                 let aside = &aside[..m];
                 let nearer = (self.distance(aside) - far) * normal;
                 // Not-a-number where it is not known, as on a way that a bound cuts short.
-                let slack = self.slack(&self.requirements[i], aside, at.ahead);
+                let slack = self.slack(&self.requirements[i], aside, at.evaluations);
                 if slack.is_some_and(|s| s > nearer) {
                     return true;
                 }

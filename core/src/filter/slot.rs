@@ -8,6 +8,7 @@ use alloc::vec::Vec;
 use super::errors::{ErrorSlopes, MeasurementErrors, Shortfall};
 use super::hold::Lowest;
 use super::outlook::Outlook;
+use super::shared::SharedPlants;
 use super::step::Moment;
 use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, SAME_TIME, Status};
 use crate::convergence::comparison::Stack;
@@ -69,6 +70,8 @@ pub enum Strictness {
 pub(super) struct BarrierSlot {
     pub(super) name: String,
     pub(super) source: Box<dyn DerivativeSource>,
+    /// The number of its plant, where others share it.
+    pub(super) plant: Option<usize>,
     pub(super) promise: FixedTime,
     pub(super) begin: Begin,
     pub(super) end: End,
@@ -129,7 +132,8 @@ impl BarrierSlot {
     pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
         let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
         let now = SlotSample::new(source.state_dim());
-        Self { name: name.to_owned(), source, promise, begin, end, strictness, exact: true, now }
+        let name = name.to_owned();
+        Self { name, source, plant: None, promise, begin, end, strictness, exact: true, now }
     }
 
     /// n.
@@ -141,18 +145,19 @@ impl BarrierSlot {
     /// Evaluates h and its derivatives along the plant where the input begins to act
     /// (docs/theory.md, sections 1 and 8). Returns h at the sample itself.
     #[inline]
-    pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64]) -> f64 {
-        let Self { source, now, .. } = self;
-        source.evaluate(moment.t, moment.x, &mut now.derivatives);
-        let h = now.derivatives.drift[0];
+    pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64], plants: &mut SharedPlants) -> f64 {
+        let Self { source, plant, now, .. } = self;
+        let mut h = None;
         now.from.copy_from_slice(moment.x);
         if moment.delay > 0.0 {
+            source.evaluate(moment.t, moment.x, &mut now.derivatives);
+            h = Some(now.derivatives.drift[0]);
             if let Some(source) = source.predict() {
                 source.flow(&mut now.from, acting, moment.delay);
             }
-            source.evaluate(moment.begin, &now.from, &mut now.derivatives);
         }
-        h
+        plants.evaluate((&**source, *plant), moment.begin, &now.from, &mut now.derivatives);
+        h.unwrap_or(now.derivatives.drift[0])
     }
 
     /// Moves the promise number `index` of `promises` to the sample, where h is `h`: whether it is in force, its

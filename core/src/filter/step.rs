@@ -107,14 +107,16 @@ impl SafetyFilter {
     /// Derivatives or a row that are no constraint.
     fn rows(&mut self, moment: &Moment) -> Result<(), Status> {
         let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
-        let Workspace { next, report, requirements, .. } = &mut self.workspace;
+        let Workspace { next, report, requirements, search, .. } = &mut self.workspace;
         // Within the capacity: a step does not allocate.
         requirements.clear();
+        search.evaluations.plants.forget();
         let (mut found, mut is_sampled) = (Ok(()), moment.period.is_some());
         let promises = &mut next.barriers[..];
         for (i, slot) in self.slots.iter_mut().enumerate() {
             let report = &mut report.barriers[i];
-            let h = slot.evaluate(moment, &acting[..moment.u_ref.len()]);
+            let plants = &mut search.evaluations.plants;
+            let h = slot.evaluate(moment, &acting[..moment.u_ref.len()], plants);
             let deadline_unreachable = match slot.advance(promises, i, h, moment, &self.bounds, &self.errors)
             {
                 Ok(is_unreachable) => is_unreachable,

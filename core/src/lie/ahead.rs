@@ -192,17 +192,15 @@ where
     one_step(rate, x, &rate(x), duration).unwrap_or_else(|| flow(plant, x, u, duration, SUBSTEPS))
 }
 
-/// The series of h from the state `x` at `t` on along the held input `u`, `K` coefficients.
+/// The series of the states from `x` on under the held input `u`, `K` coefficients.
 #[inline]
-fn series<P, B, S, const NX: usize, const NU: usize, const K: usize>(
-    (plant, barrier): (&P, &B),
-    t: f64,
+fn series<P, S, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
     x: &SVector<S, NX>,
     u: &SVector<S, NU>,
-) -> Taylor<S, K>
+) -> SVector<Taylor<S, K>, NX>
 where
     P: ControlAffine<NX, NU>,
-    B: Barrier<NX>,
     S: Scalar,
 {
     const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
@@ -233,7 +231,7 @@ where
         };
     }
     extend_to!(1, 2, 3, 4, 5, 6, 7, 8);
-    barrier.value(Taylor::time(t), &series)
+    series
 }
 
 /// Writes the courses of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Once
@@ -372,23 +370,33 @@ where
     enclosure::sharper(low, barrier.value(t, &x), slope, dt)
 }
 
-/// Evaluates (4) for `plant` and `barrier` from `x` at `t` under `u`, `duration` ≥ 0 seconds ahead, for k < `K`. Leaves the
-/// rest of `out` as it is.
-#[inline]
-pub(super) fn evaluate<P, B, const NX: usize, const NU: usize, const K: usize>(
-    (plant, barrier): (&P, &B),
-    (t, duration): (f64, f64),
+/// The series of the states from [`arrival`] on under the held input `u`, `K` coefficients, with their derivatives along u.
+#[inline(always)]
+pub(super) fn motion<P, const NX: usize, const NU: usize, const K: usize>(
+    plant: &P,
     x: &[f64],
     u: &[f64],
-    out: &mut Ahead,
-) where
+    duration: f64,
+) -> SVector<Taylor<Dual<NU>, K>, NX>
+where
     P: ControlAffine<NX, NU>,
-    B: Barrier<NX>,
 {
     let held: [f64; NU] = core::array::from_fn(|i| u[i]);
     let x = arrival(plant, &column(x), &held, duration);
-    let u = SVector::<Dual<NU>, NU>::from_fn(|i, _| Dual::variable(held[i], i));
-    let h: Taylor<_, K> = series((plant, barrier), t + duration, &x, &u);
+    series(plant, &x, &SVector::from_fn(|i, _| Dual::variable(held[i], i)))
+}
+
+/// Evaluates (4) for `barrier` at time `t` along the [`motion`] from there, for k < `K`. Leaves the rest of `out` as it is.
+#[inline(always)]
+pub(super) fn evaluate<B, const NX: usize, const NU: usize, const K: usize>(
+    barrier: &B,
+    t: f64,
+    motion: &SVector<Taylor<Dual<NU>, K>, NX>,
+    out: &mut Ahead,
+) where
+    B: Barrier<NX>,
+{
+    let h = barrier.value(Taylor::time(t), motion);
     for k in 0..K {
         let Dual { value, gradient } = h.derivative(k);
         out.value[k] = value;
@@ -410,7 +418,7 @@ pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
 {
     let u = column::<f64, NU>(u);
     let x = arrival_alone(plant, &column(x), &u, duration);
-    let h: Taylor<_, K> = series((plant, barrier), t + duration, &x, &u);
+    let h: Taylor<_, K> = barrier.value(Taylor::time(t + duration), &series(plant, &x, &u));
     for (k, out) in out[..K].iter_mut().enumerate() {
         *out = h.derivative(k);
     }
@@ -439,7 +447,7 @@ pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usi
         directional: Dual::from(dx[i]),
     });
     let x = flow(plant, &x, &u, duration, SUBSTEPS);
-    let h: Taylor<_, K> = series((plant, barrier), t + duration, &x, &u);
+    let h: Taylor<_, K> = barrier.value(Taylor::time(t + duration), &series(plant, &x, &u));
     out.write((0..K).map(|k| h.derivative(k).directional));
 }
 

@@ -1,5 +1,8 @@
 //! The derivatives of a barrier as the filter asks for them, whoever gives them.
 
+use alloc::boxed::Box;
+use core::any::Any;
+
 use super::{Ahead, Derivatives};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::interval::Interval;
@@ -15,6 +18,7 @@ use crate::interval::Interval;
 /// | [`directional`](Self::directional) | [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate) |
 /// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and errors of the measurement |
 /// | [`highest`](Self::highest) | deadlines that are lost ([`reach`](crate::reach)) |
+/// | [`shared`](Self::shared) | the speed of filters with several barriers along one plant |
 pub trait DerivativeSource: Send {
     /// n, in 1 ..= [`MAX_RELATIVE_DEGREE`].
     fn relative_degree(&self) -> usize;
@@ -40,6 +44,11 @@ pub trait DerivativeSource: Send {
 
     /// The source as one that differentiates its predictions along a direction. The default does not.
     fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        None
+    }
+
+    /// The source as one that others along the same plant can share work with. The default shares none.
+    fn shared(&self) -> Option<&dyn SharedPlant> {
         None
     }
 
@@ -132,6 +141,33 @@ pub trait Predict {
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
         None
     }
+}
+
+/// The part of a source's work that depends on the plant alone, so that barriers of one relative degree along one plant need
+/// it once. Whatever is shared, the numbers have the same bits.
+///
+/// Rooms hold what a method writes for another one. Only sources that [share](Self::shares) a plant know what is in them.
+pub trait SharedPlant {
+    /// The plant.
+    fn plant(&self) -> &dyn Any;
+
+    /// Whether `plant`, that of another source of the same relative degree, is this one, so that the rooms of both are alike.
+    fn shares(&self, plant: &dyn Any) -> bool;
+
+    /// Rooms for [`Self::motion`] and for [`Self::motion_ahead`].
+    fn rooms(&self) -> [Box<dyn Any + Send>; 2];
+
+    /// Writes the motion of the states from `x` on at u = 0, with its derivatives along u.
+    fn motion(&self, x: &[f64], room: &mut dyn Any);
+
+    /// Writes what [`DerivativeSource::evaluate`] does, from the motion that begins at time `t`.
+    fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives);
+
+    /// Writes the motion that begins `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along u.
+    fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any);
+
+    /// Writes what [`Predict::ahead_of_row`] does, from the motion ahead, which begins at time `t`.
+    fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead);
 }
 
 /// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …

@@ -273,7 +273,7 @@ impl PeriodProblem<'_> {
         }
         // Does u_ref violate the row over the period too?
         let requirement = &self.requirements[chosen];
-        let at_reference = self.weighted(requirement, u_ref, at.ahead)?;
+        let at_reference = self.weighted(requirement, u_ref, at.evaluations)?;
         let normal: [f64; M] = *at_reference.normal.first_chunk()?;
         let moved: f64 = (0..M).map(|i| (normal[i] * u_ref[i]).abs()).sum();
         if at_reference.value >= -MET * (at_reference.terms + moved) {
@@ -297,7 +297,7 @@ impl PeriodProblem<'_> {
         let (mut way, mut turned) = ([0.0; M], [0.0; M]);
         let (mut bends_aside, mut rounds) = (false, 0);
         let (lambda, turn) = loop {
-            let here = self.weighted(requirement, &u, at.ahead)?;
+            let here = self.weighted(requirement, &u, at.evaluations)?;
             let before = core::mem::replace(&mut row.normal, *here.normal.first_chunk()?);
             row.value = here.value;
             let change = core::array::from_fn(|i| row.normal[i] - before[i]);
@@ -439,7 +439,9 @@ impl PeriodProblem<'_> {
         chosen: usize,
         at: &mut Linearised,
     ) -> bool {
-        let Some(here) = self.weighted(&self.requirements[chosen], last, at.ahead) else { return false };
+        let Some(here) = self.weighted(&self.requirements[chosen], last, at.evaluations) else {
+            return false;
+        };
         let Some(normal) = here.normal.first_chunk() else { return false };
         let row = Bent { value: here.value, normal: *normal, hessian: [[0.0; M]; M] };
         let back = core::array::from_fn(|i| self.u_ref[i] - last[i]);

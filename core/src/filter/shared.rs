@@ -1,0 +1,119 @@
+//! What barriers along one plant share: the motion of the states at a sample, and where the last input that was tried leads.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::any::Any;
+
+use super::slot::BarrierSlot;
+use crate::MAX_INPUTS;
+use crate::lie::{Ahead, DerivativeSource, Derivatives, SharedPlant};
+
+/// The evaluations of one plant at the present sample.
+struct Plant {
+    /// The motion from the state from which the input acts.
+    motion: Box<dyn Any + Send>,
+    is_moving: bool,
+    /// Where the input held for the duration (s) leads.
+    ahead: Box<dyn Any + Send>,
+    input: [f64; MAX_INPUTS],
+    /// `None` before the first ahead.
+    duration: Option<f64>,
+}
+
+impl Plant {
+    fn new(source: &dyn SharedPlant) -> Self {
+        let [motion, ahead] = source.rooms();
+        Self { motion, is_moving: false, ahead, input: [0.0; MAX_INPUTS], duration: None }
+    }
+
+    /// Whether `ahead` is that of the input `u` after `duration`, bit by bit: 0 and −0 are not the same.
+    #[inline(always)]
+    fn is_ahead_of(&self, u: &[f64], duration: f64) -> bool {
+        let mut same = self.duration.is_some_and(|known| known == duration);
+        for (known, u) in self.input.iter().zip(u) {
+            same &= known.to_bits() == u.to_bits();
+        }
+        same
+    }
+}
+
+/// The source of a barrier, and the number of its plant.
+type Source<'a> = (&'a dyn DerivativeSource, Option<usize>);
+
+/// The plants along which there are several barriers of one relative degree.
+pub(super) struct SharedPlants(Vec<Plant>);
+
+impl SharedPlants {
+    /// Finds the plants that the sources of `slots` share, and tells each its number.
+    pub(super) fn of(slots: &mut [BarrierSlot]) -> Self {
+        let mut plants = Vec::new();
+        for i in 0..slots.len() {
+            let (before, rest) = slots.split_at_mut(i);
+            let slot = &mut rest[0];
+            slot.plant = None;
+            let Some(source) = slot.source.shared() else { continue };
+            let n = slot.source.relative_degree();
+            let is_same = |other: &&mut BarrierSlot| {
+                let plant = other.source.shared().map(SharedPlant::plant);
+                other.source.relative_degree() == n && plant.is_some_and(|plant| source.shares(plant))
+            };
+            if let Some(other) = before.iter_mut().find(is_same) {
+                let number = *other.plant.get_or_insert_with(|| {
+                    plants.push(Plant::new(source));
+                    plants.len() - 1
+                });
+                slot.plant = Some(number);
+            }
+        }
+        Self(plants)
+    }
+
+    /// Begins another sample.
+    #[inline(always)]
+    pub(super) fn forget(&mut self) {
+        for plant in &mut self.0 {
+            (plant.is_moving, plant.duration) = (false, None);
+        }
+    }
+
+    /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x` from which the input of the sample acts.
+    #[inline(always)]
+    pub(super) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
+        let Some((plant, source)) = self.shared(source) else { return source.0.evaluate(t, x, out) };
+        if !plant.is_moving {
+            source.motion(x, &mut *plant.motion);
+            plant.is_moving = true;
+        }
+        source.evaluate_along(t, &*plant.motion, out);
+    }
+
+    /// Writes what [`Predict::ahead_of_row`](crate::lie::Predict::ahead_of_row) does for the barrier of `slot`. `None` where there
+    /// is no prediction.
+    #[inline(always)]
+    pub(super) fn ahead_of_row(
+        &mut self,
+        slot: &BarrierSlot,
+        t: f64,
+        u: &[f64],
+        duration: f64,
+        out: &mut Ahead,
+    ) -> Option<()> {
+        let x = &slot.now.from;
+        let Some((plant, source)) = self.shared((&*slot.source, slot.plant)) else {
+            slot.source.predict()?.ahead_of_row(t, x, u, duration, out);
+            return Some(());
+        };
+        if !plant.is_ahead_of(u, duration) {
+            source.motion_ahead(x, u, duration, &mut *plant.ahead);
+            plant.input[..u.len()].copy_from_slice(u);
+            plant.duration = Some(duration);
+        }
+        source.ahead_of_row_along(t + duration, &*plant.ahead, out);
+        Some(())
+    }
+
+    #[inline(always)]
+    fn shared<'a>(&mut self, (source, plant): Source<'a>) -> Option<(&mut Plant, &'a dyn SharedPlant)> {
+        Some((&mut self.0[plant?], source.shared()?))
+    }
+}
