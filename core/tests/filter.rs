@@ -418,6 +418,22 @@ fn a_singular_barrier_anchors_none() {
     assert_eq!(status, Status::Singular);
     assert_eq!(filter.report().barriers[0].phase, Phase::Waiting);
     assert!(filter.state().barriers.iter().all(|b| b.phase == Phase::Waiting));
+    // The deadline has begun to count all the same: the state was valid.
+    let (_, status) = step(&mut filter, 0.5, &[1.0, 0.0, 0.0, 0.0]);
+    let goal = filter.report().barriers[1];
+    assert_eq!((status.is_satisfied(), goal.phase, goal.time_left), (true, Phase::Approach, 1.5));
+    // After its end nothing is promised.
+    filter.rearm();
+    let _ = step(&mut filter, 0.0, &[1e200, 0.0, 0.0, 0.0]);
+    let _ = step(&mut filter, 2.5, &[1.0, 0.0, 0.0, 0.0]);
+    let goal = filter.report().barriers[1];
+    assert_eq!((goal.phase, goal.on_course), (Phase::Late, false));
+    // It does not while a state is not a number, nor with a peek.
+    filter.rearm();
+    let _ = step(&mut filter, 0.0, &[f64::NAN, 0.0, 0.0, 0.0]);
+    let _ = filter.peek(0.1, &[1e200, 0.0, 0.0, 0.0], &[0.0; 2], &mut [0.0; 2]);
+    let _ = step(&mut filter, 1.0, &[1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(filter.report().barriers[1].time_left, 2.0);
 }
 
 #[test]

@@ -112,7 +112,8 @@ impl Status {
     }
 }
 
-/// One barrier's part of a [`Report`].
+/// One barrier's part of a [`Report`]. With an [actuation delay](super::FilterBuilder::actuation_delay) all but h is of the instant
+/// at which the input of the sample acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -352,9 +352,14 @@ impl SafetyFilter {
     fn abstain(&mut self, status: Status, u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = status;
+        // What has begun to count goes on: the deadlines too, where the inputs were valid.
         let start = next.start;
+        let starts: [Option<f64>; MAX_ROWS] = core::array::from_fn(|i| next.barriers.get(i)?.start_time);
         next.clone_from(&self.state);
         next.start = start;
+        for (promise, start) in next.barriers.iter_mut().zip(starts) {
+            promise.start_time = start;
+        }
         for (promise, b) in next.barriers.iter_mut().zip(&mut report.barriers) {
             promise.on_course = false;
             b.remember(promise);
