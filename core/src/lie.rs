@@ -295,6 +295,12 @@ where
         Some(ahead::lowest_held::<P, B, NX, NU>(model, (t, duration), x, u, wanted))
     }
 
+    fn is_still(&self, x: &[f64]) -> Option<bool> {
+        let x = SVector::from_fn(|i, _| Interval::from(x[i]));
+        // Where time is not used, the bits are the same.
+        Some(self.barrier.value(Interval::ALL, &x) == self.barrier.value(Interval::from(0.0), &x))
+    }
+
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
         self.barrier.range_from(t, &column(x)).map(|[least, _]| least)
     }

@@ -8,12 +8,12 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, Commitment, FilterBuilder, FilterState, Pace, SafetyFilter, Sampling,
-    Standing,
+    AssuredFilter, BarrierSettings, Begin, Commitment, End, FilterBuilder, FilterState, Pace, SafetyFilter,
+    Sampling, Standing,
 };
 use punctual_core::plan::Failure;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::Unicycle;
+use punctual_reference::plants::{PointMass, Unicycle};
 
 const PERIOD: f64 = 0.05;
 const HORIZON: f64 = 8.0;
@@ -375,9 +375,60 @@ fn sets_that_move_for_ever_need_a_horizon() {
     let refused = |horizon| fleeing(horizon).err().map(|e| e.to_string()).unwrap_or_default();
     assert_eq!(
         refused(None),
-        "strip.source: moves with time for ever, so that no plan ends; with a horizon one may end before"
+        "strip.source: moves with time, so that no plan ends; with a horizon one may end before"
     );
     assert_eq!(refused(Some(0.0)), "horizon: is 0, must be finite and > 0");
     assert_eq!(refused(Some(f64::NAN)), "horizon: is NaN, must be finite and > 0");
     assert_eq!(refused(Some(3.0)), "");
+}
+
+/// A disc around the origin that shrinks for a moment, and at last moves as little as nothing.
+#[derive(Clone, Copy, Debug)]
+struct Pulse {
+    at: f64,
+    width: f64,
+    depth: f64,
+}
+
+impl<const NX: usize> Barrier<NX> for Pulse {
+    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+        let off = (t - self.at) / self.width;
+        -(x[0] * x[0] + x[1] * x[1]) / 9.0 + 5.0 - (-(off * off)).exp() * self.depth
+    }
+}
+
+/// At whatever time a set moves, and for however short a while, no plan is said to keep it for ever. Nor is one that ends after
+/// that, where it ends. One of depth 0 does not move.
+#[test]
+fn a_set_that_moves_once_is_not_promised_for_ever() {
+    let mut random = Random(0x9E37_79B9_7F4A_7C15);
+    let assured = |pulse: Pulse, end: End| {
+        let builder = SafetyFilter::builder(4, 2)
+            .barrier("goal", PointMass, DistanceDisc::new([3.0, 0.0], 1.0, 1.0).expect("a disc"), keeping())
+            .and_then(|b| {
+                b.barrier("gate", PointMass, pulse, BarrierSettings { deadline: None, ..keeping() })
+            })
+            .and_then(|b| b.window(Begin::AtOnce, end));
+        AssuredFilter::new(built(builder, &[2.0, 2.0]), PERIOD)
+    };
+    for draw in 0..40 {
+        let (at, width) = (10.0_f64.powf(random.between(0.5, 5.0)), 10.0_f64.powf(random.between(-3.0, 1.0)));
+        let pulse = Pulse { at, width, depth: 10.0 };
+        let refused = assured(pulse, End::Never).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(
+            refused.starts_with("gate.source: moves with time, so that no plan ends"),
+            "{pulse:?}: {refused}"
+        );
+        if draw % 8 == 0 {
+            let mut u = [0.0; 2];
+            let mut ends = assured(pulse, End::At(at + 10.0 * width)).expect("one that ends");
+            let assurance = ends.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+            assert!(!assurance.is_assured(), "{pulse:?}: {assurance:?}");
+        }
+    }
+    let mut still =
+        assured(Pulse { at: 40.0, width: 0.5, depth: 0.0 }, End::Never).expect("a set that is still");
+    let mut u = [0.0; 2];
+    let assurance = still.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    assert!(assurance.is_assured(), "{assurance:?}");
 }

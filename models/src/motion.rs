@@ -487,6 +487,13 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         Some(self.work.borrow_mut().few_over.follow(time, |i, _| path[i][0]))
     }
 
+    fn is_still(&self, x: &[f64]) -> Option<bool> {
+        let few_over = &mut self.work.borrow_mut().few_over;
+        let mut at = |time| few_over.follow(time, |i, _| Interval::from(x[i]));
+        // Where time is not used, the bits are the same.
+        Some(at(Interval::ALL) == at(Interval::from(0.0)))
+    }
+
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
         let Work { value, few_over, held, rate, .. } = &mut *self.work.borrow_mut();
         rates_at(&mut value.flow, x, u, rate);

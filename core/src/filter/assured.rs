@@ -438,8 +438,7 @@ impl AssuredFilter {
         one_plant(filter, period)?;
         for slot in &filter.slots {
             if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
-                let message =
-                    "moves with time for ever, so that no plan ends; with a horizon one may end before";
+                let message = "moves with time, so that no plan ends; with a horizon one may end before";
                 return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
             }
         }
@@ -1340,14 +1339,16 @@ fn trial_state(i: usize, trial: usize) -> f64 {
     ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
 }
 
-/// Whether h changes with time alone, at some states and times in s, and it is not known that it does so within limits.
+/// Whether h changes with time alone, at some states, and it is not known that it does so within limits. It is looked at at some
+/// times in s, and at all at once where it has enclosures.
 fn leaves(slot: &BarrierSlot, states: usize) -> bool {
     const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
     let Some(model) = slot.source.predict() else { return false };
     (0..4).any(|trial| {
         let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
         let values = TIMES.map(|t| model.value(t, &x));
-        let moves = values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()));
+        let moves = values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()))
+            || model.is_still(&x) == Some(false);
         moves && model.lowest_from(0.0, &x).is_none_or(|least| least == f64::NEG_INFINITY)
     })
 }

@@ -169,6 +169,10 @@ impl Predict for Embedded {
         self.source.predict()?.lowest_held(t, own, u, duration, wanted)
     }
 
+    fn is_still(&self, x: &[f64]) -> Option<bool> {
+        self.source.predict()?.is_still(&self.picked(x)[..self.picks.len()])
+    }
+
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
         self.source.predict()?.lowest_from(t, &self.picked(x)[..self.picks.len()])
     }

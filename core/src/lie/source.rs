@@ -137,6 +137,11 @@ pub trait Predict {
         None
     }
 
+    /// Whether h at the state `x` is the same at all times, by its enclosures. The default knows none.
+    fn is_still(&self, _x: &[f64]) -> Option<bool> {
+        None
+    }
+
     /// The least value of h from `t` on while the state stays `x`; for sets that move. The default knows none.
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
         None

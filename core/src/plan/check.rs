@@ -578,7 +578,7 @@ impl<'a> Walk<'a> {
                 let later = requirement.model.value(self.t + span, &self.x);
                 (later - h).abs() > 1e-12 * (1.0 + h.abs())
             });
-            if moves {
+            if moves || requirement.model.is_still(&self.x) == Some(false) {
                 let begin = self.t.max(requirement.from);
                 for (x, c) in self.point.iter_mut().zip(&self.path) {
                     *x = c[0] + c[1] * DRIFT * hold;

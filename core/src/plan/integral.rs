@@ -54,6 +54,10 @@ impl Predict for Limit<'_> {
         Some((path[self.state][0] - self.limit) * self.sign)
     }
 
+    fn is_still(&self, _: &[f64]) -> Option<bool> {
+        Some(true)
+    }
+
     fn last_over(&self, _: Interval, path: &[CourseOver]) -> Option<Interval> {
         Some(path[self.state][COURSE - 1] * self.sign)
     }
