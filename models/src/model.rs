@@ -247,6 +247,13 @@ impl Equations for Listed {
         self.inputs
     }
 
+    /// Operations of barriers come after those of the plant, and move none of its registers.
+    fn is_same(&self, other: &Self) -> bool {
+        (self.states, self.inputs) == (other.states, other.inputs)
+            && self.derivatives == other.derivatives
+            && self.steps == other.steps
+    }
+
     fn series<C: Scalar>(&self, orders: usize) -> Series<C> {
         Series::new(self.registers, orders)
     }

@@ -1,5 +1,6 @@
 //! The motion of a plant and the series of a barrier along it, whether a tape or code does the operations.
 
+use std::any::Any;
 use std::cell::RefCell;
 
 use punctual_core::MAX_RELATIVE_DEGREE;
@@ -8,7 +9,7 @@ use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
     self, Ahead, COURSE, Coefficients, Course, CourseOver, DerivativeSource, Derivatives, Direction,
-    Directional, Predict, PredictDirectional, RateOver, RelativeDegree, SUBSTEPS,
+    Directional, Predict, PredictDirectional, RateOver, RelativeDegree, SUBSTEPS, SharedPlant,
 };
 use punctual_core::scalar::Scalar;
 
@@ -23,6 +24,11 @@ pub(crate) trait Equations: Clone + Send + 'static {
 
     /// Number of inputs.
     fn inputs(&self) -> usize;
+
+    /// Whether the operations of the plant are those of `other`. The default knows none that are.
+    fn is_same(&self, _other: &Self) -> bool {
+        false
+    }
 
     /// Memory for `orders` coefficients of every register.
     fn series<C: Scalar>(&self, orders: usize) -> Series<C>;
@@ -100,7 +106,7 @@ pub(crate) fn source<E: Equations>(
             rate: vec![0.0; plant.states()],
         };
         let (states, inputs) = (plant.states(), plant.inputs());
-        Box::new(Source { work: RefCell::new(work), states, inputs, n })
+        Box::new(Source { work: RefCell::new(work), plant: plant.clone(), states, inputs, n })
     }
     if n == 0 || n > MAX_RELATIVE_DEGREE {
         let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
@@ -330,6 +336,13 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
         self.flow.hold((0..M).map(|i| Dual::variable(u(i), i)));
     }
 
+    /// Moves from the state `x` under the held input `u`.
+    fn arrive(&mut self, x: &[f64], u: &[f64], duration: f64) {
+        self.flow.set_state(x.iter().map(|&v| Dual::from(v)));
+        self.hold(|i| u.get(i).copied().unwrap_or_default());
+        self.flow.predict(duration);
+    }
+
     /// Computes the coefficients from the state `x` at time `t`, along the free motion.
     fn evaluate(&mut self, t: f64, x: &[f64]) {
         self.evaluate_at(t, x, |_| 0.0);
@@ -353,6 +366,7 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
 /// A barrier along a plant, as the filter takes it.
 struct Source<E, const M: usize> {
     work: RefCell<Work<E, M>>,
+    plant: E,
     states: usize,
     inputs: usize,
     n: usize,
@@ -425,7 +439,57 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
     fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
         Some(self)
     }
+
+    fn shared(&self) -> Option<&dyn SharedPlant> {
+        Some(self)
+    }
 }
+
+/// The way ahead is shared. At a sample the operations of plant and barrier are one tape, so of that motion its begin is.
+impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
+    fn plant(&self) -> &dyn Any {
+        &self.plant
+    }
+
+    fn shares(&self, plant: &dyn Any) -> bool {
+        plant.downcast_ref().is_some_and(|plant| self.plant.is_same(plant))
+    }
+
+    fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
+        let arrival = vec![Dual::<M>::from(0.0); self.states + self.inputs];
+        [Box::new(vec![0.0; self.states]), Box::new(arrival)]
+    }
+
+    fn motion(&self, x: &[f64], room: &mut dyn Any) {
+        let begin: &mut Vec<f64> = room.downcast_mut().expect(ROOM);
+        begin.copy_from_slice(x);
+    }
+
+    fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
+        let begin: &Vec<f64> = motion.downcast_ref().expect(ROOM);
+        self.evaluate(t, begin, out);
+    }
+
+    fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
+        let arrival: &mut Vec<Dual<M>> = room.downcast_mut().expect(ROOM);
+        let along = &mut self.work.borrow_mut().along;
+        along.arrive(x, u, duration);
+        for (register, value) in arrival.iter_mut().enumerate() {
+            *value = along.flow.series.get(register, 0);
+        }
+    }
+
+    fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
+        let arrival: &Vec<Dual<M>> = motion.downcast_ref().expect(ROOM);
+        let along = &mut self.work.borrow_mut().along;
+        along.flow.set_state(arrival.iter().copied());
+        along.continue_from_flow(t);
+        self.write(out, |k| along.derivative(k));
+    }
+}
+
+/// What a room that is not of the plant would break.
+const ROOM: &str = "a room that a source along the same plant has made";
 
 impl<E: Equations, const M: usize> Predict for Source<E, M> {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
@@ -434,9 +498,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let along = &mut self.work.borrow_mut().along;
-        along.flow.set_state(x.iter().map(|&v| Dual::from(v)));
-        along.hold(|i| u.get(i).copied().unwrap_or_default());
-        along.flow.predict(duration);
+        along.arrive(x, u, duration);
         along.continue_from_flow(t + duration);
         self.write(out, |k| along.derivative(k));
     }

@@ -286,3 +286,62 @@ fn twelve_inputs() {
         assert_eq!(out.row.to_vec(), wanted);
     }
 }
+
+/// What a barrier computes of the plant is what another one along it takes: every bit is that of its own.
+#[test]
+fn barriers_along_one_model_share_the_plant() {
+    let model = |l_r| {
+        let derivatives = ["v*cos(theta)", "v*sin(theta)", "v*beta/l_r", "a"];
+        let parameters = [("R", 2.0), ("c_x", 45.0), ("c_y", 44.0), ("l_r", l_r)];
+        Model::new(&["x_p", "y_p", "theta", "v"], &["a", "beta"], &parameters, &derivatives).expect("a model")
+    };
+    let source = |l_r, text| {
+        let barrier = model(l_r).barrier(text).expect("a barrier");
+        barrier.source(2).expect("in range")
+    };
+    let (one, other, longer) =
+        (source(3.0, DISC), source(3.0, "sin(t) - x_p + exp(y_p/9)"), source(4.0, DISC));
+    let [one, shared, longer] = [&one, &other, &longer].map(|s| s.shared().expect("a source that shares"));
+    assert!(one.shares(shared.plant()) && shared.shares(one.plant()) && !one.shares(longer.plant()));
+    let [mut motion, mut ahead] = one.rooms();
+    for (t, x) in lie::samples(&[[-3.0, 3.0]; 4]).into_iter().take(50) {
+        let (mut found, mut wanted) = (Derivatives::ZERO, Derivatives::ZERO);
+        one.motion(&x, &mut *motion);
+        shared.evaluate_along(t, &*motion, &mut found);
+        other.evaluate(t, &x, &mut wanted);
+        assert_eq!(found, wanted);
+        // One Runge-Kutta step does for the first, and not for the second.
+        for duration in [1e-3, 1.5] {
+            let (mut found, mut wanted) = (Ahead::ZERO, Ahead::ZERO);
+            let u = [0.7, -0.4 * t.cos()];
+            one.motion_ahead(&x, &u, duration, &mut *ahead);
+            shared.ahead_of_row_along(t + duration, &*ahead, &mut found);
+            other.predict().expect("a model").ahead_of_row(t, &x, &u, duration, &mut wanted);
+            assert_eq!(found, wanted);
+        }
+    }
+}
+
+/// Whether time matters to a barrier is known of all times at once.
+#[test]
+fn what_depends_on_time_is_known() {
+    let model = Model::new(&["x", "v"], &["u"], &[("c", 3.0)], &["v", "u"]).expect("a model");
+    let is_still = |text: &str, x: [f64; 2]| {
+        let source = model.barrier(text).expect("a barrier").source(2).expect("in range");
+        source.predict().expect("a model").is_still(&x)
+    };
+    let texts = [
+        (true, "5 - x^2/c"),
+        (true, "sqrt(x^2 + v^2 + 1) - atan2(x, v)/max(c, exp(x))"),
+        (false, "5 - x^2/9 - 10*exp(-((t - 40)*2)^2)"),
+        (false, "5 - x - 1e-9*tanh(t - 1e6)"),
+        (false, "5 - x - max(0, t - 1e5)"),
+        (false, "sin(1e-3*t) - x"),
+        (false, "x - sqrt(t)"),
+    ];
+    for (still, text) in texts {
+        for x in [[0.3, -2.0], [1e3, 0.0], [-7.5, 1e-9]] {
+            assert_eq!(is_still(text, x), Some(still), "{text} at {x:?}");
+        }
+    }
+}
