@@ -193,7 +193,7 @@ where
 }
 
 /// The series of the states from `x` on under the held input `u`, `K` coefficients.
-#[inline]
+#[inline(always)]
 fn series<P, S, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     x: &SVector<S, NX>,
