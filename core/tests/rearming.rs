@@ -41,6 +41,29 @@ fn leaving_rearms_with_the_recovery_time() {
     }
 }
 
+/// What is reached early, and left again, has still to be there by its first deadline, however short or long the recovery is.
+#[test]
+fn a_recovery_time_does_not_move_the_first_deadline() {
+    for recovery in [0.2, 1.5, 20.0] {
+        let settings = BarrierSettings { recovery: Some(recovery), ..BarrierSettings::within(3.0) };
+        let mut filter = goal(settings);
+        let mut u = [0.0; 2];
+        let mut at = |t: f64, x: f64| {
+            let report = filter.step(t, &[x, 45.0, 0.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
+            let b = report.barriers[0];
+            (b.phase, b.recoveries, (1e6 * b.time_left).round() / 1e6)
+        };
+        assert_eq!(at(0.0, 40.0), (Phase::Approach, 0, 3.0));
+        assert_eq!(at(1.0, 45.0), (Phase::Stay, 0, 2.0));
+        assert_eq!(at(1.5, 42.0), (Phase::Approach, 0, 1.5));
+        // Once more, and then from the deadline on.
+        assert_eq!(at(2.0, 45.0), (Phase::Stay, 0, 1.0));
+        assert_eq!(at(2.5, 42.0), (Phase::Approach, 0, 0.5));
+        assert_eq!(at(2.9, 45.0), (Phase::Stay, 0, 0.1));
+        assert_eq!(at(3.5, 42.0), (Phase::Approach, 1, recovery));
+    }
+}
+
 #[test]
 fn without_a_recovery_time_leaving_is_reported() {
     let mut filter = goal(BarrierSettings::within(3.0));

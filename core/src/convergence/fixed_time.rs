@@ -221,8 +221,11 @@ impl FixedTime {
         }
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
-            self.anchor(state, t, &lowest, recovery, state.period);
-            state.recoveries = state.recoveries.saturating_add(1);
+            // What was to be reached may be left again while its deadline is ahead, which stands.
+            let left = state.deadline - state.elapsed(t);
+            let stands = state.recoveries == 0 && !state.was_inside() && left > 0.0;
+            self.anchor(state, t, &lowest, if stands { left } else { recovery }, state.period);
+            state.recoveries = state.recoveries.saturating_add(u32::from(!stands));
         }
         // Note the arrival, and move on to the phase that begins here.
         let elapsed = state.elapsed(t);

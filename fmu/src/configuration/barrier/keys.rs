@@ -133,7 +133,7 @@ static KEYS: [Row; 33] = [
             name: "recovery",
             value: Number(S, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "a new deadline after leaving the set; 0: leaving is reported only",
+            meaning: "a new deadline after leaving the set, from the first deadline on, which stands; 0: leaving is reported only",
         },
         parameters: &[whole("deadline for coming back after leaving; 0: none", |b| Some(&mut b.recovery.0))],
     },
