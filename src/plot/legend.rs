@@ -31,6 +31,11 @@ pub(super) fn width(entries: &[Entry]) -> f64 {
     entries.iter().map(|(_, text)| KEY + 8.0 + text_width(text, SIZE)).fold(0.0, f64::max)
 }
 
+/// The height of that column in pixels.
+pub(super) fn height(entries: &[Entry]) -> f64 {
+    entries.len() as f64 * ROW
+}
+
 /// Draws the entries downwards from `at`.
 pub(super) fn draw(canvas: &mut Canvas, entries: &[Entry], at: Point) {
     for (i, (key, text)) in entries.iter().enumerate() {

@@ -239,7 +239,7 @@ pub fn time(plot: &TimePlot, file: &File) -> Result<(), Error> {
 ///
 /// As for [`time`].
 pub fn times(plots: &[TimePlot], file: &File) -> Result<(), Error> {
-    let mut canvas = Canvas::new(ALONE, time::WIDTH, time::height(plots.len()));
+    let mut canvas = Canvas::new(ALONE, time::WIDTH, time::height(plots));
     time::draw(plots, &mut canvas).map_err(|message| Error::plot(file, message))?;
     canvas.save(file)
 }

@@ -20,9 +20,33 @@ const BOTTOM: f64 = 58.0;
 /// Most decades shown on a logarithmic axis.
 const DECADES: f64 = 12.0;
 
-/// Height of the sheet for this many panels.
-pub(super) fn height(panels: usize) -> f64 {
-    if panels <= 1 { SINGLE } else { panels as f64 * PANEL + BOTTOM }
+/// Height of the sheet for these panels.
+pub(super) fn height(plots: &[TimePlot]) -> f64 {
+    match plots {
+        [plot] => SINGLE.max(with_legend(plot)),
+        _ => plots.len() as f64 * panel(plots) + BOTTOM,
+    }
+}
+
+/// Height of each of these panels. A single one keeps it where its legend is longer.
+fn panel(plots: &[TimePlot]) -> f64 {
+    match plots {
+        [_] => SINGLE - BOTTOM,
+        _ => plots.iter().map(with_legend).fold(PANEL, f64::max),
+    }
+}
+
+/// Height of a panel's legend, with what stands above it.
+fn with_legend(plot: &TimePlot) -> f64 {
+    above(plot) + legend::height(&entries(plot)) + 8.0
+}
+
+/// Room for the title and the notes above a panel.
+fn above(plot: &TimePlot) -> f64 {
+    let title = if plot.title.is_empty() { 14.0 } else { 40.0 };
+    let is_noted = plot.instants.iter().any(|mark| !mark.label.is_empty())
+        || matches!(plot.scale, Scale::Percentiles(..) | Scale::Fixed(..));
+    title + if is_noted { 16.0 } else { 0.0 }
 }
 
 pub(super) fn draw(plots: &[TimePlot], canvas: &mut Canvas) -> Result<(), String> {
@@ -31,14 +55,10 @@ pub(super) fn draw(plots: &[TimePlot], canvas: &mut Canvas) -> Result<(), String
     let legends: Vec<Vec<Entry>> = plots.iter().map(entries).collect();
     let widest = legends.iter().map(|l| legend::width(l)).fold(0.0, f64::max);
     let right = canvas.width() - if widest > 0.0 { widest + 34.0 } else { 24.0 };
-    let panel = (canvas.height() - BOTTOM) / plots.len().max(1) as f64;
+    let panel = panel(plots);
     for (i, (plot, legend)) in plots.iter().zip(&legends).enumerate() {
-        let title = if plot.title.is_empty() { 14.0 } else { 40.0 };
-        let above = plot.instants.iter().any(|mark| !mark.label.is_empty())
-            || matches!(plot.scale, Scale::Percentiles(..) | Scale::Fixed(..));
-        let notes = if above { 16.0 } else { 0.0 };
         let last = i + 1 == plots.len();
-        let top = i as f64 * panel + title + notes;
+        let top = i as f64 * panel + above(plot);
         let bottom = (i + 1) as f64 * panel - if last { 0.0 } else { 22.0 };
         let area = [92.0, top, right, bottom];
         let (y, note) = y_axis(plot, bottom - top)?;
@@ -187,6 +207,23 @@ mod tests {
         assert!(note.unwrap().contains("to 31950"));
         let (axis, note) = y_axis(&plot(values, Scale::Linear), 300.0).unwrap();
         assert!(axis.high > 31_000.0 && note.is_none());
+    }
+
+    /// However many signals there are, each is named within the picture, and no panel's names reach into the next one.
+    #[test]
+    fn the_sheet_has_room_for_every_name() {
+        let named = |count: usize| {
+            let series = Series { label: "h".into(), ..plot(vec![0.0, 1.0], Scale::Linear).series.remove(0) };
+            TimePlot { series: vec![series; count], ..TimePlot::default() }
+        };
+        for count in [1, 11, 22, 130] {
+            let one = [named(count)];
+            assert!(height(&one) >= above(&one[0]) + legend::height(&entries(&one[0])), "{count}");
+            let two = [named(count), named(3)];
+            assert!(panel(&two) >= above(&two[0]) + legend::height(&entries(&two[0])), "{count}");
+            assert_eq!(height(&two), 2.0 * panel(&two) + BOTTOM);
+        }
+        assert_eq!((height(&[named(4)]), panel(&[named(130)])), (SINGLE, SINGLE - BOTTOM));
     }
 
     #[test]

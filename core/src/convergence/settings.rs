@@ -90,8 +90,9 @@ pub struct FixedTimeSettings {
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
-    /// again: leaving then anchors anew with this deadline, or with what is left of the first one while that is ahead. `None`, the default: leaving is reported
-    /// ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
+    /// again: leaving then anchors anew with this deadline, or with what is left of the first one while that is
+    /// ahead. `None`, the default: leaving is reported ([`Phase::Left`](super::Phase::Left)) and the stay constraint
+    /// pulls back, without a deadline.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub recovery: Option<f64>,
     /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on the part of h⁽ⁿ⁾ that the model lacks, such as L_wL_f^{n−1}h w for a

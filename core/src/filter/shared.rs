@@ -16,7 +16,7 @@ struct Plant {
     /// Where the input held for the duration (s) leads.
     ahead: Box<dyn Any + Send>,
     input: [f64; MAX_INPUTS],
-    /// `None` before the first ahead.
+    /// `None` before the first one.
     duration: Option<f64>,
 }
 
