@@ -1,6 +1,7 @@
 //! Held inputs: predictions along the flow, the sampled form of the constraint, and its effect.
 
 mod scenario;
+mod support;
 
 use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
@@ -15,6 +16,7 @@ use punctual_core::scalar::Scalar;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, speed_damping};
+use support::Reduced;
 
 const DEADLINE: f64 = 5.0;
 
@@ -272,28 +274,10 @@ fn a_period_must_be_positive() {
     }
 }
 
-/// A source of derivatives that knows no plant.
-struct Blind(Box<dyn DerivativeSource>);
-
-impl DerivativeSource for Blind {
-    fn relative_degree(&self) -> usize {
-        self.0.relative_degree()
-    }
-    fn state_dim(&self) -> usize {
-        self.0.state_dim()
-    }
-    fn input_dim(&self) -> usize {
-        self.0.input_dim()
-    }
-    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        self.0.evaluate(t, x, out);
-    }
-}
-
 /// Without a model the constraint is pointwise, to the bit, and the report says so.
 #[test]
 fn without_a_prediction_the_constraint_is_pointwise() {
-    let blind = Blind(lie::along(PointMass, distance_disc(), 2).expect("in range"));
+    let blind = Reduced::blind(lie::along(PointMass, distance_disc(), 2).expect("in range"));
     let mut blind = SafetyFilter::builder(4, 2)
         .source("goal", Box::new(blind), settings())
         .and_then(|b| b.sampling(Sampling::Period(0.05)))

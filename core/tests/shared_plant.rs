@@ -3,48 +3,20 @@
 #![expect(clippy::float_cmp, reason = "the numbers have to be the same to the bit")]
 
 mod draw;
+mod support;
 
 use draw::Draw;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::{ControlAffine, IntegratedInput, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
-use punctual_core::lie::{self, DerivativeSource, Derivatives, Directional, Predict, PredictDirectional};
+use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::plants::{Bicycle, PointMass, SmallSlipBicycle, Unicycle};
-
-/// A source that shares nothing.
-struct Alone(Box<dyn DerivativeSource>);
-
-impl DerivativeSource for Alone {
-    fn relative_degree(&self) -> usize {
-        self.0.relative_degree()
-    }
-    fn state_dim(&self) -> usize {
-        self.0.state_dim()
-    }
-    fn input_dim(&self) -> usize {
-        self.0.input_dim()
-    }
-    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        self.0.evaluate(t, x, out);
-    }
-    fn predict(&self) -> Option<&dyn Predict> {
-        self.0.predict()
-    }
-    fn directional(&self) -> Option<&dyn Directional> {
-        self.0.directional()
-    }
-    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
-        self.0.predict_directional()
-    }
-    fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
-        self.0.highest(t, x, bounds, time)
-    }
-}
+use support::Reduced;
 
 /// A source, or the same one alone.
 fn source(source: Box<dyn DerivativeSource>, alone: bool) -> Box<dyn DerivativeSource> {
-    if alone { Box::new(Alone(source)) } else { source }
+    if alone { Box::new(Reduced::alone(source)) } else { source }
 }
 
 /// A goal, some obstacles, and a limit of the speed, which has another relative degree.

@@ -1,11 +1,11 @@
-//! Systems for the tests of derivatives, one for each case of `cas/generate.py`.
+//! Systems for the tests of derivatives, one for each case of `cas/generate.py`, and a source that does less.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::lie::{self, DerivativeSource};
+use punctual_core::lie::{self, DerivativeSource, Derivatives, Directional, Predict, PredictDirectional};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
@@ -172,4 +172,51 @@ pub(crate) fn source(name: &str) -> Box<dyn DerivativeSource> {
         _ => panic!("values.csv has the case {name}, which tests/support does not"),
     }
     .expect("a relative degree in range")
+}
+
+/// A source that does less than it could: it shares no plant, and where it is blind it knows none.
+pub(crate) struct Reduced {
+    source: Box<dyn DerivativeSource>,
+    blind: bool,
+}
+
+impl Reduced {
+    pub(crate) fn alone(source: Box<dyn DerivativeSource>) -> Self {
+        Self { source, blind: false }
+    }
+
+    pub(crate) fn blind(source: Box<dyn DerivativeSource>) -> Self {
+        Self { source, blind: true }
+    }
+
+    fn sighted(&self) -> Option<&dyn DerivativeSource> {
+        (!self.blind).then_some(&*self.source)
+    }
+}
+
+impl DerivativeSource for Reduced {
+    fn relative_degree(&self) -> usize {
+        self.source.relative_degree()
+    }
+    fn state_dim(&self) -> usize {
+        self.source.state_dim()
+    }
+    fn input_dim(&self) -> usize {
+        self.source.input_dim()
+    }
+    fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
+        self.source.evaluate(t, x, out);
+    }
+    fn predict(&self) -> Option<&dyn Predict> {
+        self.sighted()?.predict()
+    }
+    fn directional(&self) -> Option<&dyn Directional> {
+        self.sighted()?.directional()
+    }
+    fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
+        self.sighted()?.predict_directional()
+    }
+    fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
+        self.sighted()?.highest(t, x, bounds, time)
+    }
 }
