@@ -188,13 +188,27 @@ where
     if is_even(whole.each_ref().map(|k| k.as_slice())) {
         return stepped(x, &whole, duration);
     }
+    run_in_parts(&rate, x, k1, duration)
+}
+
+/// The same by [`SUBSTEPS`], apart from what short periods take.
+#[inline(never)]
+fn run_in_parts<S, const NX: usize>(
+    rate: &impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
+    x: &SVector<S, NX>,
+    k1: &SVector<S, NX>,
+    duration: f64,
+) -> SVector<S, NX>
+where
+    S: Scalar,
+{
     let part = duration / SUBSTEPS as f64;
     let (mut x, mut k1) = (*x, *k1);
     for i in 0..SUBSTEPS {
         if i > 0 {
             k1 = rate(&x);
         }
-        x = stepped(&x, &stages(&rate, &x, &k1, part), part);
+        x = stepped(&x, &stages(rate, &x, &k1, part), part);
     }
     x
 }
