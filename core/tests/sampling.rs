@@ -83,6 +83,61 @@ fn predictions_follow_the_flow() {
     }
 }
 
+/// ẋ = u − k x.
+struct Decay(f64);
+
+impl ControlAffine<1, 1> for Decay {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        vector![-x[0] * self.0]
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
+        SMatrix::from_element(S::one())
+    }
+}
+
+/// `bound` − x₁ after `duration` s, as a prediction of relative degree `n` has it.
+fn predicted<P, const NX: usize, const NU: usize>(
+    plant: P,
+    n: usize,
+    x: [f64; NX],
+    u: [f64; NU],
+    duration: f64,
+) -> f64
+where
+    P: ControlAffine<NX, NU> + Send + 'static,
+{
+    let wall = StateBound::at_most(0, 0.0).expect("a bound");
+    let source = lie::along(plant, wall, n).expect("in range");
+    let mut ahead = Ahead::ZERO;
+    source.predict().expect("a model").ahead(0.0, &x, &u, duration, &mut ahead);
+    -ahead.value[0]
+}
+
+proptest! {
+    /// Whether one Runge-Kutta step does or two are taken, what turns or decays is predicted to 1e-9 of the way, until two
+    /// are off by that too. Each is allowed half as much again, and round-off.
+    #[test]
+    fn predictions_are_exact_to_a_part_of_the_way(
+        turn in 1e-3..0.08_f64,
+        heading in -3.0..3.0_f64,
+        decay in 1e-3..0.04_f64,
+        duration in 0.01..0.2_f64,
+        speed in 1.0..20.0_f64,
+    ) {
+        // Along a circle; the way is that of the state that moves most.
+        prop_assume!(turn / duration <= speed);
+        let found = predicted(Unicycle, 2, [0.0, 0.0, heading, speed], [0.0, turn / duration], duration);
+        let way = speed * duration;
+        let exact = way * (f64::sin(heading + turn) - f64::sin(heading)) / turn;
+        prop_assert!((found - exact).abs() <= 1.5e-9 * way + 1e-13 * way / turn.abs(), "{found} {exact}");
+        // Towards rest.
+        let found = predicted(Decay(decay / duration), 1, [speed], [0.0], duration);
+        let exact = speed * f64::exp(-decay);
+        prop_assert!((found - exact).abs() <= 1.5e-9 * (speed - exact) + 1e-15 * speed, "{found} {exact}");
+    }
+}
+
 /// A chain of integrators is linear, so the sampled constraint is met to round-off at every sample,
 /// whatever the period: ψ = (D + a)ⁿ⁻¹ e never falls below e^{−aδ} of itself.
 fn psi_never_falls_faster<const N: usize>(period: f64) {
