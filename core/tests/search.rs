@@ -18,6 +18,7 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::qp::Solver;
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
@@ -595,4 +596,49 @@ fn a_kept_bend_only_shortens_the_search() {
     }
     println!("{samples} samples, {kept} from a kept bend, {repeated} taken again");
     assert!(kept > samples / 2 && repeated > samples / 2, "{kept} and {repeated} of {samples}");
+}
+
+/// A unicycle that heads for its goal gains nothing by turning, and loses the more the longer it turns: over a long period
+/// the row is curved inwards by several times itself. Its answer is found at once all the same, without a look far around,
+/// and no input near it is nearer to u_ref.
+#[test]
+fn a_row_that_is_curved_inwards_is_solved_at_once() {
+    const PERIOD: f64 = 0.1;
+    let (mut solved, mut at_once) = (0, 0);
+    for seed in 1..=20 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
+        let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
+        let (mut filter, promises) = build(Unicycle, &[(Set::Distance(disc), settings)], None, PERIOD);
+        let mut x = SVector::from([
+            random.between(0.0, 20.0),
+            random.between(0.0, 20.0),
+            random.between(0.5, 1.1),
+            random.between(2.0, 8.0),
+        ]);
+        for k in 0..40 {
+            let (t, mut u) = (f64::from(k) * PERIOD, [0.0; 2]);
+            let u_ref = [random.between(-3.0, 0.0), random.between(-1.0, 1.0)];
+            let report = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("right dimensions");
+            if report.status == Status::Filtered {
+                solved += 1;
+                at_once += u32::from(report.solver == Solver::ClosedForm);
+                let (promise, source) = &promises[0];
+                let mut derivatives = Derivatives::ZERO;
+                source.evaluate(t, x.as_slice(), &mut derivatives);
+                let state = filter.state().barriers[0];
+                let demand =
+                    promise.over_period(&state, t, &derivatives.drift[..2], PERIOD).expect("no approach");
+                let rows = vec![Asked { source: &**source, demand, floor: None }];
+                let case = Case { rows, t, x: x.into(), period: PERIOD, bound: None, u_ref };
+                assert!(case.violation(u) <= 1e-8, "{seed} at {t}: {u:?}");
+                // A point of the oracle is as exact as its last step.
+                let (_, nearest) = case.oracle(1.05 * case.distance(u), 17).expect("at least that one");
+                assert!(case.distance(u) <= nearest + 1e-6, "{seed} at {t}: {u:?} {nearest}");
+            }
+            x = rk4_step(&Unicycle, &x, &SVector::from(u), PERIOD);
+        }
+    }
+    // Where the vehicle crosses the line of sight other answers are looked for.
+    assert!(solved > 400 && at_once * 10 > solved * 9, "{at_once} of {solved}");
 }

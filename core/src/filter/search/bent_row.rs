@@ -18,7 +18,9 @@
 //!
 //! The answer stands under the terms of [`correction`](super::correction): the rows are all but affine from u_ref to there, every other row
 //! holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the way from u_ref. What r and
-//! ∇r at u_ref miss those at the answer by tells it too. Where the answer goes on from that of the sample before, it is
+//! ∇r at u_ref miss those at the answer by tells it too. A row that turns further stands too where it is curved inwards: where no
+//! eigenvalue of λH is large and positive, the quadratic has one answer, and what r and ∇r at u_ref miss *its* values by is small.
+//! So turns a vehicle that heads for its goal over a long period. Where the answer goes on from that of the sample before, it is
 //! looked around for others every [`GOES_ON`]th time only.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
@@ -36,7 +38,7 @@ const TELLING: f64 = 1e-7;
 /// The next change of λ in Newton's method, as a part of it, that is left out: 3/2 λH times the square of the last one.
 const ROOT: f64 = SKIPPED * MET;
 /// Steps of Newton's method for λ.
-const MULTIPLIER_STEPS: usize = 6;
+const MULTIPLIER_STEPS: usize = 12;
 
 /// Samples in a row whose answers go on from the one before without a look around for others.
 const GOES_ON: u32 = 8;
@@ -146,7 +148,29 @@ impl<const M: usize> Bent<M> {
         true
     }
 
-    /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where λH is not small.
+    /// Whether no eigenvalue of λH is as large as `most`.
+    fn is_curved_inwards(&self, lambda: f64, most: f64) -> bool {
+        // `most` I − λH has only positive pivots.
+        let mut left: Matrix<M> = core::array::from_fn(|i| {
+            core::array::from_fn(|j| if i == j { most } else { 0.0 } - lambda * self.hessian[i][j])
+        });
+        for k in 0..M {
+            // Not-a-number is not positive.
+            if !matches!(left[k][k], f64::MIN_POSITIVE..f64::INFINITY) {
+                return false;
+            }
+            for i in k + 1..M {
+                let part = left[i][k] / left[k][k];
+                for j in k + 1..M {
+                    left[i][j] -= part * left[k][j];
+                }
+            }
+        }
+        true
+    }
+
+    /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where an eigenvalue of λH is not small
+    /// and positive.
     #[inline(always)]
     fn nearest(&self, back: &[f64; M]) -> Option<([f64; M], f64)> {
         /// The largest square of λH.
@@ -161,10 +185,15 @@ impl<const M: usize> Bent<M> {
         // The first terms in λ are value + λ cᵀc + 3/2 λ² cᵀHc.
         let (square, bent) = (product(&c, &c), product(&c, &self.turn(&c)));
         let mut lambda = -value * square / (square * square - 1.5 * value * bent);
+        // Not-a-number is not small.
+        let is_small = |turn: f64| matches!(turn, 0.0..=SMALL);
+        if !is_small(lambda * lambda * size) {
+            // Where the row is curved inwards what is missing is concave in λ. From the first term on, which is too small, λ grows.
+            lambda = -value / square;
+        }
         for _ in 0..MULTIPLIER_STEPS {
-            // Not-a-number is not small.
             let turn = lambda * lambda * size;
-            if !matches!(turn, 0.0..=SMALL) {
+            if !is_small(turn) && !self.is_curved_inwards(lambda, CONVERGING) {
                 return None;
             }
             // ∇r there is w/λ, so that H w is what it differs from c by.
@@ -364,9 +393,21 @@ impl PeriodProblem<'_> {
         let missed = (at_reference.value + lambda * square).abs() / (lambda * square);
         let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
         let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
-        let ratio = ratio.max(bend).max(turn);
+        let mut ratio = ratio.max(bend).max(turn);
         // Not-a-number is no number at most.
-        if !matches!(ratio, 0.0..=CONVERGING) {
+        let is_mild = |ratio: f64| matches!(ratio, 0.0..=CONVERGING);
+        if !is_mild(ratio) {
+            // A quadratic that is curved inwards has one answer, however far it bends. What counts is what it misses.
+            let way = core::array::from_fn(|i| u[i] - u_ref[i]);
+            let bend = row.turn(&way);
+            let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &bend)).abs();
+            let rest: [f64; M] = core::array::from_fn(|i| turned[i] - bend[i]);
+            let outwards = if row.is_curved_inwards(lambda, CONTRACTION) { 0.0 } else { CONVERGING };
+            ratio = (missed / (lambda * square))
+                .max(elementary::sqrt(product(&rest, &rest) / square))
+                .max(outwards);
+        }
+        if !is_mild(ratio) {
             return None;
         }
         let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
@@ -390,7 +431,7 @@ impl PeriodProblem<'_> {
             let is_sole = match last {
                 Some(last) => {
                     self.is_near(last, &u, distance, ratio)
-                        || self.leads_to(last.first_chunk()?, &u, chosen, at)
+                        || self.leads_to(last.first_chunk()?, &u, (chosen, &row.hessian), at)
                 }
                 None => ratio <= CONTRACTION,
             };
@@ -430,20 +471,20 @@ impl PeriodProblem<'_> {
         furthest
     }
 
-    /// Whether the row `chosen`, linearised at `last`, leads to the answer `u`.
+    /// Whether the row `chosen`, with the bend of `hessian` at `last`, leads to the answer `u`.
     #[inline(always)]
     fn leads_to<const M: usize>(
         &self,
         last: &[f64; M],
         u: &[f64; M],
-        chosen: usize,
+        (chosen, hessian): (usize, &Matrix<M>),
         at: &mut Linearised,
     ) -> bool {
         let Some(here) = self.weighted(&self.requirements[chosen], last, at.evaluations) else {
             return false;
         };
         let Some(normal) = here.normal.first_chunk() else { return false };
-        let row = Bent { value: here.value, normal: *normal, hessian: [[0.0; M]; M] };
+        let row = Bent { value: here.value, normal: *normal, hessian: *hessian };
         let back = core::array::from_fn(|i| self.u_ref[i] - last[i]);
         let Some((step, lambda)) = row.nearest(&back) else { return false };
         let away: [f64; M] = core::array::from_fn(|i| u[i] - last[i]);
@@ -485,6 +526,25 @@ mod tests {
         });
         let [a, b] = &mut answers;
         assert!((a[0] - b[0]).abs() < 1e-11 && (a[1] - b[1]).abs() < 1e-11, "{a:?}, {b:?}");
+    }
+
+    /// From far outside the row turns several times as much as itself on the way, and there still is one answer. Curved
+    /// outwards there may be others.
+    #[test]
+    fn the_nearest_point_of_a_row_that_is_curved_inwards() {
+        for u_ref in [[3.0, 2.0], [-9.0, 4.0], [0.5, -30.0]] {
+            let (step, lambda) = inside(u_ref).nearest(&[0.0; 2]).expect("curved inwards");
+            let Bent { value, normal, hessian } = inside([u_ref[0] + step[0], u_ref[1] + step[1]]);
+            assert!(lambda * norm(hessian.iter().flatten().copied()) > 2.0, "{lambda}");
+            // As above, on numbers of order 1000 at u_ref.
+            assert!(value.abs() < 1e-9, "{u_ref:?}: {value}");
+            for i in 0..2 {
+                assert!((step[i] - lambda * normal[i]).abs() < 1e-9, "{u_ref:?}: {step:?}");
+            }
+        }
+        // r = u₁ + 3 u₂²/2 − 1, from 0: either side is nearer than straight ahead.
+        let outside = Bent { value: -1.0, normal: [1.0, 0.0], hessian: [[0.0, 0.0], [0.0, 3.0]] };
+        assert!(outside.nearest(&[0.0; 2]).is_none());
     }
 
     /// Two steps in different directions show all of a constant Hessian, each change as little as it must be.
