@@ -499,6 +499,36 @@ fn a_vehicle_at_the_edge_comes_to_rest_there() {
     }
 }
 
+/// A wall without a deadline that the vehicle can stop before is promised whatever the period is, and kept: how long it takes
+/// to stop has nothing to do with the period.
+#[test]
+fn a_wall_is_promised_at_every_period() {
+    for seed in 1..=24_u64 {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let period = [0.0005, 0.001, 0.002, 0.005, 0.02, 0.05][seed as usize % 6];
+        let (bound, speed) = (random.between(2.0, 20.0), random.between(0.5, 8.0));
+        let room = speed * speed / (2.0 * bound) * random.between(1.3, 10.0) + 2.0 * speed * period;
+        let wall = StateBound::at_most(0, room).expect("valid bound");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("wall", PointMass, wall, BarrierSettings::keeping())
+            .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, period).expect("a filter that can be assured");
+        let mut x = [0.0, 0.0, speed, 0.0];
+        for k in 0..(4.0 * room / speed / period).min(3000.0) as u32 {
+            let (t, mut u) = (f64::from(k) * period, [0.0; 2]);
+            let assurance = *filter.step(t, &x, &[bound, 0.0], &mut u).expect("right dimensions");
+            assert!(assurance.is_assured(), "{seed}, period {period}, at {t}: {assurance:?}");
+            for _ in 0..4 {
+                x = Vehicle::PointMass.move_by(x, u, period / 4.0);
+                assert!(x[0] <= room, "{seed} at {t}: {x:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_sample_at_another_time_ends_the_promise() {
     let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);

@@ -25,6 +25,9 @@ pub(super) struct WitnessReport {
     in_motion: Option<[f64; 2]>,
     /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
     left_out: Vec<String>,
+    /// Whether a barrier has a deadline, so that later ones were tried.
+    #[serde(skip)]
+    has_deadline: bool,
     /// The least factor of all deadlines with which a plan was found.
     soonest_factor: Option<f64>,
     /// The soonest deadlines in s, by barrier.
@@ -66,6 +69,7 @@ pub(super) fn find(
         reason: Some(reason),
         in_motion: in_motion(c, x0),
         left_out: Vec::new(),
+        has_deadline: false,
         soonest_factor: None,
         soonest: Vec::new(),
         plan: None,
@@ -117,6 +121,7 @@ pub(super) fn find(
         reason,
         in_motion: if configured.is_err() { in_motion(c, x0) } else { None },
         left_out,
+        has_deadline,
         soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
         soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: shown.map(plan),
@@ -141,7 +146,12 @@ fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
 impl WitnessReport {
     /// Whether the plan keeps the promise of `barrier`.
     pub(super) fn keeps(&self, barrier: &str) -> bool {
-        self.found && self.left_out.iter().all(|name| name != barrier)
+        self.found && self.covers(barrier)
+    }
+
+    /// Whether a plan has to keep the promise of `barrier`.
+    pub(super) fn covers(&self, barrier: &str) -> bool {
+        self.left_out.iter().all(|name| name != barrier)
     }
 
     /// Time in s until which the plan keeps what it does, where it ends without a rest.
@@ -180,7 +190,7 @@ impl WitnessReport {
             self.soonest.iter().map(|(name, deadline)| format!("{name} {} s", number(*deadline))).collect();
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
-        } else if !self.found && self.plan.is_none() {
+        } else if self.has_deadline && !self.found && self.plan.is_none() {
             lines.push(format!(
                 "none was found for deadlines up to {} times as long either",
                 AssuredFilter::LONGEST

@@ -13,10 +13,11 @@ use crate::MAX_INPUTS;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
-/// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
-/// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
-/// deadlines that leave much time, where long holds are too coarse.
-const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
+/// Grids: the part of the time until each deadline after which its set is already asked for in the search, the number of
+/// holds until the last deadline and after it, and the periods of a hold where there is no deadline. First for a plant that
+/// stops soon, then for one that does not, then for deadlines that leave much time, where long holds are too coarse.
+/// Without a deadline, holds are longer each time: how long a plant takes to stop has nothing to do with the period.
+const GRIDS: [(f64, [usize; 2], usize); 3] = [(1.0, [32, 12], 5), (1.0, [16, 28], 40), (0.35, [32, 12], 320)];
 /// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
@@ -181,7 +182,7 @@ impl<'a> Planner<'a> {
     /// Searches for a plan that ends at rest, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let mut failure = Failure::NoRest;
-        for (part, holds) in GRIDS {
+        for (part, holds, undated) in GRIDS {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
                     true => ROOM * r.model.value(t, x).abs(),
@@ -190,7 +191,7 @@ impl<'a> Planner<'a> {
                 Requirement { from: t + part * (r.from - t), margin, ..*r }
             };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
-            let Some((mut hold, mut times)) = self.grid(t, &requirements, holds, horizon) else {
+            let Some((mut hold, mut times)) = self.grid(t, &requirements, (holds, undated), horizon) else {
                 failure = Failure::TooLong;
                 continue;
             };
@@ -205,7 +206,9 @@ impl<'a> Planner<'a> {
             let finer =
                 guide.as_ref().map_or(1, |guide| (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1);
             if finer > 1
-                && let Some(grid) = self.grid(t, &requirements, holds.map(|n| n * finer.min(FINEST)), horizon)
+                && let finer = finer.min(FINEST)
+                && let holds = (holds.map(|n| n * finer), undated.div_ceil(finer))
+                && let Some(grid) = self.grid(t, &requirements, holds, horizon)
             {
                 (hold, times) = grid;
                 guide = Brake::around(&model, x, hold).or(guide);
@@ -302,13 +305,13 @@ impl<'a> Planner<'a> {
     }
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
-    /// deadline, `after` of them past it; or both together to the end of a plan with a horizon. The last sample before each
-    /// deadline is a node. `None` for too many samples.
+    /// deadline, `after` of them past it; or both together to the end of a plan with a horizon. Without a deadline a hold is
+    /// `undated` periods. The last sample before each deadline is a node. `None` for too many samples.
     fn grid(
         &self,
         t: f64,
         requirements: &[Requirement<'_>],
-        [before, after]: [usize; 2],
+        ([before, after], undated): ([usize; 2], usize),
         horizon: Option<f64>,
     ) -> Option<(f64, Vec<f64>)> {
         // Round-off of a deadline that is a number of periods leaves it one.
@@ -329,7 +332,7 @@ impl<'a> Planner<'a> {
         let hold = match past {
             Some(past) => (last + past).div_ceil(before + after),
             None if last > 0 => last.div_ceil(before),
-            None => 5,
+            None => undated,
         };
         let after = past.map_or(after, |past| past.div_ceil(hold));
         let (mut samples, mut from) = (vec![0], 0);
