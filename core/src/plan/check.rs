@@ -464,9 +464,16 @@ impl<'a> Walk<'a> {
     pub(super) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = brake.hold.max(self.grid.period);
-        let mut failure = Failure::NoRest;
-        for _ in 0..BRAKING {
-            let rest = self.is_rest(brake, hold, &mut u);
+        let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
+        for k in 0..BRAKING {
+            // Followed far ahead is what stands still, and where it did not stay not again at every hold.
+            let rest = match self.is_still(brake, hold, &mut u) && (k >= due || k + 1 == BRAKING) {
+                true => {
+                    (due, wait) = (k + wait, 2 * wait);
+                    self.stays(brake, hold, &u)
+                }
+                false => Ok(false),
+            };
             self.hold_until(&u, self.t + hold)?;
             match rest {
                 Ok(true) => return Ok(Witness { until: f64::INFINITY, ..self.witness }),
@@ -498,22 +505,20 @@ impl<'a> Walk<'a> {
     /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
-        let ends = self.is_rest(brake, brake.hold.max(self.grid.period), &mut u);
+        let hold = brake.hold.max(self.grid.period);
+        let ends = self.is_still(brake, hold, &mut u) && matches!(self.stays(brake, hold, &u), Ok(true));
         self.witness.tightest = tightest;
-        matches!(ends, Ok(true))
+        ends
     }
 
-    /// The same, with the input of `brake` written to `u`, and what is tightest there noted.
-    fn is_rest(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> Result<bool, Failure> {
+    /// Whether the plant that stands still under `u`, the input of `brake`, can stay here for ever. Notes what is tightest there.
+    fn stays(&mut self, brake: &Brake, hold: f64, u: &[f64]) -> Result<bool, Failure> {
         let tightest = self.witness.tightest;
-        let is_rest = match self.is_still(brake, hold, u) {
-            true => self.rests(u, hold).map(|rests| rests && self.settles(brake, hold)),
-            false => Ok(false),
-        };
-        if !matches!(is_rest, Ok(true)) {
+        let stays = self.rests(u, hold).map(|rests| rests && self.settles(brake, hold));
+        if !matches!(stays, Ok(true)) {
             self.witness.tightest = tightest;
         }
-        is_rest
+        stays
     }
 
     /// Whether the plant stands still under the input of `brake`, which is written to `u`.
@@ -540,7 +545,11 @@ impl<'a> Walk<'a> {
             brake.input(&self.model, &x, &mut u);
             self.model.flow(&mut x, &u, hold);
             for (i, seen) in &mut seen {
-                seen.push(h(*i, &x));
+                let h = h(*i, &x);
+                if h < self.least_of(*i) {
+                    return false;
+                }
+                seen.push(h);
             }
             let window = holds / 4;
             if holds % 4 > 0 {
