@@ -121,7 +121,7 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
-    /// Whether nothing speaks against the promise: a plan keeps it, or the first step and the closed loop do.
+    /// Whether nothing speaks against the promise: a plan keeps it, or where none is followed the first step and the closed loop do.
     promised: bool,
     /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
@@ -461,11 +461,15 @@ fn filter(
             _ => None,
         };
         let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
-        let guaranteed = c.is_assured() && witness.as_ref().is_some_and(|witness| witness.keeps(name));
+        let planned = witness.as_ref().filter(|witness| c.is_assured() && witness.covers(name));
+        let guaranteed = planned.is_some_and(|witness| witness.keeps(name));
         let start = report.map(|b| StartReport {
             h: b.h,
             inside: b.h >= -ROUND_OFF,
-            promised: guaranteed || b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
+            promised: match planned {
+                Some(_) => guaranteed,
+                None => b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
+            },
             guaranteed,
             guaranteed_until: witness.as_ref().filter(|_| guaranteed).and_then(WitnessReport::until),
             on_course: b.on_course,

@@ -278,3 +278,41 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     assert_eq!((&witness["found"], &witness["reason"]), (&false.into(), &reason.into()), "{witness}");
     assert!(text.contains(&format!("witness: NONE was found: {reason}\n")), "{text}");
 }
+
+/// A filter that follows plans and finds none promises nothing, although its rows keep the set from there: the code shows it,
+/// and later deadlines that nobody has asked for are not spoken of.
+#[test]
+fn a_start_without_a_plan_is_code_one() {
+    let workshop = Workshop::new();
+    let written = |least: f64| {
+        let text = format!(
+            r#"
+kind = "filter"
+bounds = {{ u = [{least:?}, 2.0] }}
+x0 = {{ v = 1.0 }}
+experiment = {{ step_size = 0.05 }}
+
+[plant]
+states = [{{ name = "p", unit = "m" }}, {{ name = "v", unit = "m/s" }}]
+inputs = [{{ name = "u", unit = "m/s2" }}]
+derivatives = {{ p = "v", v = "u" }}
+
+[[barrier]]
+name = "floor"
+expression = "p + 1"
+"#
+        );
+        workshop.write("floor.toml", text);
+        workshop.punctual(["check", "floor.toml"])
+    };
+    // It gathers speed for ever, away from the floor.
+    let done = written(0.5);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(
+        done.stdout.contains("every promise is kept") && done.stdout.contains("witness: NONE was found"),
+        "{done:#?}"
+    );
+    assert!(!done.stdout.contains("for deadlines up to"), "{done:#?}");
+    let done = written(-0.5);
+    assert_eq!(done.code, 0, "{done:#?}");
+}
