@@ -66,8 +66,8 @@ impl FilterBatch {
         self.configuration.experiment.step_size
     }
 
-    /// After the last step: whether a plan in hand keeps the promise of each barrier whatever u_ref is, an array of bool
-    /// of shape (n, barriers).
+    /// Whether a plan in hand keeps the promise of each barrier whatever u_ref is, an array of bool of shape
+    /// (n, barriers). False before a row's first step, and from `rearm` or `reset` until its next.
     #[getter]
     fn guaranteed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let shape = [self.memories.len(), self.interface.barriers.len()];
@@ -160,11 +160,12 @@ impl FilterBatch {
     fn rearm(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let chosen = self.chosen(rows)?;
         let own = &mut self.loops.get_mut().unwrap_or_else(PoisonError::into_inner)[0];
-        for (memory, _) in self.memories.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+        for (memory, _) in self.memories.iter_mut().zip(&chosen).filter(|(_, chosen)| **chosen) {
             own.restore(memory).map_err(|e| refused(&e))?;
             own.rearm();
             own.save(memory);
         }
+        self.withdraw(&chosen);
         Ok(())
     }
 
@@ -173,9 +174,10 @@ impl FilterBatch {
     #[pyo3(signature = (rows=None))]
     fn reset(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let chosen = self.chosen(rows)?;
-        for (memory, _) in self.memories.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
+        for (memory, _) in self.memories.iter_mut().zip(&chosen).filter(|(_, chosen)| **chosen) {
             memory.clone_from(&self.fresh);
         }
+        self.withdraw(&chosen);
         Ok(())
     }
 }
@@ -196,6 +198,14 @@ impl FilterBatch {
             configuration,
             interface,
         })
+    }
+
+    /// What the chosen rows had promised is over.
+    fn withdraw(&mut self, chosen: &[bool]) {
+        let barriers = self.interface.barriers.len();
+        for (i, _) in chosen.iter().enumerate().filter(|(_, chosen)| **chosen) {
+            self.guaranteed[i * barriers..][..barriers].fill(false);
+        }
     }
 
     /// The rows that a mask chooses; without a mask, all.
