@@ -292,7 +292,7 @@ impl PeriodProblem<'_> {
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
-        settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, i, &mut at));
+        settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, (i, false), &mut at));
         // Look far around where the answer is in doubt.
         let widens =
             !self.is_backed && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
@@ -543,10 +543,11 @@ impl PeriodProblem<'_> {
         if size.is_finite() { size } else { 0.0 }
     }
 
-    /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`.
+    /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`. Where the rows are all
+    /// but affine the others have to allow it too: else the plant may turn so far that they do elsewhere.
     #[inline(always)]
-    fn is_nearer_aside(&self, u: &[f64], i: usize, at: &mut Linearised) -> bool {
-        self.look_aside(u, i, at, |_, _| {})
+    fn is_nearer_aside(&self, u: &[f64], (i, is_all_but_affine): (usize, bool), at: &mut Linearised) -> bool {
+        self.look_aside(u, (i, is_all_but_affine), at, |_, _| {})
     }
 
     /// [`Self::is_nearer_aside`]. Tells `seen` of each way aside, as far as it went without a nearer answer, and the sum of
@@ -555,7 +556,7 @@ impl PeriodProblem<'_> {
     fn look_aside(
         &self,
         u: &[f64],
-        i: usize,
+        (i, is_all_but_affine): (usize, bool),
         at: &mut Linearised,
         mut seen: impl FnMut(&[f64], f64),
     ) -> bool {
@@ -583,7 +584,9 @@ impl PeriodProblem<'_> {
                 let nearer = (self.distance(aside) - far) * normal;
                 // Not-a-number where it is not known, as on a way that a bound cuts short.
                 let slack = self.slack(&self.requirements[i], aside, at.evaluations);
-                if slack.is_some_and(|s| s > nearer) {
+                if slack.is_some_and(|s| s > nearer)
+                    && (!is_all_but_affine || self.others_leave_room(aside, i, far, at))
+                {
                     return true;
                 }
                 let is_cut = (0..m).any(|j| aside[j] != u[j] + way * direction[j]);
@@ -595,6 +598,16 @@ impl PeriodProblem<'_> {
             seen(&direction[..m], slacks);
         }
         false
+    }
+
+    /// Whether every hard row but `i` holds from `aside` on to where it is only `far` from u_ref, as where no other row is active.
+    fn others_leave_room(&self, aside: &[f64], i: usize, far: f64, at: &mut Linearised) -> bool {
+        let (way, soft) = (self.distance(aside) - far, self.soft());
+        let has_row = |j: &usize| *j != i && !soft.contains(*j) && !self.requirements[*j].bound.is_zero();
+        (0..self.requirements.len()).filter(has_row).all(|j| {
+            let normal = norm(at.rows[j].normal[..aside.len()].iter().copied());
+            self.slack(&self.requirements[j], aside, at.evaluations).is_some_and(|s| s > way * normal)
+        })
     }
 
     /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that

@@ -395,20 +395,16 @@ impl PeriodProblem<'_> {
         let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
         let mut ratio = ratio.max(bend).max(turn);
         // Not-a-number is no number at most.
-        let is_mild = |ratio: f64| matches!(ratio, 0.0..=CONVERGING);
-        if !is_mild(ratio) {
+        if !matches!(ratio, 0.0..=CONVERGING) {
             // A quadratic that is curved inwards has one answer, however far it bends. What counts is what it misses.
             let way = core::array::from_fn(|i| u[i] - u_ref[i]);
             let bend = row.turn(&way);
             let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &bend)).abs();
             let rest: [f64; M] = core::array::from_fn(|i| turned[i] - bend[i]);
-            let outwards = if row.is_curved_inwards(lambda, CONTRACTION) { 0.0 } else { CONVERGING };
-            ratio = (missed / (lambda * square))
-                .max(elementary::sqrt(product(&rest, &rest) / square))
-                .max(outwards);
-        }
-        if !is_mild(ratio) {
-            return None;
+            ratio = (missed / (lambda * square)).max(elementary::sqrt(product(&rest, &rest) / square));
+            if !matches!(ratio, 0.0..=CONTRACTION) || !row.is_curved_inwards(lambda, CONTRACTION) {
+                return None;
+            }
         }
         let distance = norm(u.iter().zip(u_ref).map(|(v, r)| v - r));
         let known = 1.0_f64.max(largest(u_ref));
@@ -437,7 +433,7 @@ impl PeriodProblem<'_> {
             };
             let seen_aside = ratio <= CONTRACTION && bends_aside;
             let learn = |way: &[f64], slacks: f64| sees_aside &= row.learn_aside(way, slacks);
-            if !is_sole || !seen_aside && self.look_aside(&u, chosen, at, learn) {
+            if !is_sole || !seen_aside && self.look_aside(&u, (chosen, ratio <= CONTRACTION), at, learn) {
                 return None;
             }
         }

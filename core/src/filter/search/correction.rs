@@ -122,7 +122,7 @@ impl PeriodProblem<'_> {
             };
             let settled = distance <= FAR * limit
                 && is_sole
-                && !against.is_some_and(|i| self.is_nearer_aside(u, i, at));
+                && !against.is_some_and(|i| self.is_nearer_aside(u, (i, ratio <= CONTRACTION), at));
             return settled.then_some(Solution { iterations, ..solution });
         }
         None
