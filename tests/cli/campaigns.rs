@@ -380,7 +380,9 @@ fn numbers(list: &Value) -> Vec<f64> {
 /// The page of a campaign, against its rows.
 #[test]
 fn a_report_has_the_runs_and_how_to_see_them_again() {
-    let workshop = workshop(40, "sobol");
+    /// One of them arrives late.
+    const RUNS: u32 = 56;
+    let workshop = workshop(u64::from(RUNS), "sobol");
     let report = workshop.punctual(["campaign", "c.toml", "--report", "--json"]).success();
     let report: Value = serde_json::from_str(&report).expect("JSON");
     assert_eq!(report["report"], serde_json::json!(["c.html", "c.svg"]));
@@ -395,7 +397,7 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"), "an address");
     // Every run has its place, and every number that differs is an axis.
     let scene = data(&page, "scene");
-    assert_eq!(numbers(&scene["runs"]), (0..40).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(numbers(&scene["runs"]), (0..RUNS).map(f64::from).collect::<Vec<_>>());
     let good: Vec<Option<f64>> = scene["good"]
         .as_array()
         .expect("a list")
@@ -422,18 +424,18 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     assert!(numbers(&scene["shown"]).contains(&1.0), "{}", scene["shown"]);
     let picture = workshop.text("c.svg");
     // A mark for each run that fails, and one in the legend.
-    assert_eq!(picture.matches("l6 6m0 -6l-6 6").count(), 40 - count("success") + 1);
+    assert_eq!(picture.matches("l6 6m0 -6l-6 6").count(), RUNS as usize - count("success") + 1);
     // All are first ones, so cells count them all; whoever reads says how they are shown.
-    assert_eq!(scene["first"], 40);
+    assert_eq!(scene["first"], RUNS);
     assert!(page.contains(">rate of success by cell</option>"), "a choice");
     // The bars count what the rows say, on the side of the deadline where it was.
     let arrivals = &scene["arrivals"][0];
     let (on_time, arrived) =
         (count("filter.goal.on_time"), column("filter.goal.arrival").iter().flatten().count());
     let said = format!(
-        "filter.goal: of 40 runs {on_time} arrive by the deadline, {} later, {} not in their time.",
+        "filter.goal: of {RUNS} runs {on_time} arrive by the deadline, {} later, {} not in their time.",
         arrived - on_time,
-        40 - arrived
+        RUNS as usize - arrived
     );
     assert_eq!(arrivals["said"], said);
     assert_eq!(arrivals["chart"]["verticals"][0]["at"], 10.0);
@@ -449,7 +451,7 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     // The rate, what was varied, and the worst runs.
     let tree = body(&page);
     let texts: Vec<_> = tree.descendants().filter_map(|node| node.text()).collect();
-    let rate = format!("{} of 40 runs succeed: ", count("success"));
+    let rate = format!("{} of {RUNS} runs succeed: ", count("success"));
     assert!(texts.iter().any(|text| text.starts_with(&rate)), "{texts:?}");
     let [low, high] = [0, 1].map(|end| report["success"]["interval"][end].as_f64().expect("a number"));
     let interval = texts.iter().find(|text| text.starts_with("The rate of success is ")).expect("a sentence");
