@@ -20,7 +20,7 @@
 //! holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the way from u_ref. What r and
 //! ∇r at u_ref miss those at the answer by tells it too. A row that turns further stands too where it is curved inwards: where no
 //! eigenvalue of λH is large and positive, the quadratic has one answer, and what r and ∇r at u_ref miss *its* values by is small.
-//! So turns a vehicle that heads for its goal over a long period. Where the answer goes on from that of the sample before, it is
+//! So bends the row of a vehicle that heads for its goal over a long period. Where the answer goes on from that of the sample before, it is
 //! looked around for others every [`GOES_ON`]th time only.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
@@ -396,13 +396,15 @@ impl PeriodProblem<'_> {
         let mut ratio = ratio.max(bend).max(turn);
         // Not-a-number is no number at most.
         if !matches!(ratio, 0.0..=CONVERGING) {
-            // A quadratic that is curved inwards has one answer, however far it bends. What counts is what it misses.
+            // A quadratic that is curved inwards has one answer, however far it bends. What counts is what it misses; and that
+            // the plant does not turn all the way round, which no quadratic sees.
             let way = core::array::from_fn(|i| u[i] - u_ref[i]);
             let bend = row.turn(&way);
             let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &bend)).abs();
             let rest: [f64; M] = core::array::from_fn(|i| turned[i] - bend[i]);
             ratio = (missed / (lambda * square)).max(elementary::sqrt(product(&rest, &rest) / square));
-            if !matches!(ratio, 0.0..=CONTRACTION) || !row.is_curved_inwards(lambda, CONTRACTION) {
+            let is_far = norm(way.iter().copied()) > FAR * 1.0_f64.max(largest(u_ref));
+            if is_far || !matches!(ratio, 0.0..=CONTRACTION) || !row.is_curved_inwards(lambda, CONTRACTION) {
                 return None;
             }
         }
