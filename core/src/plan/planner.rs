@@ -13,11 +13,14 @@ use crate::MAX_INPUTS;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
-/// Grids: the part of the time until each deadline after which its set is already asked for in the search, the number of
-/// holds until the last deadline and after it, and the periods of a hold where there is no deadline. First for a plant that
-/// stops soon, then for one that does not, then for deadlines that leave much time, where long holds are too coarse.
-/// Without a deadline, holds are longer each time: how long a plant takes to stop has nothing to do with the period.
-const GRIDS: [(f64, [usize; 2], usize); 3] = [(1.0, [32, 12], 5), (1.0, [16, 28], 40), (0.35, [32, 12], 320)];
+/// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
+/// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
+/// deadlines that leave much time, where long holds are too coarse.
+const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
+/// The periods of a hold where there is no deadline; and then, since how long a plant takes to stop has nothing to do with the
+/// period, those of longer ones on the first grid.
+const UNDATED: usize = 5;
+const LONGER: [usize; 2] = [40, 320];
 /// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
@@ -182,7 +185,9 @@ impl<'a> Planner<'a> {
     /// Searches for a plan that ends at rest, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let mut failure = Failure::NoRest;
-        for (part, holds, undated) in GRIDS {
+        let is_dated = self.last(t) > t || horizon.is_some();
+        let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
+        for ((part, holds), undated) in GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(longer) {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
                     true => ROOM * r.model.value(t, x).abs(),
@@ -248,6 +253,10 @@ impl<'a> Planner<'a> {
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
             match self.descend(&mut search, descents, &ending) {
                 Ok(plan) => return Ok(plan),
+                // Holds that are too long say little: what came nearer is told.
+                Err(Some(Failure::Broken { slack, .. }))
+                    if self.last(t) <= t
+                        && matches!(failure, Failure::Broken { slack: nearer, .. } if nearer > slack) => {}
                 Err(found) => failure = found.unwrap_or(failure),
             }
         }
