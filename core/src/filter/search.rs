@@ -544,10 +544,11 @@ impl PeriodProblem<'_> {
     }
 
     /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`. Where the rows are all
-    /// but affine the others have to allow it too: else the plant may turn so far that they do elsewhere.
+    /// but affine, or miss little of a quadratic that is curved inwards, the others have to allow it too: else the plant may
+    /// turn so far that they do elsewhere.
     #[inline(always)]
-    fn is_nearer_aside(&self, u: &[f64], (i, is_all_but_affine): (usize, bool), at: &mut Linearised) -> bool {
-        self.look_aside(u, (i, is_all_but_affine), at, |_, _| {})
+    fn is_nearer_aside(&self, u: &[f64], (i, is_regular): (usize, bool), at: &mut Linearised) -> bool {
+        self.look_aside(u, (i, is_regular), at, |_, _| {})
     }
 
     /// [`Self::is_nearer_aside`]. Tells `seen` of each way aside, as far as it went without a nearer answer, and the sum of
@@ -556,7 +557,7 @@ impl PeriodProblem<'_> {
     fn look_aside(
         &self,
         u: &[f64],
-        (i, is_all_but_affine): (usize, bool),
+        (i, is_regular): (usize, bool),
         at: &mut Linearised,
         mut seen: impl FnMut(&[f64], f64),
     ) -> bool {
@@ -585,7 +586,7 @@ impl PeriodProblem<'_> {
                 // Not-a-number where it is not known, as on a way that a bound cuts short.
                 let slack = self.slack(&self.requirements[i], aside, at.evaluations);
                 if slack.is_some_and(|s| s > nearer)
-                    && (!is_all_but_affine || self.others_leave_room(aside, i, far, at))
+                    && (!is_regular || self.others_leave_room(aside, i, far, at))
                 {
                     return true;
                 }
