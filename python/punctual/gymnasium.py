@@ -188,6 +188,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
             raise gymnasium.error.ResetNeeded("step before the first reset: call reset")
         u_ref = np.asarray(self._to_input(actions))
         u, status, _ = self.filter.step(self._steps * self.dt, self._x, u_ref)
+        # Before a reset below ends it.
+        guaranteed = self.filter.guaranteed.all(axis=1)
         changed = (u != u_ref).any(axis=1)
         applied = self._to_action(u)
         applied[~changed] = np.asarray(actions)[~changed]
@@ -204,7 +206,7 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
             "filter_nominal": actions,
             "filter_action": applied,
             "filter_status": status,
-            "filter_guaranteed": self.filter.guaranteed.all(axis=1),
+            "filter_guaranteed": guaranteed,
         }
         # Gymnasium's convention: which rows have the key.
         has = {f"_{key}": np.ones(len(over), bool) for key in told}
