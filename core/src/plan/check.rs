@@ -31,6 +31,8 @@ const TRUNCATED: f64 = 1e-10;
 const RESIDUAL: f64 = 1e-8;
 /// Coefficients of the rate of the states that bound this: first few, then all.
 const ORDERS: [usize; 2] = [FEW_ORDERS, COURSE - 1];
+/// How much longer than a piece that has been halved the next may be. The one after that by the square of it, and so on.
+const LONGER: f64 = 1.2;
 /// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
 const HALVINGS: u32 = 14;
 const SHARPER: u32 = 3;
@@ -173,6 +175,9 @@ pub(super) struct Walk<'a> {
     over: Vec<CourseOver>,
     rate_over: Vec<RateOver>,
     pieces: u32,
+    /// The longest piece in s to try, and how much longer the next one may be.
+    longest: f64,
+    growth: f64,
     witness: Witness,
     started: f64,
     grid: Grid,
@@ -200,6 +205,8 @@ impl<'a> Walk<'a> {
             over: Vec::with_capacity(x.len()),
             rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
             pieces: 0,
+            longest: f64::INFINITY,
+            growth: LONGER,
             witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
             started: t,
             grid,
@@ -331,12 +338,17 @@ impl<'a> Walk<'a> {
         }
         let whole = node - self.t;
         let mut dt = self.path.iter().fold(whole, |dt, c| course::reach(c, TRUNCATED * size(c), dt));
+        // Bends that have cut the piece before short are there still.
+        dt = dt.min(self.longest);
         while !self.is_solution(u, dt) {
             dt *= 0.5;
+            (self.longest, self.growth) = (dt, LONGER);
             if self.t + dt <= self.t {
                 return Err(Failure::Singular);
             }
         }
+        self.longest *= self.growth;
+        self.growth *= self.growth;
         let end = if dt < whole { self.t + dt } else { node };
         // At a time so large that a piece is within its round-off.
         if end <= self.t {
@@ -368,12 +380,8 @@ impl<'a> Walk<'a> {
         for orders in ORDERS {
             if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
                 return [0.5 * dt, dt].into_iter().all(|after| {
-                    for (x, c) in self.point.iter_mut().zip(&self.path) {
-                        *x = at(c, after);
-                    }
-                    plant.rate(&self.point, u, &mut self.rate);
-                    let mut rates = self.path.iter().zip(&self.rate).zip(&self.over);
-                    rates.all(|((c, rate), over)| is_small((course::slope(c, after) - rate).abs(), over))
+                    self.miss(u, after);
+                    self.rate.iter().zip(&self.over).all(|(missed, over)| is_small(*missed, over))
                 });
             }
             let mut rates = self.rate_over.iter().zip(&self.over);
@@ -382,6 +390,17 @@ impl<'a> Walk<'a> {
             }
         }
         false
+    }
+
+    /// Writes what the course of each state misses its rate by `after` s after its begin to `rate`.
+    fn miss(&mut self, u: &[f64], after: f64) {
+        for (x, c) in self.point.iter_mut().zip(&self.path) {
+            *x = at(c, after);
+        }
+        self.model.plant.rate(&self.point, u, &mut self.rate);
+        for (rate, c) in self.rate.iter_mut().zip(&self.path) {
+            *rate = (course::slope(c, after) - *rate).abs();
+        }
     }
 
     /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from` and is
@@ -531,11 +550,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Whether a plant at rest here stays in all sets though it may creep on under the braking law.
-    fn settles(&self, brake: &Brake, hold: f64) -> bool {
+    fn settles(&mut self, brake: &Brake, hold: f64) -> bool {
         let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
+        let (requirements, t) = (self.requirements, self.t);
         let h = |i: usize, x: &[f64]| {
-            let Requirement { model, from, .. } = self.requirements[i];
-            let begin = self.t.max(from);
+            let Requirement { model, from, .. } = requirements[i];
+            let begin = t.max(from);
             let h = model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x));
             if h.is_nan() { f64::NEG_INFINITY } else { h }
         };
@@ -543,7 +563,7 @@ impl<'a> Walk<'a> {
         let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
         for holds in 1..=SETTLING {
             brake.input(&self.model, &x, &mut u);
-            self.model.flow(&mut x, &u, hold);
+            self.creep(&mut x, &u, hold);
             for (i, seen) in &mut seen {
                 let h = h(*i, &x);
                 if h < self.least_of(*i) {
@@ -569,6 +589,32 @@ impl<'a> Walk<'a> {
             }
         }
         false
+    }
+
+    /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states where they are short, and where they are
+    /// not, or a kink breaks them, in steps of the model.
+    fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
+        let (plant, mut left) = (self.model.plant, duration);
+        while left > 0.0 {
+            plant.path(x, u, &mut self.path);
+            let least = left.min(self.model.step);
+            let mut dt = self.path.iter().fold(left, |dt, c| course::reach(c, ROUND_OFF * size(c), dt));
+            loop {
+                if dt < least {
+                    return self.model.flow(x, u, left);
+                }
+                self.miss(u, dt);
+                let mut missed = self.rate.iter().zip(&self.path);
+                if missed.all(|(missed, c)| missed * dt <= SETTLED * size(c)) {
+                    break;
+                }
+                dt *= 0.5;
+            }
+            for (x, c) in x.iter_mut().zip(&self.path) {
+                *x = at(c, dt);
+            }
+            left -= dt;
+        }
     }
 
     /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
