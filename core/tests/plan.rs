@@ -1753,3 +1753,73 @@ fn a_rest_that_decays_slowly_stays_one() {
     }
     assert!(assured > 8, "{assured}");
 }
+
+/// A point on a line (m, m/s) that its input accelerates, and a temperature that has come up to 0 fast. From there it goes on
+/// towards another, at a rate per second.
+#[derive(Clone, Copy, Debug)]
+struct Warming {
+    towards: f64,
+    rate: f64,
+}
+
+impl ControlAffine<3, 1> for Warming {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+        let warms = (-x[2] + self.towards) * self.rate + (-x[2]).max(S::zero()) * 5.0;
+        SVector::from([x[1], S::zero(), warms])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
+        SMatrix::from([[S::zero(), S::one(), S::zero()]])
+    }
+}
+
+/// Near 2 m, and not too warm: h tells of a temperature only near the edge.
+#[derive(Clone, Copy, Debug)]
+struct Cool {
+    edge: f64,
+    is_smooth: bool,
+}
+
+impl Barrier<3> for Cool {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 3>) -> S {
+        let near = -((x[0] - 2.0).squared() + 1e-4).sqrt() + 0.2;
+        match self.is_smooth {
+            true => near - (((x[2] - self.edge) * 60.0).tanh() + 1.0) * 0.3,
+            false => near.min(-x[2] + self.edge),
+        }
+    }
+}
+
+/// A state that creeps on where h does not see it yet is no rest, if it leads out within the day. Where it ends inside it may
+/// be one.
+#[test]
+fn what_creeps_on_unseen_is_no_rest() {
+    let random = &mut Random(17);
+    let mut told = [0; 2];
+    for round in 0..80 {
+        let plant =
+            Warming { towards: random.between(0.3, 2.0), rate: 10.0_f64.powf(random.between(-6.0, -2.5)) };
+        let cool = Cool { edge: random.between(0.1, 2.5), is_smooth: round % 2 == 0 };
+        // After a day, less what is left of the margin's half.
+        let warm = plant.towards * -(plant.rate * -0.9e5).exp_m1();
+        let leads_out = warm > cool.edge + 0.05;
+        if !leads_out && plant.towards > cool.edge - 0.1 {
+            continue;
+        }
+        let filter = SafetyFilter::builder(3, 1)
+            .barrier("cool", plant, cool, BarrierSettings::within(8.0))
+            .and_then(|b| b.bounds(&[-2.0], &[2.0]))
+            .and_then(|b| b.sampling(Sampling::Period(0.05)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, 0.05).expect("a filter that can be assured");
+        let start = [0.0, 0.0, -(10.0_f64.powf(random.between(0.0, 3.0)))];
+        let standing = filter.step(0.0, &start, &[0.0], &mut [0.0]).expect("dimensions").standing;
+        let is_assured = standing == Standing::Assured;
+        assert!(!(leads_out && is_assured), "{plant:?} from {start:?}, {cool:?}");
+        // What is still fast beside the way before is no rest either.
+        told[usize::from(leads_out)] += u32::from(leads_out || is_assured);
+    }
+    println!("{told:?} are assured, and lead out");
+    assert!(told[0] > 5 && told[1] > 5, "{told:?}");
+}

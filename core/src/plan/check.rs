@@ -51,6 +51,10 @@ const DRIFT: f64 = 1e3;
 pub(crate) const ON_TIME: f64 = 1e-6;
 /// Holds of the braking law in which what is left at a rest is followed.
 const SETTLING: usize = 128;
+/// Halvings of the way of the states that is left at a rest, on which h is enclosed.
+const WAY_HALVINGS: u32 = 6;
+/// Instants of that way at which h is looked at otherwise.
+const WAY_INSTANTS: u32 = 32;
 /// What h changes by in one of them for that to be round-off, as a part of what it is made of.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
 /// The time in s for which what does not die away has to leave every set where it is.
@@ -561,9 +565,11 @@ impl<'a> Walk<'a> {
         };
         let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
         let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
+        let mut states = vec![x.clone()];
         for holds in 1..=SETTLING {
             brake.input(&self.model, &x, &mut u);
             self.creep(&mut x, &u, hold);
+            states.push(x.clone());
             for (i, seen) in &mut seen {
                 let h = h(*i, &x);
                 if h < self.least_of(*i) {
@@ -576,14 +582,23 @@ impl<'a> Walk<'a> {
                 continue;
             }
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+            let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
+            // The rest of a plan is asked for half as long, so that time may pass.
+            let windows = |i: usize| {
+                let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
+                time / (hold * window as f64)
+            };
             let stays = seen.iter().all(|(i, seen)| {
                 let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
-                let round_off = SETTLED * (size + least.abs());
-                // The rest of a plan is asked for half as long, so that time may pass.
-                let time = (self.requirements[*i].until - self.t).min(LONG * self.strictness);
-                let last = [4, 3, 2, 1, 0].map(|back| seen[holds - back * window]);
-                least - to_come(last, round_off, time / (hold * window as f64)) >= self.least_of(*i)
+                let motion = Motion::of(last(&|k| seen[k]), SETTLED * (size + least.abs()));
+                least - motion.to_come(windows(*i)) >= self.least_of(*i)
             });
+            // What bends h further on the way of the states has not shown yet.
+            let stays = stays && {
+                let motion = |j: usize| Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
+                let ahead: Vec<_> = x.iter().copied().zip((0..x.len()).map(motion)).collect();
+                seen.iter().all(|(i, _)| self.stays_ahead(*i, &ahead, windows(*i)))
+            };
             if stays {
                 return true;
             }
@@ -615,6 +630,46 @@ impl<'a> Walk<'a> {
             }
             left -= dt;
         }
+    }
+
+    /// Whether requirement `i` is met as the states move on, for so many windows of time: each from where it is by its motion.
+    /// Of a set that moves, and of a source without enclosures, at instants.
+    fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
+        let Requirement { model, from, .. } = self.requirements[i];
+        let begin = self.t.max(from);
+        let mut x = self.x.clone();
+        let mut at = |part: u32| {
+            let passed = windows * f64::from(part) / f64::from(WAY_INSTANTS);
+            for (x, (now, motion)) in x.iter_mut().zip(ahead) {
+                *x = now + motion.creep * passed;
+            }
+            let h = model.lowest_from(begin, &x).unwrap_or_else(|| model.value(begin, &x));
+            h >= self.least_of(i)
+        };
+        // Where it is lost in the end nothing else need be known.
+        at(WAY_INSTANTS)
+            && match model.is_still(&self.x) {
+                Some(true) => self.encloses(i, ahead, [0.0, windows], WAY_HALVINGS),
+                _ => (0..WAY_INSTANTS).all(at),
+            }
+    }
+
+    /// The same by enclosures of h, where it does not move, from so many windows on until as many.
+    fn encloses(&self, i: usize, ahead: &[(f64, Motion)], [from, to]: [f64; 2], halvings: u32) -> bool {
+        let over = ahead.iter().map(|(x, motion)| {
+            let mut over = [Interval::ALL; COURSE];
+            over[0] = motion.over(*x, [from, to]);
+            over
+        });
+        let Requirement { model, from: begin, .. } = self.requirements[i];
+        let h = model.value_over(Interval::from(self.t.max(begin)), &over.collect::<Vec<_>>());
+        // Not-a-number is not large enough.
+        if h.is_some_and(|h| h.low >= self.least_of(i)) {
+            return true;
+        }
+        let middle = 0.5 * (from + to);
+        let parts = [[from, middle], [middle, to]];
+        halvings > 0 && parts.into_iter().all(|part| self.encloses(i, ahead, part, halvings - 1))
     }
 
     /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
@@ -654,17 +709,43 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The most by which a number moves in so many windows of time to come that is `last` at the ends of the last four. What it
-/// changes by in each is a series that dies away above a creep. What the first three and the last three differ by on the creep
-/// counts as creep. One that leads inside counts too, since it may be a slow series that will end.
-fn to_come(last: [f64; 5], round_off: f64, windows: f64) -> f64 {
-    let change = |k: usize| last[k + 1] - last[k];
-    let [before, now] = [0, 1].map(|k| told_apart([change(k), change(k + 1), change(k + 2)], round_off));
-    match (before, now) {
-        (Some([other, ..]), Some([creep, unsure, series])) => {
-            series + (creep.abs() + unsure + (creep - other).abs()) * windows
+/// How a number goes on to move, window of time by window: it creeps, above a series that dies away.
+#[derive(Clone, Copy)]
+struct Motion {
+    /// Change in a window, and by how much that may be wrong.
+    creep: f64,
+    unsure: f64,
+    /// The most that the series comes to.
+    series: f64,
+}
+
+impl Motion {
+    /// That of a number that was `last` at the ends of the last four windows. What the first three changes and the last three
+    /// differ by on the creep, that may be wrong by. Infinite where the changes do not die away.
+    fn of(last: [f64; 5], round_off: f64) -> Self {
+        let change = |k: usize| last[k + 1] - last[k];
+        let [before, now] = [0, 1].map(|k| told_apart([change(k), change(k + 1), change(k + 2)], round_off));
+        match (before, now) {
+            (Some([other, ..]), Some([creep, unsure, series])) => {
+                Self { creep, unsure: unsure + (creep - other).abs(), series }
+            }
+            _ => Self { creep: 0.0, unsure: 0.0, series: f64::INFINITY },
         }
-        _ => f64::INFINITY,
+    }
+
+    /// The most by which it moves in so many windows. A creep that leads inside counts too, since it may be a slow series that
+    /// will end.
+    fn to_come(self, windows: f64) -> f64 {
+        self.series + (self.creep.abs() + self.unsure) * windows
+    }
+
+    /// Where a number that is at `x` is, from so many windows on until as many.
+    fn over(&self, x: f64, [from, to]: [f64; 2]) -> Interval {
+        let (a, b, wide) = (self.creep * from, self.creep * to, self.series + self.unsure * to);
+        match wide.is_finite() {
+            true => Interval::new(x + a.min(b) - wide, x + a.max(b) + wide),
+            false => Interval::ALL,
+        }
     }
 }
 
@@ -699,7 +780,12 @@ fn size(course: &Course) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::to_come;
+    use super::Motion;
+
+    /// The most by which a number moves in a million windows.
+    fn to_come(last: [f64; 5], round_off: f64) -> f64 {
+        Motion::of(last, round_off).to_come(1e6)
+    }
 
     proptest! {
         /// Of a geometric series above a creep, both of any sign and size, what is to come is known.
@@ -712,23 +798,31 @@ mod tests {
         ) {
             let series = |k: u32| decays * (0..k).map(|_| ratio).product::<f64>();
             let h = |k: u32| series(k) + creep * f64::from(k);
-            let moves = to_come([0, 1, 2, 3, 4].map(h), 1e-14, f64::from(windows));
+            let moves = Motion::of([0, 1, 2, 3, 4].map(h), 1e-14).to_come(f64::from(windows));
             let moved = (0..=windows).map(|k| (h(4 + k) - h(4)).abs()).fold(0.0, f64::max);
             prop_assert!(moves >= moved, "{moves} {moved}");
             // No more than each by itself, and what round-off of 1e-14 hides in a creep.
             let apart = series(4).abs() * (1.0 - ratio) / (1.0 - ratio.abs());
             let apart = apart + creep.abs() * f64::from(windows);
             prop_assert!(moves <= apart + 1e-9 * f64::from(windows), "{moves} {apart}");
+            // And where it is meanwhile.
+            let (motion, half) = (Motion::of([0, 1, 2, 3, 4].map(h), 1e-14), windows / 2);
+            for [from, to] in [[0, half], [half, windows]] {
+                let over = motion.over(h(4), [f64::from(from), f64::from(to)]);
+                for k in from..=to {
+                    prop_assert!(over.low <= h(4 + k) && h(4 + k) <= over.high, "{over:?} {}", h(4 + k));
+                }
+            }
         }
     }
 
     #[test]
     fn what_gathers_pace_or_is_no_number_has_no_end() {
-        assert_eq!(to_come([0.5, 0.0, -1.0, -2.5, -5.0], 0.0, 1e6), f64::INFINITY);
-        assert_eq!(to_come([0.0, 0.0, 1.0, 1.0, 0.0], 0.0, 1e6), f64::INFINITY);
-        assert_eq!(to_come([f64::NAN, 1.0, 1.5, 1.75, 1.875], 0.0, 1e6), f64::INFINITY);
-        assert_eq!(to_come([0.0, 1.0, 2.0, 2.5, f64::NEG_INFINITY], 0.0, 1e6), f64::INFINITY);
-        assert_eq!(to_come([1.0; 5], 1e-14, 1e6), 0.0);
+        assert_eq!(to_come([0.5, 0.0, -1.0, -2.5, -5.0], 0.0), f64::INFINITY);
+        assert_eq!(to_come([0.0, 0.0, 1.0, 1.0, 0.0], 0.0), f64::INFINITY);
+        assert_eq!(to_come([f64::NAN, 1.0, 1.5, 1.75, 1.875], 0.0), f64::INFINITY);
+        assert_eq!(to_come([0.0, 1.0, 2.0, 2.5, f64::NEG_INFINITY], 0.0), f64::INFINITY);
+        assert_eq!(to_come([1.0; 5], 1e-14), 0.0);
     }
 
     /// A fast decay above a slow one does not hide a creep of the slow one's size.
@@ -737,6 +831,6 @@ mod tests {
         let power = |base: f64, k: u32| (0..k).map(|_| base).product::<f64>();
         // The last three changes alone say that h rises.
         let h = |k: u32| -2.58e-3 * power(0.984, k) + 3.68e-5 * power(0.483, k) - 9.08e-7 * f64::from(k);
-        assert!(to_come([0, 1, 2, 3, 4].map(h), 1e-14, 1e6) > 0.9);
+        assert!(to_come([0, 1, 2, 3, 4].map(h), 1e-14) > 0.9);
     }
 }
