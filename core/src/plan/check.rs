@@ -661,8 +661,8 @@ impl<'a> Walk<'a> {
             over[0] = motion.over(*x, [from, to]);
             over
         });
-        let Requirement { model, from: begin, .. } = self.requirements[i];
-        let h = model.value_over(Interval::from(self.t.max(begin)), &over.collect::<Vec<_>>());
+        // It does not move where it was looked at; at all times it may not on the way either.
+        let h = self.requirements[i].model.value_over(Interval::ALL, &over.collect::<Vec<_>>());
         // Not-a-number is not large enough.
         if h.is_some_and(|h| h.low >= self.least_of(i)) {
             return true;
