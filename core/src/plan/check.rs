@@ -53,7 +53,7 @@ pub(crate) const ON_TIME: f64 = 1e-6;
 const SETTLING: usize = 128;
 /// Halvings of the way of the states that is left at a rest, on which h is enclosed.
 const WAY_HALVINGS: u32 = 6;
-/// Instants of that way at which h is looked at otherwise.
+/// Instants of that way at which the plant has to rest, and h is looked at otherwise.
 const WAY_INSTANTS: u32 = 32;
 /// What h changes by in one of them for that to be round-off, as a part of what it is made of.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
@@ -490,7 +490,8 @@ impl<'a> Walk<'a> {
         let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
         for k in 0..BRAKING {
             // Followed far ahead is what stands still, and where it did not stay not again at every hold.
-            let rest = match self.is_still(brake, hold, &mut u) && (k >= due || k + 1 == BRAKING) {
+            let still = self.is_still(brake, hold, &self.x.clone(), &mut u);
+            let rest = match still && (k >= due || k + 1 == BRAKING) {
                 true => {
                     (due, wait) = (k + wait, 2 * wait);
                     self.stays(brake, hold, &u)
@@ -529,7 +530,8 @@ impl<'a> Walk<'a> {
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
         let hold = brake.hold.max(self.grid.period);
-        let ends = self.is_still(brake, hold, &mut u) && matches!(self.stays(brake, hold, &u), Ok(true));
+        let still = self.is_still(brake, hold, &self.x.clone(), &mut u);
+        let ends = still && matches!(self.stays(brake, hold, &u), Ok(true));
         self.witness.tightest = tightest;
         ends
     }
@@ -544,13 +546,12 @@ impl<'a> Walk<'a> {
         stays
     }
 
-    /// Whether the plant stands still under the input of `brake`, which is written to `u`.
-    fn is_still(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
-        brake.input(&self.model, &self.x, u);
-        self.model.plant.rate(&self.x, u, &mut self.rate);
-        self.rate.iter().enumerate().all(|(i, rate)| {
-            rate.abs() <= AT_REST * self.witness.rates[i] + ROUND_OFF * self.x[i].abs() / hold
-        })
+    /// Whether the plant stands still at `x` under the input of `brake`, which is written to `u`.
+    fn is_still(&mut self, brake: &Brake, hold: f64, x: &[f64], u: &mut [f64]) -> bool {
+        brake.input(&self.model, x, u);
+        self.model.plant.rate(x, u, &mut self.rate);
+        let small = |i: usize| AT_REST * self.witness.rates[i] + ROUND_OFF * x[i].abs() / hold;
+        self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
     }
 
     /// Whether a plant at rest here stays in all sets though it may creep on under the braking law.
@@ -597,7 +598,9 @@ impl<'a> Walk<'a> {
             let stays = stays && {
                 let motion = |j: usize| Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
                 let ahead: Vec<_> = x.iter().copied().zip((0..x.len()).map(motion)).collect();
+                let longest = seen.iter().map(|(i, _)| windows(*i)).fold(0.0, f64::max);
                 seen.iter().all(|(i, _)| self.stays_ahead(*i, &ahead, windows(*i)))
+                    && self.rests_ahead(brake, hold, &ahead, longest)
             };
             if stays {
                 return true;
@@ -637,21 +640,21 @@ impl<'a> Walk<'a> {
     fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
         let Requirement { model, from, .. } = self.requirements[i];
         let begin = self.t.max(from);
-        let mut x = self.x.clone();
-        let mut at = |part: u32| {
-            let passed = windows * f64::from(part) / f64::from(WAY_INSTANTS);
-            for (x, (now, motion)) in x.iter_mut().zip(ahead) {
-                *x = now + motion.creep * passed;
-            }
+        let is_met = |x: Vec<f64>| {
             let h = model.lowest_from(begin, &x).unwrap_or_else(|| model.value(begin, &x));
             h >= self.least_of(i)
         };
-        // Where it is lost in the end nothing else need be known.
-        at(WAY_INSTANTS)
-            && match model.is_still(&self.x) {
-                Some(true) => self.encloses(i, ahead, [0.0, windows], WAY_HALVINGS),
-                _ => (0..WAY_INSTANTS).all(at),
-            }
+        match model.is_still(&self.x) {
+            Some(true) => self.encloses(i, ahead, [0.0, windows], WAY_HALVINGS),
+            _ => way(ahead, windows).all(is_met),
+        }
+    }
+
+    /// Whether the plant still rests under the input of `brake` as the states move on: a force that grows on their way has not
+    /// shown yet.
+    fn rests_ahead(&mut self, brake: &Brake, hold: f64, ahead: &[(f64, Motion)], windows: f64) -> bool {
+        let mut u = vec![0.0; self.model.inputs()];
+        way(ahead, windows).all(|x| self.is_still(brake, hold, &x, &mut u))
     }
 
     /// The same by enclosures of h, where it does not move, from so many windows on until as many.
@@ -715,7 +718,8 @@ struct Motion {
     /// Change in a window, and by how much that may be wrong.
     creep: f64,
     unsure: f64,
-    /// The most that the series comes to.
+    /// What the series comes to, and the most that it does on the way.
+    end: f64,
     series: f64,
 }
 
@@ -726,10 +730,10 @@ impl Motion {
         let change = |k: usize| last[k + 1] - last[k];
         let [before, now] = [0, 1].map(|k| told_apart([change(k), change(k + 1), change(k + 2)], round_off));
         match (before, now) {
-            (Some([other, ..]), Some([creep, unsure, series])) => {
-                Self { creep, unsure: unsure + (creep - other).abs(), series }
+            (Some([other, ..]), Some([creep, unsure, end, series])) => {
+                Self { creep, unsure: unsure + (creep - other).abs(), end, series }
             }
-            _ => Self { creep: 0.0, unsure: 0.0, series: f64::INFINITY },
+            _ => Self { creep: 0.0, unsure: 0.0, end: 0.0, series: f64::INFINITY },
         }
     }
 
@@ -737,6 +741,11 @@ impl Motion {
     /// will end.
     fn to_come(self, windows: f64) -> f64 {
         self.series + (self.creep.abs() + self.unsure) * windows
+    }
+
+    /// Where a number that is at `x` is a `part` of the way on, of so many windows.
+    fn at(&self, x: f64, part: f64, windows: f64) -> f64 {
+        x + (self.end + self.creep * windows) * part
     }
 
     /// Where a number that is at `x` is, from so many windows on until as many.
@@ -750,18 +759,28 @@ impl Motion {
 }
 
 /// What three changes in a row tell by Aitken's process if they are a geometric series and a constant creep: the creep, what
-/// round-off may hide of it, and the sum of the series to come. `None` where what they change by does not die away.
-fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 3]> {
+/// round-off may hide of it, the sum of the series to come, and the most that it comes to on the way. `None` where what they
+/// change by does not die away.
+fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 4]> {
     let (bent, bends) = (before - first, now - before);
     if bends.abs() <= round_off {
-        return Some([if now.abs() <= round_off { 0.0 } else { now }, 0.0, 0.0]);
+        return Some([if now.abs() <= round_off { 0.0 } else { now }, 0.0, 0.0, 0.0]);
     }
     let dies_away = bends.abs() < bent.abs();
     dies_away.then(|| {
         let ratio = bends / bent;
         let decays = bends * ratio / (ratio - 1.0);
         let unsure = 2.0 * round_off / ((1.0 - ratio) * (1.0 - ratio));
-        [now - decays, unsure, (decays * ratio).abs() / (1.0 - ratio.abs())]
+        let next = decays * ratio;
+        [now - decays, unsure, next / (1.0 - ratio), next.abs() / (1.0 - ratio.abs())]
+    })
+}
+
+/// The states at instants of their way, from where they are on for so many windows.
+fn way(ahead: &[(f64, Motion)], windows: f64) -> impl Iterator<Item = Vec<f64>> {
+    (0..=WAY_INSTANTS).map(move |instant| {
+        let part = f64::from(instant) / f64::from(WAY_INSTANTS);
+        ahead.iter().map(|(x, motion)| motion.at(*x, part, windows)).collect()
     })
 }
 
