@@ -490,8 +490,7 @@ impl<'a> Walk<'a> {
         let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
         for k in 0..BRAKING {
             // Followed far ahead is what stands still, and where it did not stay not again at every hold.
-            let still = self.is_still(brake, hold, &self.x.clone(), &mut u);
-            let rest = match still && (k >= due || k + 1 == BRAKING) {
+            let rest = match self.is_still(brake, hold, &mut u) && (k >= due || k + 1 == BRAKING) {
                 true => {
                     (due, wait) = (k + wait, 2 * wait);
                     self.stays(brake, hold, &u)
@@ -530,8 +529,7 @@ impl<'a> Walk<'a> {
     pub(super) fn may_end(&mut self, brake: &Brake) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
         let hold = brake.hold.max(self.grid.period);
-        let still = self.is_still(brake, hold, &self.x.clone(), &mut u);
-        let ends = still && matches!(self.stays(brake, hold, &u), Ok(true));
+        let ends = self.is_still(brake, hold, &mut u) && matches!(self.stays(brake, hold, &u), Ok(true));
         self.witness.tightest = tightest;
         ends
     }
@@ -546,11 +544,17 @@ impl<'a> Walk<'a> {
         stays
     }
 
-    /// Whether the plant stands still at `x` under the input of `brake`, which is written to `u`.
-    fn is_still(&mut self, brake: &Brake, hold: f64, x: &[f64], u: &mut [f64]) -> bool {
-        brake.input(&self.model, x, u);
-        self.model.plant.rate(x, u, &mut self.rate);
-        let small = |i: usize| AT_REST * self.witness.rates[i] + ROUND_OFF * x[i].abs() / hold;
+    /// Whether the plant stands still here under the input of `brake`, which is written to `u`.
+    fn is_still(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+        self.point.copy_from_slice(&self.x);
+        self.is_still_at_point(brake, hold, u)
+    }
+
+    /// The same at the state in `point`.
+    fn is_still_at_point(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+        brake.input(&self.model, &self.point, u);
+        self.model.plant.rate(&self.point, u, &mut self.rate);
+        let small = |i: usize| AT_REST * self.witness.rates[i] + ROUND_OFF * self.point[i].abs() / hold;
         self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
     }
 
@@ -650,21 +654,14 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Whether the plant still rests under the input of `brake` as the states move on: a force that grows on their way has not
-    /// shown yet.
-    fn rests_ahead(&mut self, brake: &Brake, hold: f64, ahead: &[(f64, Motion)], windows: f64) -> bool {
-        let mut u = vec![0.0; self.model.inputs()];
-        way(ahead, windows).all(|x| self.is_still(brake, hold, &x, &mut u))
-    }
-
-    /// The same by enclosures of h, where it does not move, from so many windows on until as many.
+    /// The same by enclosures of h, from so many windows on until as many.
     fn encloses(&self, i: usize, ahead: &[(f64, Motion)], [from, to]: [f64; 2], halvings: u32) -> bool {
         let over = ahead.iter().map(|(x, motion)| {
             let mut over = [Interval::ALL; COURSE];
             over[0] = motion.over(*x, [from, to]);
             over
         });
-        // It does not move where it was looked at; at all times it may not on the way either.
+        // A set that does not move where the plant is now may do so farther on: at all times.
         let h = self.requirements[i].model.value_over(Interval::ALL, &over.collect::<Vec<_>>());
         // Not-a-number is not large enough.
         if h.is_some_and(|h| h.low >= self.least_of(i)) {
@@ -673,6 +670,16 @@ impl<'a> Walk<'a> {
         let middle = 0.5 * (from + to);
         let parts = [[from, middle], [middle, to]];
         halvings > 0 && parts.into_iter().all(|part| self.encloses(i, ahead, part, halvings - 1))
+    }
+
+    /// Whether the plant still rests under the input of `brake` as the states move on: a force that grows on their way has not
+    /// shown yet.
+    fn rests_ahead(&mut self, brake: &Brake, hold: f64, ahead: &[(f64, Motion)], windows: f64) -> bool {
+        let mut u = vec![0.0; self.model.inputs()];
+        way(ahead, windows).all(|x| {
+            self.point.copy_from_slice(&x);
+            self.is_still_at_point(brake, hold, &mut u)
+        })
     }
 
     /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
