@@ -1791,6 +1791,57 @@ impl Barrier<3> for Cool {
     }
 }
 
+/// A point on a line (m, m/s) that its input accelerates, a flow that dies away, and a level that it fills. By itself the level
+/// moves away from 0 at a rate per second, or towards it. Within 0.2 of 0.6 it pushes the point.
+#[derive(Clone, Copy, Debug)]
+struct Unstable {
+    rate: f64,
+}
+
+impl ControlAffine<4, 1> for Unstable {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        let push = (-(x[3] - 0.6).abs() + 0.2).max(S::zero()) * 20.0;
+        SVector::from([x[1], push, -x[2] * 5.0, x[3] * self.rate + x[2]])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 1> {
+        SMatrix::from([[S::zero(), S::one(), S::zero(), S::zero()]])
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Near;
+
+impl Barrier<4> for Near {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+        -((x[0] - 2.0).squared() + 1e-4).sqrt() + 0.2
+    }
+}
+
+/// A level that comes to rest at 0, where it does not stay, is no rest: however near it comes, it leaves within the day. One that
+/// is drawn there is.
+#[test]
+fn an_unstable_rest_is_none() {
+    let random = &mut Random(23);
+    for round in 0..60 {
+        let leads_out = round % 3 > 0;
+        let rate = 10.0_f64.powf(random.between(-3.0, 0.5)) * if leads_out { 1.0 } else { -1.0 };
+        let plant = Unstable { rate };
+        let filter = SafetyFilter::builder(4, 1)
+            .barrier("near", plant, Near, BarrierSettings::within(8.0))
+            .and_then(|b| b.bounds(&[-2.0], &[2.0]))
+            .and_then(|b| b.sampling(Sampling::Period(0.05)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, 0.05).expect("a filter that can be assured");
+        // On the way that leads to 0, but for very little.
+        let beside = if round % 2 == 0 { 0.0 } else { 10.0_f64.powf(random.between(-14.0, -7.0)) };
+        let start = [0.0, 0.0, 0.5, -0.5 / (5.0 + rate) + beside];
+        let standing = filter.step(0.0, &start, &[0.0], &mut [0.0]).expect("dimensions").standing;
+        assert_eq!(standing == Standing::Assured, !leads_out, "{plant:?} from {start:?}: {standing:?}");
+    }
+}
+
 /// A state that creeps on where neither h nor the plant tells of it yet is no rest, if it leads out within the day. Where it
 /// ends inside it may be one.
 #[test]

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::{Linear, Model};
+use super::model::{Linear, Model, largest_eigenvalue};
 use crate::elementary;
 use crate::scalar::all_finite;
 
@@ -67,8 +67,10 @@ impl Brake {
 
     fn at(model: &Model<'_>, state: Vec<f64>, input: Vec<f64>, hold: f64) -> Option<Self> {
         let Linear { a, b } = model.linear(&state, &input, hold);
-        let growth = a.complex_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(v.norm_sqr()));
-        let growth = elementary::sqrt(growth);
+        let growth = largest_eigenvalue(&a);
+        if !growth.is_finite() {
+            return None;
+        }
         let nx = a.nrows();
         // What is round-off of a difference moves nothing.
         let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > STILL { v } else { 0.0 });

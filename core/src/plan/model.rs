@@ -3,10 +3,11 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Schur};
 
 use super::Integral;
 use super::check::ROUND_OFF;
+use crate::elementary;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
@@ -14,6 +15,8 @@ use crate::qp::Bounds;
 const DIFFERENCE: f64 = 1e-6;
 /// Most Gauss-Newton steps to a state of rest.
 const TO_REST: u32 = 30;
+/// Most steps of an eigenvalue decomposition: it takes a few for each state.
+const MOST_ROTATIONS: usize = 1000;
 /// Least singular value that counts, as a part of the largest.
 const RANK: f64 = 1e-9;
 
@@ -73,29 +76,12 @@ impl Model<'_> {
 
     /// The linear model over `duration` s beside `x` and `u`, by central differences.
     pub(super) fn linear(&self, x: &[f64], u: &[f64], duration: f64) -> Linear {
-        let (nx, nu) = (x.len(), u.len());
-        let (mut a, mut b) = (DMatrix::zeros(nx, nx), DMatrix::zeros(nx, nu));
-        let (mut held, mut ends) = (u.to_vec(), [x.to_vec(), x.to_vec()]);
-        for j in 0..nx + nu {
-            let size = DIFFERENCE * (1.0 + if j < nx { x[j].abs() } else { u[j - nx].abs() });
-            for (end, sign) in ends.iter_mut().zip([size, -size]) {
-                end.copy_from_slice(x);
-                held.copy_from_slice(u);
-                match j < nx {
-                    true => end[j] += sign,
-                    false => held[j - nx] += sign,
-                }
-                self.flow(end, &held, duration);
-            }
-            for i in 0..nx {
-                let slope = (ends[0][i] - ends[1][i]) / (2.0 * size);
-                match j < nx {
-                    true => a[(i, j)] = slope,
-                    false => b[(i, j - nx)] = slope,
-                }
-            }
-        }
-        Linear { a, b }
+        let nx = x.len();
+        let both = differences(&[x, u].concat(), DIFFERENCE, nx, |end| {
+            let (x, u) = end.split_at_mut(nx);
+            self.flow(x, u, duration);
+        });
+        Linear { a: both.columns(0, nx).into(), b: both.columns(nx, u.len()).into() }
     }
 
     /// The rate of the state under `u`: its mean over `duration` s.
@@ -136,4 +122,40 @@ impl Model<'_> {
         }
         None
     }
+}
+
+/// The slopes of the first `rows` numbers that `map` makes of those in `at`, one column for each of these: central differences,
+/// each of `part` of its size.
+pub(super) fn differences(
+    at: &[f64],
+    part: f64,
+    rows: usize,
+    mut map: impl FnMut(&mut [f64]),
+) -> DMatrix<f64> {
+    let (mut slopes, mut ends) = (DMatrix::zeros(rows, at.len()), [at.to_vec(), at.to_vec()]);
+    for (j, number) in at.iter().enumerate() {
+        let size = part * (1.0 + number.abs());
+        for (end, by) in ends.iter_mut().zip([size, -size]) {
+            end.copy_from_slice(at);
+            end[j] += by;
+            map(end);
+        }
+        for i in 0..rows {
+            slopes[(i, j)] = (ends[0][i] - ends[1][i]) / (2.0 * size);
+        }
+    }
+    slopes
+}
+
+/// The size of the largest eigenvalue. Infinite where there is none to be found.
+pub(super) fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
+    // Of what is no number the decomposition need not end.
+    let schur = match matrix.iter().all(|v| v.is_finite()) {
+        true => Schur::try_new(matrix.clone(), f64::EPSILON, MOST_ROTATIONS),
+        false => None,
+    };
+    schur.map_or(f64::INFINITY, |schur| {
+        let squares = schur.complex_eigenvalues().map(|value| value.norm_sqr());
+        elementary::sqrt(squares.max())
+    })
 }
