@@ -1842,6 +1842,63 @@ fn an_unstable_rest_is_none() {
     }
 }
 
+/// A point on a line (m, m/s) that is driven from 0 at `stiffness` (1/s2) times its place, and accelerated by its input.
+#[derive(Clone, Copy, Debug)]
+struct Driven {
+    stiffness: f64,
+}
+
+impl ControlAffine<2, 1> for Driven {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1], x[0] * self.stiffness])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), S::one()]])
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Within(f64);
+
+impl Barrier<2> for Within {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+        -x[0].abs() + self.0
+    }
+}
+
+/// Where the bounds end before the set does, the plant is kept from the brink by more than what is rounded off: a plan from there
+/// would be lost on the way. Judged by the exact solution.
+#[test]
+fn what_round_off_would_lose_is_not_followed() {
+    const STEP: f64 = 0.04;
+    let random = &mut Random(29);
+    for round in 0..8 {
+        let (stiffness, most) = (random.between(20.0, 40.0), random.between(1.0, 3.0));
+        let brink = most / stiffness;
+        let set = Within(brink * random.between(1.2, 2.0));
+        let filter = SafetyFilter::builder(2, 1)
+            .barrier("near", Driven { stiffness }, set, BarrierSettings::keeping())
+            .and_then(|b| b.bounds(&[-most], &[most]))
+            .and_then(|b| b.sampling(Sampling::Period(STEP)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, STEP).expect("a filter that can be assured");
+        let (lambda, mut u) = (stiffness.sqrt(), [0.0]);
+        let (cosh, sinh) = ((lambda * STEP).cosh(), (lambda * STEP).sinh());
+        let mut x = [brink * random.between(-0.7, 0.7), 0.0];
+        let wanted = [0.0, -1e3, 1e3, 0.5 * most][round % 4];
+        for k in 0..250 {
+            let standing =
+                filter.step(f64::from(k) * STEP, &x, &[wanted], &mut u).expect("dimensions").standing;
+            assert_eq!(standing, Standing::Assured, "round {round}, step {k}, {x:?}");
+            let from = x[0] + u[0] / stiffness;
+            x = [from * cosh + x[1] / lambda * sinh - u[0] / stiffness, from * lambda * sinh + x[1] * cosh];
+            assert!(x[0].abs() < brink, "round {round}, step {k}, {x:?}");
+        }
+    }
+}
+
 /// A state that creeps on where neither h nor the plant tells of it yet is no rest, if it leads out within the day. Where it
 /// ends inside it may be one.
 #[test]

@@ -193,7 +193,8 @@ static inline double punctual_value(const punctual_calculator *c, punctual_numbe
 /*
  * A function of one number that is given by its value and derivatives at punctual_value(c, a): derivatives[0] is the
  * value, derivatives[k] the derivative of order k, `count` of them. A barrier of relative degree n needs the orders up
- * to n + 2, that is a count of n + 3; those that are not given count as 0.
+ * to n + 2, that is a count of n + 3, and plans those up to 9; those that are not given count as 0. Between the
+ * instants at which a plan looks, nothing is known of such a function: narrow dips of it are not seen.
  */
 static inline punctual_number punctual_function(const punctual_calculator *c, punctual_number a,
                                                 const double *derivatives, size_t count) {

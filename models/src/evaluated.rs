@@ -7,6 +7,7 @@
 
 mod trial;
 
+use std::cell::Cell;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -151,6 +152,7 @@ impl CodeModel {
             plant_steps: 0,
             next: 0,
             fault: None,
+            looks: [false; 2],
         };
         trial::run(&mut equations, barriers, ranges)?;
         equations.growing = false;
@@ -258,6 +260,8 @@ struct Evaluated {
     /// The first register that the steps leave free.
     next: Register,
     fault: Option<Fault>,
+    /// Whether the plant, and the barrier, asked for one value of what was enclosed as many.
+    looks: [bool; 2],
 }
 
 impl Clone for Evaluated {
@@ -304,6 +308,8 @@ struct Work<'a, C> {
     zero: Register,
     growing: bool,
     fault: Option<Fault>,
+    /// Whether the code asked for one value of what was enclosed as many.
+    looks: Cell<bool>,
 }
 
 impl<C: Scalar> Work<'_, C> {
@@ -433,7 +439,14 @@ impl<C: Scalar> Calculator for Work<'_, C> {
 
     fn value(&self, a: Number) -> f64 {
         let register = a as Register;
-        if self.is_given(register) { self.series.get(register, 0).value() } else { f64::NAN }
+        if !self.is_given(register) {
+            return f64::NAN;
+        }
+        let value = self.series.get(register, 0);
+        if value.compare(value).is_none() {
+            self.looks.set(true);
+        }
+        value.value()
     }
 }
 
@@ -476,11 +489,12 @@ impl Equations for Evaluated {
             zero: time + 1,
             growing: self.growing,
             fault: None,
+            looks: Cell::new(false),
         };
         self.code.plant(&mut work, &self.parameters, &self.x, &mut self.f, &mut self.g);
         work.combine(&self.f, &self.g, &mut self.derivatives);
         let nan = work.not_a_number();
-        (self.next, self.fault) = (work.next, work.fault);
+        (self.next, self.fault, self.looks[0]) = (work.next, work.fault, work.looks.get());
         self.plant_steps = self.steps.len();
         if self.fault.is_some() {
             self.derivatives.fill(nan);
@@ -489,6 +503,10 @@ impl Equations for Evaluated {
 
     fn derivative(&self, i: usize) -> Register {
         self.derivatives[i]
+    }
+
+    fn encloses(&self) -> [bool; 2] {
+        self.looks.map(|looks| !looks)
     }
 
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register {
@@ -505,10 +523,12 @@ impl Equations for Evaluated {
             zero: time + 1,
             growing: self.growing,
             fault: self.fault,
+            looks: Cell::new(false),
         };
         let h = self.code.barrier(self.barrier, &mut work, &self.parameters, time as Number, &self.x);
         let h = work.checked(h);
         let (fault, nan, end) = (work.fault, work.not_a_number(), work.next);
+        self.looks[1] = work.looks.get();
         for k in 1..=n {
             series.advance(&self.steps[self.plant_steps..], k);
         }

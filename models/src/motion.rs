@@ -39,6 +39,11 @@ pub(crate) trait Equations: Clone + Send + 'static {
     /// The register of the derivative of state `i`, once [`Self::advance`] was done.
     fn derivative(&self, i: usize) -> Register;
 
+    /// Whether the last coefficients of the plant, and of the barrier, enclose all values where they were computed on enclosures.
+    fn encloses(&self) -> [bool; 2] {
+        [true; 2]
+    }
+
     /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their register.
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
 }
@@ -542,18 +547,21 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
                 out[k] = series.get(equations.derivative(i), k);
             }
         }
-        true
+        equations.encloses()[0]
     }
 
     fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
-        Some(self.work.borrow_mut().few_over.follow(time, |i, _| path[i][0]))
+        let few_over = &mut self.work.borrow_mut().few_over;
+        let h = few_over.follow(time, |i, _| path[i][0]);
+        few_over.equations.encloses()[1].then_some(h)
     }
 
     fn is_still(&self, x: &[f64]) -> Option<bool> {
         let few_over = &mut self.work.borrow_mut().few_over;
         let mut at = |time| few_over.follow(time, |i, _| Interval::from(x[i]));
         // Where time is not used, the bits are the same.
-        Some(at(Interval::ALL) == at(Interval::from(0.0)))
+        let is_still = at(Interval::ALL) == at(Interval::from(0.0));
+        few_over.equations.encloses()[1].then_some(is_still)
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
@@ -572,10 +580,16 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
                 *rate = series.get(equations.derivative(i), 0);
             }
         });
+        if !equations.encloses()[0] {
+            return None;
+        }
         if !known {
             return Some(f64::NEG_INFINITY);
         }
         let low = few_over.follow(Interval::new(t, t + duration), |i, k| held[i][k]).low;
+        if !few_over.equations.encloses()[1] {
+            return None;
+        }
         if low >= wanted {
             return Some(low);
         }
@@ -586,7 +600,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
         let courses = &mut self.work.borrow_mut().courses_over;
         courses.follow(time, |i, k| path[i][k]);
-        Some(courses.series.get(courses.h, COURSE - 1))
+        courses.equations.encloses()[1].then(|| courses.series.get(courses.h, COURSE - 1))
     }
 }
 

@@ -231,11 +231,21 @@ impl Distribution {
         match self {
             Self::Uniform { min, max } => (min + u * (max - min)).clamp(*min, *max),
             Self::LogUniform { min, max } => {
-                elementary::exp(elementary::ln(*min) + u * elementary::ln(max / min)).clamp(*min, *max)
+                let ratio = max / min;
+                let decades = match ratio.is_finite() {
+                    true => elementary::ln(ratio),
+                    false => elementary::ln(*max) - elementary::ln(*min),
+                };
+                elementary::exp(elementary::ln(*min) + u * decades).clamp(*min, *max)
             }
             Self::Normal { mean, deviation, min, max } => {
-                let [from, to] = [min, max].map(|end| below((end - mean) / deviation));
-                (mean + deviation * quantile(from + u * (to - from))).clamp(*min, *max)
+                let [low, high] = [min, max].map(|end| (end - mean) / deviation);
+                // Far above the mean the parts below are too near 1 to be told apart, those above are not.
+                let z = match low > 1.0 {
+                    true => -quantile(below(-low) + u * (below(-high) - below(-low))),
+                    false => quantile(below(low) + u * (below(high) - below(low))),
+                };
+                (mean + deviation * z).clamp(*min, *max)
             }
             Self::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
             Self::Course { values, .. } => values[0],
@@ -301,6 +311,11 @@ mod tests {
         assert_eq!(at("distribution = \"choice\"\nvalues = [1, 5]", 0.49), 1.0);
         assert_eq!(at("distribution = \"choice\"\nvalues = [1, 5]", 0.51), 5.0);
         assert_eq!(checked("distribution = \"seed\"", Range::NON_NEGATIVE).unwrap().value(0.5, 7), 7.0);
+        let tail =
+            at("distribution = \"normal\"\nmean = 0\ndeviation = 1\nmin = 5", 1.0 - f64::EPSILON / 2.0);
+        assert!(tail > 5.0 && tail < 12.0, "the largest number drawn of a tail: {tail}");
+        let wide = at("distribution = \"log_uniform\"\nmin = 1e-9\nmax = 1e300", 0.5);
+        assert!((wide / 3.162_277_660_168_379_5e145 - 1.0).abs() < 1e-12, "{wide}");
         let least = at(normal, 0.5 / (1_u64 << 52) as f64);
         assert!(least.is_finite(), "the least number drawn: {least}");
     }

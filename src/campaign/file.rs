@@ -225,7 +225,7 @@ impl Campaign {
     /// Reads a campaign that [`Campaign::packed`] packed.
     fn unpacked(text: &str, path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::configuration("", format!("{}: {message}", path.display()));
-        let Packed { version, fingerprint, source, .. } = serde_json::from_str(text)
+        let Packed { version, fingerprint, runs, source } = serde_json::from_str(text)
             .map_err(|e| wrong(format!("is no whole campaign that `--pack` wrote: {e}")))?;
         let ours = env!("CARGO_PKG_VERSION");
         if version != ours {
@@ -233,10 +233,12 @@ impl Campaign {
                 "was packed by version {version} of this program, this is version {ours}"
             )));
         }
+        let changed = || wrong("was changed after `--pack` wrote it; pack the campaign anew".to_owned());
         if fingerprint != source.fingerprint() {
-            return Err(wrong("was changed after `--pack` wrote it; pack the campaign anew".to_owned()));
+            return Err(changed());
         }
-        Self::of(source, path, path)
+        let campaign = Self::of(source, path, path)?;
+        if campaign.runs == runs { Ok(campaign) } else { Err(changed()) }
     }
 
     /// The campaign with all that it needs, as one text.

@@ -65,11 +65,17 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
     }
     let folder = Parts::open(output, campaign, None)?;
     let metadata = runner::metadata(campaign.source(), &measures, None);
-    let mut writer = Writer::create(&folder.unfinished(), measures.columns(), &metadata)?;
-    for Part { runs, path } in &parts {
-        runner::copy(&Reader::open(path)?, path, runs, &measures, &mut writer)?;
+    let written = || {
+        let mut writer = Writer::create(&folder.unfinished(), measures.columns(), &metadata)?;
+        for Part { runs, path } in &parts {
+            runner::copy(&Reader::open(path)?, path, runs, &measures, &mut writer)?;
+        }
+        writer.finish()
+    };
+    if let Err(error) = written() {
+        folder.remove()?;
+        return Err(error);
     }
-    writer.finish()?;
     folder.settle(&folder.unfinished(), output)?;
     folder.remove()
 }

@@ -20,6 +20,7 @@ use super::file::{Campaign, Choice, Success};
 use super::measures::Measures;
 use super::runner::{self, Crew, Options, Parts};
 use super::splitting::{self, Estimate, Plan, Point, Problem, Repeat, Stalled};
+use super::summary::Rate;
 use super::table::{Cell, Row};
 use crate::error::Error;
 use crate::whole;
@@ -145,13 +146,18 @@ pub fn rare(
     };
     let worst = write(campaign, output, &worst)?;
     let runs = plan.made + made;
+    // Where every run failed there is no spread to go by: it is plain sampling.
+    let (interval, plain_runs) = match probability < 1.0 {
+        true => (interval, (1.0 - probability) / (probability * deviation * deviation)),
+        false => (Rate::of(made, made).interval, made as f64),
+    };
     store.remove()?;
     Ok(Ended::Done(Box::new(Rare {
         probability,
         interval,
         repeats,
         runs,
-        plain_runs: (1.0 - probability) / (probability * deviation * deviation),
+        plain_runs,
         levels: plan.levels.iter().map(|level| level.margin).collect(),
         worst,
     })))

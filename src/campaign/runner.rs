@@ -22,7 +22,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::arrow;
 use super::file::{Campaign, Choice, Source};
 use super::measures::Measures;
-use super::table::{Cell, GROUP, Reader, Row, Writer};
+use super::table::{Cell, Checksum, GROUP, Reader, Row, Writer};
 use crate::coupling::Simulation;
 use crate::error::Error;
 
@@ -388,17 +388,23 @@ pub(super) fn copy(
             format!("it has {} rows, must have {}; remove it", reader.rows(), runs.end - runs.start);
         return Err(wrong(message));
     }
-    let mut due = runs.start;
+    let (mut due, mut checksum) = (runs.start, Checksum::default());
     for group in 0..reader.groups() {
         for row in reader.group(group, measures.columns())? {
             match row.first() {
                 Some(Cell::Count(run)) if *run == due => due += 1,
                 _ => return Err(wrong(format!("run {due} is not in its place; remove it"))),
             }
+            checksum.add(&row);
             writer.push(row)?;
         }
     }
-    Ok(())
+    match reader.is_whole(&checksum) {
+        true => Ok(()),
+        false => {
+            Err(wrong("its rows are not those that were written, so it is damaged; make it again".to_owned()))
+        }
+    }
 }
 
 thread_local! {

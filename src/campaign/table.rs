@@ -91,6 +91,35 @@ impl std::fmt::Display for Cell {
 /// A run: one cell for each column.
 pub type Row = Vec<Cell>;
 
+/// The name of the checksum of all rows in the metadata.
+const CHECKSUM: &str = "punctual.checksum";
+
+/// A checksum of rows, in their order: what a disk or a copy has changed shows.
+#[derive(Default)]
+pub(super) struct Checksum(crc32fast::Hasher);
+
+impl Checksum {
+    pub(super) fn add(&mut self, row: &Row) {
+        for cell in row {
+            match cell {
+                Cell::Count(count) => self.0.update(&count.to_le_bytes()),
+                Cell::Number(Some(number)) => self.0.update(&number.to_bits().to_le_bytes()),
+                Cell::Flag(flag) => self.0.update(&[u8::from(*flag)]),
+                Cell::Text(Some(text)) => {
+                    self.0.update(&(text.len() as u64).to_le_bytes());
+                    self.0.update(text.as_bytes());
+                }
+                Cell::Number(None) | Cell::Text(None) => self.0.update(b"none"),
+            }
+        }
+    }
+
+    /// The text in the metadata.
+    pub(super) fn text(&self) -> String {
+        format!("{:08x}", self.0.clone().finalize())
+    }
+}
+
 /// A file that cannot be written or read as Parquet.
 fn broken(action: &'static str, path: &Path) -> impl Fn(ParquetError) -> Error {
     move |e| Error::io(action, path, std::io::Error::other(e))
@@ -103,6 +132,7 @@ pub(super) struct Writer {
     inner: SerializedFileWriter<File>,
     columns: Vec<Column>,
     waiting: Vec<Row>,
+    checksum: Checksum,
 }
 
 impl Writer {
@@ -145,7 +175,14 @@ impl Writer {
         let copy = file.try_clone().map_err(|e| Error::io("write", path, e))?;
         let inner =
             SerializedFileWriter::new(copy, Arc::new(schema), Arc::new(properties)).map_err(&problem)?;
-        Ok(Self { path: path.to_owned(), file, inner, columns: columns.to_vec(), waiting: Vec::new() })
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            inner,
+            columns: columns.to_vec(),
+            waiting: Vec::new(),
+            checksum: Checksum::default(),
+        })
     }
 
     /// Adds a row.
@@ -154,6 +191,7 @@ impl Writer {
     ///
     /// The file cannot be written.
     pub(super) fn push(&mut self, row: Row) -> Result<(), Error> {
+        self.checksum.add(&row);
         self.waiting.push(row);
         if self.waiting.len() == GROUP { self.flush() } else { Ok(()) }
     }
@@ -173,6 +211,7 @@ impl Writer {
         if !self.waiting.is_empty() {
             self.flush()?;
         }
+        self.inner.append_key_value_metadata(KeyValue::new(CHECKSUM.to_owned(), self.checksum.text()));
         self.inner.close().map_err(broken("write", &self.path))?;
         self.file.sync_all().map_err(|e| Error::io("write", &self.path, e))
     }
@@ -243,6 +282,11 @@ impl Reader {
     pub fn text(&self, key: &str) -> Option<&str> {
         let texts = self.inner.metadata().file_metadata().key_value_metadata()?;
         texts.iter().find(|text| text.key == key)?.value.as_deref()
+    }
+
+    /// Whether this is the checksum that was written with the rows.
+    pub(super) fn is_whole(&self, rows: &Checksum) -> bool {
+        self.text(CHECKSUM) == Some(&rows.text())
     }
 
     /// The number of rows.

@@ -26,9 +26,9 @@ pub struct Arguments {
     /// campaign file with the ending .parquet; of a shard .K-of-N.parquet or .FIRST-LAST.parquet, of the worst run of --rare -worst.parquet]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The number of runs made at once [default: one for each core]
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    /// The number of runs made at once, at most 1024 [default: one for each core]
+    #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1024))]
+    threads: Option<usize>,
     /// How many of the worst runs to list
     #[arg(long, value_name = "N", default_value_t = 10)]
     worst: usize,
@@ -82,6 +82,12 @@ fn range(text: &str) -> Result<Range, String> {
     let number = |text: &str| text.parse::<u64>().map_err(|_| wrong());
     let range = Range { first: number(first)?, last: number(last)? };
     if range.first < range.last { Ok(range) } else { Err(format!("{text:?} has no run, must rise")) }
+}
+
+impl Arguments {
+    fn threads(&self) -> Option<NonZeroUsize> {
+        self.threads.and_then(NonZeroUsize::new)
+    }
 }
 
 /// A part of a campaign, as `--shard` names it.
@@ -181,6 +187,13 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return list(arguments, &campaign, range);
     }
     if let Some(path) = &arguments.pack {
+        // What --pack wrote before may be written again, and nothing else.
+        if path.exists() && std::fs::read(path).map_or(true, |bytes| !bytes.starts_with(b"{\n  \"version\""))
+        {
+            let message =
+                format!("{} is there already and is no packed campaign; give another name", path.display());
+            return Err(Error::configuration("--pack", message));
+        }
         whole::write(path, campaign.packed()?)?;
         output::result(&format!("written: {}", path.display()));
         return Ok(ExitCode::SUCCESS);
@@ -203,7 +216,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     // Run.
     let all = runs.as_ref().map_or(campaign.runs(), |runs| runs.end - runs.start);
     let progress = if arguments.join.is_empty() {
-        let options = Options { output: output.clone(), runs: runs.clone(), threads: arguments.threads };
+        let options = Options { output: output.clone(), runs: runs.clone(), threads: arguments.threads() };
         let counter = Counter::new("runs", 0, all);
         campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?
     } else {
@@ -237,7 +250,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         runs: all,
         shard: runs.map(|runs| [runs.start, runs.end]),
         wall_time: seconds,
-        runs_per_second: (progress.done - progress.before) as f64 / seconds.max(1e-9),
+        runs_per_second: if seconds > 0.0 { (progress.done - progress.before) as f64 / seconds } else { 0.0 },
         report: pages,
         summary,
     };
@@ -334,7 +347,7 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
     let output = arguments.output.clone().unwrap_or_else(worst);
     let stop = super::interruption()?;
     let counter = Counter::new("repeats", 0, repeats as u64);
-    let found = campaign::rare(campaign, &output, arguments.threads, repeats, &stop, &|done| {
+    let found = campaign::rare(campaign, &output, arguments.threads(), repeats, &stop, &|done| {
         counter.update(done as u64);
     })?;
     drop(counter);

@@ -629,6 +629,22 @@ fn shards_join_to_the_campaign_of_one_machine() {
         2,
         "--join: begun.parquet is not complete: what is there is in begun.parquet.parts, and the same --shard goes on",
     );
+    // A bit that a disk has changed is seen, or changes nothing.
+    let mut damaged = 0;
+    for k in 0..24 {
+        let mut flipped = bytes.clone();
+        let at = 4 + k * bytes.len() / 60;
+        flipped[at] ^= 1 << (k % 8);
+        workshop.write("flipped.parquet", flipped);
+        let joined = join(&[first, "flipped.parquet", third]);
+        if joined.code == 0 {
+            assert!(workshop.bytes("joined.parquet") == workshop.bytes("whole.parquet"), "byte {at}");
+            fs::remove_file(workshop.path("joined.parquet")).expect("a file");
+        } else {
+            damaged += usize::from(joined.stderr.contains("so it is damaged; make it again"));
+        }
+    }
+    assert!(damaged > 0, "no checksum was compared");
     // Another version, where the text stands in the file.
     let mut other = bytes.clone();
     let key = other.windows(16).position(|w| w == b"punctual.version").expect("the key");
@@ -691,6 +707,9 @@ fn shards_join_to_the_campaign_of_one_machine() {
     );
     shard("0/3").fails_like(2, "invalid value '0/3'", &["K must be from 1 to N"]);
     shard("3").fails_like(2, "invalid value '3'", &["such as 0..100; or K/N, such as 1/8"]);
+    let threads = |number| workshop.punctual(["campaign", "c.toml", "--threads", number]);
+    threads("0").fails_like(2, "invalid value '0'", &["1..=1024"]);
+    threads("1025").fails_like(2, "invalid value '1025'", &["1..=1024"]);
     shard("1/21").fails(2, "--shard: is one of 21 parts, must be of at most 20, the number of runs");
     shard("6..21").fails(2, "--shard: ends at 21, must be at most 20, the number of runs");
 }
@@ -723,6 +742,11 @@ fn a_packed_campaign_needs_no_other_file() {
     let workshop = with_fmus(6, "random");
     workshop.punctual(["campaign", "c.toml"]).success();
     workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
+    // What it wrote it writes again, and nothing else.
+    workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
+    workshop
+        .punctual(["campaign", "c.toml", "--pack", "c.toml"])
+        .fails(2, "--pack: c.toml is there already and is no packed campaign; give another name");
     let packed = workshop.text("c.json");
     let elsewhere = Workshop::new();
     elsewhere.write("c.json", &packed);
@@ -733,6 +757,7 @@ fn a_packed_campaign_needs_no_other_file() {
         elsewhere.punctual(["campaign", "other.json"]).fails_like(2, "other.json: ", &[message]);
     };
     refused(packed.replace("seed = 7", "seed = 8"), "was changed after `--pack` wrote it");
+    refused(packed.replace("\"runs\": 6", "\"runs\": 7"), "was changed after `--pack` wrote it");
     refused(
         packed.replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1),
         "was packed by version 0.0.0 of this program",

@@ -45,6 +45,11 @@ const MISSED: f64 = 4.0;
 const AT_REST: f64 = 1e-6;
 /// Change of a state over a hold that is round-off, as a part of its size.
 pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// How many times a deviation may grow on the way of a plan, and of one that was accepted before: what it begins with is what the
+/// courses of the states miss, far more than round-off.
+const SPREADS: [f64; 2] = [1e4, 1e6];
+/// Part of a state's size by which the plant is moved to see how a deviation grows.
+const ASIDE: f64 = 1e-6;
 /// Number of holds for which a drift at rest has to leave every set where it is.
 const DRIFT: f64 = 1e3;
 /// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
@@ -138,6 +143,8 @@ pub enum Failure {
     },
     /// The plant does not come to rest, or a set moves.
     NoRest,
+    /// A deviation that nobody could measure grows on the way until the plan is lost.
+    Unsteady,
     /// Nothing is promised that could be kept.
     Nothing,
     /// The model is not finite on the way.
@@ -186,9 +193,52 @@ pub(super) struct Walk<'a> {
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
     growth: f64,
+    aside: Aside,
     witness: Witness,
     started: f64,
     grid: Grid,
+}
+
+/// A plant beside that of a roll-out, under the same law.
+struct Aside {
+    /// By how much its state and its input differ.
+    x: Vec<f64>,
+    u: [f64; MAX_INPUTS],
+    path: Vec<Course>,
+    /// How many times the difference has grown since some instant, at most.
+    grown: f64,
+}
+
+impl Aside {
+    /// Beside `x`, in a direction that is none of an axis.
+    fn new(x: &[f64]) -> Self {
+        let away =
+            |(i, x): (u32, &f64)| (1.0 - 2.0 * f64::from(i % 2)) * ASIDE * size_of(*x) / f64::from(1 + i);
+        Self {
+            x: (0_u32..).zip(x).map(away).collect(),
+            u: [0.0; MAX_INPUTS],
+            path: vec![[0.0; COURSE]; x.len()],
+            grown: 1.0,
+        }
+    }
+
+    /// Notes by how much the difference has grown, at `x`, and makes it as small again. Returns that growth.
+    fn note(&mut self, x: &[f64]) -> f64 {
+        let size = self.x.iter().zip(x).fold(0.0, |size: f64, (d, x)| size.max(d.abs() / size_of(*x)));
+        let ratio = size / ASIDE;
+        self.grown = (self.grown * ratio).max(1.0);
+        match ratio > 0.0 && ratio < f64::INFINITY {
+            true => self.x.iter_mut().for_each(|d| *d /= ratio),
+            // What is no number shows in the states soon enough.
+            false => self.x = Self::new(x).x,
+        }
+        self.grown
+    }
+}
+
+/// What a change of a state is small against.
+fn size_of(x: f64) -> f64 {
+    1.0 + x.abs()
 }
 
 impl<'a> Walk<'a> {
@@ -215,6 +265,7 @@ impl<'a> Walk<'a> {
             pieces: 0,
             longest: f64::INFINITY,
             growth: LONGER,
+            aside: Aside::new(x),
             witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
             started: t,
             grid,
@@ -260,8 +311,31 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Holds `u` until `end`, or where samples are even and have come to lie elsewhere until the nearest.
+    /// Holds the input that `law` has here until `end`, or where samples are even and have come to lie elsewhere until the nearest.
+    fn hold_under(&mut self, law: impl Fn(&[f64], &mut [f64]), end: f64) -> Result<(), Failure> {
+        let m = self.model.inputs();
+        let (mut u, mut beside) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
+        law(&self.x, &mut u[..m]);
+        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&self.aside.x)) {
+            *point = x + d;
+        }
+        law(&self.point, &mut beside[..m]);
+        self.aside.u = core::array::from_fn(|i| beside[i] - u[i]);
+        self.hold_until_sample(&u[..m], end)?;
+        let most = match self.strictness {
+            s if s >= 1.0 => SPREADS[0],
+            s if s > 0.0 => SPREADS[1],
+            _ => f64::INFINITY,
+        };
+        if self.aside.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
+    }
+
+    /// Holds `u` until `end` or the nearest sample.
     pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        self.hold_under(|_, held| held.copy_from_slice(u), end)
+    }
+
+    fn hold_until_sample(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         let Grid { period, even } = self.grid;
         let samples = ((end - self.started) / period + 0.5) as u64;
         let sample = self.started + samples as f64 * period;
@@ -313,6 +387,7 @@ impl<'a> Walk<'a> {
         let Integral { state, input } = integral;
         let (rate, mut held) = (u[input], u.to_vec());
         held[input] = 0.0;
+        let aside_rate = core::mem::take(&mut self.aside.u[input]);
         self.witness.rates[state] = self.witness.rates[state].max(rate.abs());
         let period = self.grid.period;
         while self.t < end {
@@ -321,8 +396,11 @@ impl<'a> Walk<'a> {
             let sample = self.started + (passed + 1) as f64 * period;
             let sample = if sample < end - 1e-6 * period { sample } else { end };
             let (from, to) = (self.x[state], self.x[state] + rate * (sample - self.t));
+            let aside = 0.5 * (aside_rate * (sample - self.t));
             self.x[state] = 0.5 * (from + to);
+            self.aside.x[state] += aside;
             self.move_to(&held, sample)?;
+            self.aside.x[state] += aside;
             self.x[state] = to;
             for (i, requirement) in self.requirements.iter().enumerate() {
                 if requirement.is_in_force(sample) {
@@ -371,11 +449,28 @@ impl<'a> Walk<'a> {
             let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
             self.note(i, from, least)
         });
+        self.move_aside(u, &path, dt);
         for (x, c) in self.x.iter_mut().zip(&path) {
             *x = at(c, dt);
         }
         (self.t, self.path, self.over) = (end, path, over);
         met
+    }
+
+    /// Moves the plant aside on by `dt` s, as that on `path` under `u` is.
+    fn move_aside(&mut self, u: &[f64], path: &[Course], dt: f64) {
+        let Aside { x: aside, u: more, path: beside, .. } = &mut self.aside;
+        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&*aside)) {
+            *point = x + d;
+        }
+        let mut held = [0.0; MAX_INPUTS];
+        for (held, (u, more)) in held.iter_mut().zip(u.iter().zip(&*more)) {
+            *held = u + more;
+        }
+        self.model.plant.path(&self.point, &held[..u.len()], beside);
+        for (d, (there, here)) in aside.iter_mut().zip(beside.iter().zip(path)) {
+            *d = at(there, dt) - at(here, dt);
+        }
     }
 
     /// Whether the courses of the states are a solution until `dt` s after their begin. Leaves what encloses them.
@@ -471,20 +566,18 @@ impl<'a> Walk<'a> {
 
     /// Follows the rest of `reference`.
     pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
-        let mut u = vec![0.0; self.model.inputs()];
         while let Some(k) = reference.hold_at(self.t, self.grid.slack()) {
-            reference.input(&self.model, k, self.t, &self.x, &mut u);
-            self.hold_until(&u, reference.times[k + 1])?;
+            let (model, t) = (self.model, self.t);
+            self.hold_under(|x, u| reference.input(&model, k, t, x, u), reference.times[k + 1])?;
         }
         Ok(())
     }
 
     /// Holds the input of `reference` here until `end`.
     pub(super) fn follow_until(&mut self, reference: &Reference, end: f64) -> Result<(), Failure> {
-        let mut u = vec![0.0; self.model.inputs()];
         let Some(k) = reference.hold_at(self.t, self.grid.slack()) else { return Ok(()) };
-        reference.input(&self.model, k, self.t, &self.x, &mut u);
-        self.hold_until(&u, end)
+        let (model, t) = (self.model, self.t);
+        self.hold_under(|x, u| reference.input(&model, k, t, x, u), end)
     }
 
     /// Brakes until the plant is at rest where it can stay for ever.
@@ -501,7 +594,8 @@ impl<'a> Walk<'a> {
                 }
                 false => Ok(false),
             };
-            self.hold_until(&u, self.t + hold)?;
+            let model = self.model;
+            self.hold_under(|x, u| brake.input(&model, x, u), self.t + hold)?;
             match rest {
                 Ok(true) => return Ok(Witness { until: f64::INFINITY, ..self.witness }),
                 Ok(false) => {}

@@ -663,6 +663,9 @@ impl FilterConfiguration {
                     .to_owned()
             }
             Failure::NoRest => "no plan reaches as far as plan_horizon".to_owned(),
+            Failure::Unsteady => "the plant is so unstable on the way that a deviation too small to measure grows until the plan \
+                                  is lost; wider bounds or a start farther from where they end would hold it"
+                .to_owned(),
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
             Failure::TooLong => {
                 "there are too many samples until the deadline, or too long a step".to_owned()

@@ -67,7 +67,7 @@ impl<'c> Number<'c> {
     }
 
     /// A function given by its value and derivatives, of the orders 0, 1, …, at [`Self::value`]. A relative
-    /// degree of n needs n + 3 of them.
+    /// degree of n needs n + 3 of them, plans ten. Between the instants at which a plan looks, nothing is known of it.
     pub fn function(self, derivatives: &[f64]) -> Self {
         let away = self - self.value();
         let mut factorial: f64 = (1..derivatives.len()).map(|k| k as f64).product();
