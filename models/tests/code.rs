@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use punctual_core::lie::{Ahead, DerivativeSource, Derivatives, Direction};
+use punctual_core::interval::Interval;
+use punctual_core::lie::{Ahead, COURSE, CourseOver, DerivativeSource, Derivatives, Direction};
 use punctual_models::Model;
 use punctual_models::evaluated::{Calculator, Code, CodeModel, Dimensions, LITERAL, Number, OPERATIONS};
 
@@ -110,6 +111,36 @@ const STATES: [[f64; 4]; 3] = [[1.0, 2.0, 0.3, 4.0], [30.0, -5.0, -2.0, -0.5], [
 fn code_gives_the_bits_of_expressions() {
     compare(sources(disc, DISC, 2));
     compare(sources(shared, SHARED, 1));
+}
+
+/// One value of what is known as many is no enclosure: asked for it, a model has none.
+#[test]
+fn what_looks_at_plain_values_encloses_nothing() {
+    let looking: Plant = |c, x, f, g| {
+        unicycle(c, x, f, g);
+        f[3] = c.apply(0, 0, 0, if c.value(x[1]) < 0.0 { -0.0 } else { 0.0 });
+    };
+    let of = |plant, barrier, n| {
+        let model = made(plant, barrier).and_then(|m| m.barrier(0).map_err(|e| e.to_string()));
+        model.expect("a barrier").source(n).expect("in range")
+    };
+    let path = |half: f64| -> Vec<CourseOver> {
+        let over = |x: &f64| {
+            let mut course = [Interval::from(0.0); COURSE];
+            course[0] = Interval::new(x - half, x + half);
+            course
+        };
+        STATES[0].iter().map(over).collect()
+    };
+    let encloses = |source: &dyn DerivativeSource, half: f64| {
+        let (model, mut rates) = (source.predict().expect("a model"), [[Interval::ALL; COURSE - 1]; 4]);
+        let h = model.value_over(Interval::from(0.0), &path(half));
+        [model.rates_over(&path(half), &[1.0, 0.5], 1, &mut rates), h.is_some()]
+    };
+    assert_eq!(encloses(&*of(unicycle, shared, 1), 0.1), [true, true]);
+    assert_eq!(encloses(&*of(unicycle, disc, 2), 0.1), [true, false]);
+    assert_eq!(encloses(&*of(looking, shared, 1), 0.1), [false, true]);
+    assert_eq!(encloses(&*of(looking, disc, 2), 0.0), [true, true]);
 }
 
 fn compare([code, expressions]: [Box<dyn DerivativeSource>; 2]) {
