@@ -232,11 +232,11 @@ impl Distribution {
             Self::Uniform { min, max } => (min + u * (max - min)).clamp(*min, *max),
             Self::LogUniform { min, max } => {
                 let ratio = max / min;
-                let decades = match ratio.is_finite() {
+                let span = match ratio.is_finite() {
                     true => elementary::ln(ratio),
                     false => elementary::ln(*max) - elementary::ln(*min),
                 };
-                elementary::exp(elementary::ln(*min) + u * decades).clamp(*min, *max)
+                elementary::exp(elementary::ln(*min) + u * span).clamp(*min, *max)
             }
             Self::Normal { mean, deviation, min, max } => {
                 let [low, high] = [min, max].map(|end| (end - mean) / deviation);

@@ -330,11 +330,12 @@ impl<'a> Walk<'a> {
         if self.aside.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
     }
 
-    /// Holds `u` until `end` or the nearest sample.
+    /// The same of `u`, whatever the state is.
     pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         self.hold_under(|_, held| held.copy_from_slice(u), end)
     }
 
+    /// Holds `u` until `end` or the nearest sample, and notes it.
     fn hold_until_sample(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         let Grid { period, even } = self.grid;
         let samples = ((end - self.started) / period + 0.5) as u64;
@@ -449,7 +450,10 @@ impl<'a> Walk<'a> {
             let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
             self.note(i, from, least)
         });
-        self.move_aside(u, &path, dt);
+        // What has failed is not followed further.
+        if met.is_ok() {
+            self.move_aside(u, &path, dt);
+        }
         for (x, c) in self.x.iter_mut().zip(&path) {
             *x = at(c, dt);
         }
@@ -905,7 +909,7 @@ fn allowed(over: Interval) -> f64 {
 
 /// The size of a state, by which the last terms of its course are measured.
 fn size(course: &Course) -> f64 {
-    1.0 + course[0].abs()
+    size_of(course[0])
 }
 
 #[cfg(test)]
