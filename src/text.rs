@@ -6,11 +6,12 @@ use std::path::Path;
 use crate::error::Error;
 
 /// How files begin that are no text, or are in another encoding; and what is said of them.
-const OTHERS: [(&[u8], &str); 3] = [
+const OTHERS: [(&[u8], &str); 4] = [
     (
         b"PK\x03\x04",
         "it is an archive, such as an FMU, and no text; `punctual inspect` and `punctual validate` take FMUs",
     ),
+    (b"PAR1", "it is a Parquet file and no text; `punctual replay` takes one that `punctual campaign` wrote"),
     (b"\xff\xfe", "it is in UTF-16, must be in UTF-8; editors save it so"),
     (b"\xfe\xff", "it is in UTF-16, must be in UTF-8; editors save it so"),
 ];

@@ -51,8 +51,8 @@ def campaign(
     """
     path = Path(file)
     result = path.with_suffix(".parquet") if output is None else Path(output)
-    if batch is not None and not 1 <= batch <= _MOST:
-        raise Error(f"batch: is {batch}, must be from 1 to {_MOST}")
+    if batch is not None and not (isinstance(batch, int) and 1 <= batch <= _MOST):
+        raise Error(f"batch: is {batch!r}, must be a whole number from 1 to {_MOST}")
     folder = Path(f"{result}.shards")
     # One that is complete is only summed up; one of another campaign is refused.
     if client is None or result.exists():
@@ -68,7 +68,7 @@ def campaign(
     with _Kept(path, folder) as kept:
         before = kept.done
         try:
-            with nullcontext(client) if isinstance(client, Client) else Client(client) as cluster:
+            with nullcontext(client) if isinstance(client, Client) else _connected(client) as cluster:
                 _spread(cluster, kept, batch)
         except (CancelledError, OSError) as error:
             raise Error(f"client: the scheduler was lost: {type(error).__name__}; {kept.told()}") from error
@@ -78,6 +78,16 @@ def campaign(
     report: dict[str, Any] = json.loads(joined)
     rate = (kept.runs - before) / seconds
     return report | {"campaign": str(path), "wall_time": seconds, "runs_per_second": rate}
+
+
+def _connected(address: str) -> _Client:
+    from distributed import Client
+
+    try:
+        return Client(address)
+    except (OSError, ValueError) as error:
+        example = "an address is such as tcp://head:8786"
+        raise Error(f"client: no scheduler answers at {address}: {error}; {example}") from error
 
 
 class _Kept:

@@ -186,14 +186,20 @@ impl Campaign {
         if source_text.starts_with('{') {
             return Self::unpacked(&source_text, path);
         }
-        let file: File = read_toml(&source_text)
-            .map_err(|e| Error::from(FileKind::Campaign.instead(&source_text).unwrap_or(e)).in_file(path))?;
+        let file: File = read_toml(&source_text).map_err(|e| {
+            let why = FileKind::Campaign.instead(&source_text).or_else(|| unquoted(&source_text));
+            Error::from(why.unwrap_or(e)).in_file(path)
+        })?;
         let system_path = match &file.system {
             SystemSource::File(name) => path.with_file_name(name),
             SystemSource::Inline(_) => path.to_owned(),
         };
         let (system, system_text) = match file.system {
             SystemSource::File(_) => {
+                if !system_path.exists() {
+                    let message = format!("there is no file {}", system_path.display());
+                    return Err(Error::configuration("system", message).in_file(path));
+                }
                 let text = text::read(&system_path)?;
                 if FileKind::of(&text) == Some(FileKind::One) {
                     let own = |e: Error| e.in_file(&system_path);
@@ -307,16 +313,19 @@ impl Campaign {
             let settable = matches!(variable.causality, Causality::Parameter | Causality::Input);
             if !settable || variable.of != DataType::Float64 {
                 let (causality, kind) = (variable.causality.as_str(), variable.type_name);
-                let message =
-                    format!("is a {kind} {causality}; only Real parameters and inputs can be varied");
+                let message = format!(
+                    "is of type {kind} and causality {causality}; only Real parameters and inputs can be varied"
+                );
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
             if variable.count > 1 {
                 let message = "is an element of an array; only scalars can be varied";
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
-            if connected.iter().any(|link| link.to == port) {
-                let message = "is a connected input, whose values come from there";
+            if let Some(link) = connected.iter().find(|link| link.to == port) {
+                let from = &system.components()[link.from.component].name;
+                let output = &refer[link.from.component].variables[link.from.variable].name;
+                let message = format!("is an input whose values come from {from}.{output}");
                 return Err(in_file(ConfigurationError::new(field, message)));
             }
             let (min, max) = variable.range;
@@ -525,6 +534,24 @@ impl Campaign {
         };
         simulation.set_courses(self.varied.iter().filter_map(course).collect());
     }
+}
+
+/// The refusal of a name under `vary` that has dots and no quotes, so that TOML takes it for tables in one another.
+fn unquoted(text: &str) -> Option<ConfigurationError> {
+    let file: serde_json::Value = read_toml(text).ok()?;
+    for (first, mut found) in file.get("vary")?.as_object()? {
+        let mut name = first.clone();
+        while let Some(table) = found.as_object().filter(|table| !table.contains_key("distribution")) {
+            let (key, inner) = table.iter().next()?;
+            name += &format!(".{key}");
+            found = inner;
+        }
+        if name != *first && found.is_object() {
+            let message = format!("a name with dots is written in quotes, [vary.{name:?}]");
+            return Some(ConfigurationError::new(format!("vary.{name}"), message));
+        }
+    }
+    None
 }
 
 /// The whole number that `ratio` is but for round-off.

@@ -17,15 +17,15 @@ struct Part {
 }
 
 /// Joins the parts in `files` to `output`, byte for byte what one machine would have written there. A folder stands
-/// for all files in it that end in `.parquet`. An `output` that is complete stays.
+/// for all files in it that end in `.parquet`, but for whole results of this campaign. An `output` that is complete stays.
 ///
 /// # Errors
 ///
 /// A part that is missing, there twice, not whole, or of another campaign; a file that cannot be read or written.
 pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(), Error> {
-    let measures = Measures::new(campaign);
+    let measures = Measures::new(campaign)?;
     let mut parts = Vec::new();
-    for path in listed(files)? {
+    for path in listed(campaign, files)? {
         parts.push(checked(campaign, path)?);
     }
     parts.sort_by_key(|part| (part.runs.start, part.runs.end));
@@ -68,7 +68,7 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
     let written = || {
         let mut writer = Writer::create(&folder.unfinished(), measures.columns(), &metadata)?;
         for Part { runs, path } in &parts {
-            runner::copy(&Reader::open(path)?, path, runs, &measures, &mut writer)?;
+            runner::each_row(&Reader::open(path)?, path, runs, &measures, |row| writer.push(row))?;
         }
         writer.finish()
     };
@@ -81,7 +81,15 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
 }
 
 /// The files that are meant by `files`.
-fn listed(files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+fn listed(campaign: &Campaign, files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    // What cannot be read is told of as a part.
+    let is_result = |file: &Path| {
+        runner::recorded(file).is_ok_and(|(reader, source)| {
+            source == *campaign.source()
+                && runner::runs(&reader) == (0..campaign.runs())
+                && !runner::is_part(&reader)
+        })
+    };
     let mut all = Vec::new();
     for path in files {
         if !path.is_dir() {
@@ -91,7 +99,7 @@ fn listed(files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
         let problem = |e| Error::io("read", path, e);
         for entry in fs::read_dir(path).map_err(problem)? {
             let file = entry.map_err(problem)?.path();
-            if file.extension().is_some_and(|ending| ending == "parquet") {
+            if file.extension().is_some_and(|ending| ending == "parquet") && !is_result(&file) {
                 all.push(file);
             }
         }
@@ -109,6 +117,9 @@ fn checked(campaign: &Campaign, path: PathBuf) -> Result<Part, Error> {
             unfinished.display()
         );
         return Err(refused(message));
+    }
+    if !path.exists() {
+        return Err(refused("is not there".to_owned()));
     }
     let (reader, source) = runner::recorded(&path).map_err(|e| {
         refused(format!("is no part of a campaign, or only half of one: {e}; make it again with --shard"))

@@ -1,5 +1,7 @@
 //! The row of a run, from the values at the communication points and from its promises.
 
+use std::collections::HashSet;
+
 use punctual_core::filter::{Standing, Status};
 use punctual_fmu::configuration::Configuration;
 
@@ -44,7 +46,11 @@ struct Seen {
 
 impl Measures {
     /// Measures for the runs of `campaign`.
-    pub fn new(campaign: &Campaign) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// Names of a filter that make two columns of one name.
+    pub fn new(campaign: &Campaign) -> Result<Self, Error> {
         let mut filters = Vec::new();
         for (c, part) in campaign.models().iter().enumerate() {
             let Some(Configuration::Filter(filter)) = part.configuration() else { continue };
@@ -74,7 +80,15 @@ impl Measures {
             });
         }
         let columns = columns(campaign, &filters);
-        Self { filters, success: campaign.success(), columns }
+        let mut names = HashSet::new();
+        if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_str())) {
+            let message = format!(
+                "two columns of a row are called {}; call its barrier or its input otherwise",
+                twice.name
+            );
+            return Err(Error::configuration("component", message));
+        }
+        Ok(Self { filters, success: campaign.success(), columns })
     }
 
     /// The columns of a row.

@@ -93,7 +93,7 @@ pub fn rare(
     tell: &(dyn Fn(usize) + Sync),
 ) -> Result<Ended, Error> {
     check(campaign, output)?;
-    let measures = Measures::new(campaign);
+    let measures = Measures::new(campaign)?;
     let margins = Margins::new(&measures)?;
     let crew = Crew::new(campaign, &measures, threads)?;
     // After a stop all are alike, which ends the pilot and costs a repeat nothing.

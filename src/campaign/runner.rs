@@ -67,6 +67,8 @@ pub struct Progress {
     pub done: u64,
     /// Number of these runs that were there before.
     pub before: u64,
+    /// Number of runs that were made again, since the file of their rows was damaged.
+    pub again: u64,
     /// Wall time of the others.
     pub wall_time: Duration,
 }
@@ -119,6 +121,11 @@ pub fn version(reader: &Reader) -> &str {
     reader.text(key::VERSION).unwrap_or("unknown")
 }
 
+/// Whether the file holds a part of a campaign.
+pub(super) fn is_part(reader: &Reader) -> bool {
+    reader.text(key::RUNS).is_some()
+}
+
 /// The numbers of the runs in a file: those of its part, or all from 0 on.
 pub fn runs(reader: &Reader) -> Range<u64> {
     let part = reader.text(key::RUNS).and_then(|text| text.split_once(".."));
@@ -131,8 +138,8 @@ pub(super) struct Parts {
     folder: PathBuf,
     /// The fingerprint of the campaign, for a part with its runs.
     identity: String,
-    /// The first run that belongs here.
-    first: u64,
+    /// The runs that belong here.
+    runs: Range<u64>,
     /// Held as long as this lives.
     lock: File,
 }
@@ -159,8 +166,8 @@ impl Parts {
             }
             Err(TryLockError::Error(e)) => return Err(Error::io("lock", &lock_path, e)),
         }
-        let first = runs.map_or(0, |runs| runs.start);
-        let parts = Self { folder, identity, first, lock };
+        let runs = runs.cloned().unwrap_or(0..campaign.runs());
+        let parts = Self { folder, identity, runs, lock };
         let identity = parts.folder.join("fingerprint");
         match fs::read_to_string(&identity) {
             Ok(found) if found == parts.identity => {}
@@ -198,34 +205,53 @@ impl Parts {
         Ok(())
     }
 
-    /// The segments that are there, without a gap from the first run on.
+    /// The segments that are there. None of them has a run of another.
     fn segments(&self) -> Result<Segments, Error> {
         let problem = |e| Error::io("read", &self.folder, e);
-        let mut found = Segments::new();
+        let mut found = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(problem)? {
             let path = entry.map_err(problem)?.path();
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             let numbers = name.strip_prefix("runs-").and_then(|rest| rest.strip_suffix(".parquet"));
             let Some((first, next)) = numbers.and_then(|numbers| numbers.split_once('-')) else { continue };
             if let (Ok(first), Ok(next)) = (first.parse::<u64>(), next.parse::<u64>()) {
-                found.insert(first, (next.saturating_sub(first), path));
+                found.push((first, next, path));
             }
         }
-        let mut done = self.first;
-        for (first, (count, path)) in &found {
-            if *first != done {
-                let message = format!("the runs {done} to {} are missing before it; remove it", first - 1);
+        found.sort();
+        let mut due = self.runs.start;
+        for (first, next, path) in &found {
+            if *first < due || *first >= *next || *next > self.runs.end {
+                let message =
+                    format!("its runs {first}..{next} are there twice, or none of those to make; remove it");
                 return Err(Error::io("use", path, std::io::Error::other(message)));
             }
-            done += count;
+            due = *next;
         }
-        Ok(found)
+        Ok(found.into_iter().map(|(first, next, path)| (first, (next - first, path))).collect())
+    }
+
+    /// The segments that are whole, and the number of runs in the others, which are removed.
+    fn whole_segments(&self, measures: &Measures) -> Result<(Segments, u64), Error> {
+        let (mut whole, mut damaged) = (Segments::new(), 0);
+        for (first, (count, path)) in self.segments()? {
+            // What cannot be opened may be whole.
+            File::open(&path).map_err(|e| Error::io("read", &path, e))?;
+            let runs = first..first + count;
+            let rows = Reader::open(&path).and_then(|r| each_row(&r, &path, &runs, measures, |_| Ok(())));
+            if rows.is_ok() {
+                whole.insert(first, (count, path));
+            } else {
+                fs::remove_file(&path).map_err(|e| Error::io("remove", &path, e))?;
+                damaged += count;
+            }
+        }
+        Ok((whole, damaged))
     }
 
     /// Removes the folder with all its files.
     pub(super) fn remove(self) -> Result<(), Error> {
-        // The last goes first, so that the rest of an interrupted removal has no gap.
-        for (_, path) in self.segments()?.values().rev() {
+        for (_, path) in self.segments()?.values() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
         }
         // On Windows an open file keeps its folder.
@@ -268,7 +294,11 @@ pub(super) fn complete(campaign: &Campaign, output: &Path, wanted_runs: &Range<u
     if !output.exists() {
         return Ok(false);
     }
-    let (reader, _) = recorded(output)?;
+    let (reader, _) = recorded(output).map_err(|e| {
+        let message =
+            format!("{} is there already: {e}; remove it, or give another output", output.display());
+        Error::configuration("--output", message)
+    })?;
     let (found, wanted) = (fingerprint(&reader), campaign.source().fingerprint());
     if found != wanted {
         return Err(other_campaign(output, found, &wanted));
@@ -293,8 +323,8 @@ pub(super) fn fingerprint(reader: &Reader) -> &str {
     reader.text(key::FINGERPRINT).unwrap_or("none")
 }
 
-/// Makes the runs that are not there yet. Ends early once `stop` is set; then it keeps all complete runs with no
-/// gap before them. `tell` gets the number of runs made so far.
+/// Makes the runs that are not there yet. Ends early once `stop` is set; then it keeps what it has made in order.
+/// `tell` gets the number of runs made so far.
 ///
 /// # Errors
 ///
@@ -312,26 +342,30 @@ pub fn run(
             // The last process was killed between its last two steps.
             Parts::open(&options.output, campaign, options.runs.as_ref())?.remove()?;
         }
-        return Ok(Progress { done: all, before: all, wall_time: Duration::ZERO });
+        return Ok(Progress { done: all, before: all, again: 0, wall_time: Duration::ZERO });
     }
-    let measures = Measures::new(campaign);
+    let measures = Measures::new(campaign)?;
     let parts = Parts::open(&options.output, campaign, options.runs.as_ref())?;
-    let mut segments = parts.segments()?;
+    let (mut segments, again) = parts.whole_segments(&measures)?;
     let before: u64 = segments.values().map(|(count, _)| count).sum();
     let begin = Instant::now();
     if before < all {
         let crew = Crew::new(campaign, &measures, options.threads)?;
-        crew.work(runs.start + before..runs.end, stop, &|next| tell(next - runs.start), |first, rows| {
-            let next = first + rows.len() as u64;
-            let path = parts.folder.join(format!("runs-{first:016}-{next:016}.parquet"));
-            let count = next - first;
-            let mut writer = Writer::create(&parts.unfinished(), measures.columns(), &[])?;
-            rows.into_iter().try_for_each(|row| writer.push(row))?;
-            writer.finish()?;
-            parts.settle(&parts.unfinished(), &path)?;
-            segments.insert(first, (count, path));
-            Ok(())
-        })?;
+        let mut done = before;
+        for gap in gaps(&segments, &runs) {
+            let told = |made| tell(done + made);
+            let made = crew.work(gap, stop, &told, |first, rows| {
+                let next = first + rows.len() as u64;
+                let path = parts.folder.join(format!("runs-{first:016}-{next:016}.parquet"));
+                let mut writer = Writer::create(&parts.unfinished(), measures.columns(), &[])?;
+                rows.into_iter().try_for_each(|row| writer.push(row))?;
+                writer.finish()?;
+                parts.settle(&parts.unfinished(), &path)?;
+                segments.insert(first, (next - first, path));
+                Ok(())
+            })?;
+            done += made;
+        }
     }
     let wall_time = begin.elapsed();
     let done: u64 = segments.values().map(|(count, _)| count).sum();
@@ -340,7 +374,21 @@ pub fn run(
         parts.settle(&parts.unfinished(), &options.output)?;
         parts.remove()?;
     }
-    Ok(Progress { done, before, wall_time })
+    Ok(Progress { done, before, again, wall_time })
+}
+
+/// The parts of `runs` that are in none of the segments.
+fn gaps(segments: &Segments, runs: &Range<u64>) -> Vec<Range<u64>> {
+    let ends = segments.iter().map(|(first, (count, _))| (*first, first + count));
+    let mut due = runs.start;
+    let mut gaps = Vec::new();
+    for (first, next) in ends.chain([(runs.end, runs.end)]) {
+        if due < first {
+            gaps.push(due..first);
+        }
+        due = next;
+    }
+    gaps
 }
 
 /// The rows of an interrupted campaign that are kept beside `output`; `None` where there are none.
@@ -354,7 +402,7 @@ pub fn kept(campaign: &Campaign, output: &Path) -> Result<Option<Reader>, Error>
     if segments.is_empty() {
         return Ok(None);
     }
-    gather(campaign, None, &Measures::new(campaign), &parts, &segments)?;
+    gather(campaign, None, &Measures::new(campaign)?, &parts, &segments)?;
     Reader::open(&parts.unfinished()).map(Some)
 }
 
@@ -369,23 +417,23 @@ fn gather(
     let metadata = metadata(campaign.source(), measures, runs);
     let mut writer = Writer::create(&parts.unfinished(), measures.columns(), &metadata)?;
     for (first, (count, path)) in segments {
-        copy(&Reader::open(path)?, path, &(*first..first + count), measures, &mut writer)?;
+        each_row(&Reader::open(path)?, path, &(*first..first + count), measures, |row| writer.push(row))?;
     }
     writer.finish()
 }
 
-/// Copies the rows of the file at `path` to `writer`, a group at a time, if they are those of `runs`.
-pub(super) fn copy(
+/// Gives `take` the rows of the file at `path`, a group at a time. They must be those of `runs`, and as they were written.
+pub(super) fn each_row(
     reader: &Reader,
     path: &Path,
     runs: &Range<u64>,
     measures: &Measures,
-    writer: &mut Writer,
+    mut take: impl FnMut(Row) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let wrong = |message: String| Error::io("use", path, std::io::Error::other(message));
     if reader.rows() != runs.end - runs.start {
         let message =
-            format!("it has {} rows, must have {}; remove it", reader.rows(), runs.end - runs.start);
+            format!("it has {} rows, must have {}; make it again", reader.rows(), runs.end - runs.start);
         return Err(wrong(message));
     }
     let (mut due, mut checksum) = (runs.start, Checksum::default());
@@ -393,10 +441,10 @@ pub(super) fn copy(
         for row in reader.group(group, measures.columns())? {
             match row.first() {
                 Some(Cell::Count(run)) if *run == due => due += 1,
-                _ => return Err(wrong(format!("run {due} is not in its place; remove it"))),
+                _ => return Err(wrong(format!("run {due} is not in its place; make it again"))),
             }
             checksum.add(&row);
-            writer.push(row)?;
+            take(row)?;
         }
     }
     match reader.is_whole(&checksum) {
@@ -437,7 +485,11 @@ impl<'a> Crew<'a> {
         let pool = ThreadPoolBuilder::new()
             .num_threads(if one { 1 } else { threads.map_or(0, NonZeroUsize::get) })
             .build()
-            .map_err(|e| Error::configuration("--threads", e.to_string()))?;
+            .map_err(|e| {
+                let message =
+                    format!("the system refuses so many threads: {e}; give fewer, such as --threads 1");
+                Error::configuration("--threads", message)
+            })?;
         let crew = Self { campaign, measures, pool };
         let made = crew.pool.broadcast(|_| {
             SIMULATION.set(Some(campaign.simulation(&system)?));
@@ -447,16 +499,16 @@ impl<'a> Crew<'a> {
         Ok(crew)
     }
 
-    /// Makes `runs`, and gives their rows to `keep` in order, some at a time. `tell` gets the number after the last
-    /// one made.
+    /// Makes `runs`, and gives their rows to `keep` in order, some at a time. `tell` gets the number of those made.
+    /// Returns the number of those kept.
     fn work(
         &self,
         runs: Range<u64>,
         stop: &AtomicBool,
         tell: &(dyn Fn(u64) + Sync),
         mut keep: impl FnMut(u64, Vec<Row>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let done = AtomicU64::new(runs.start);
+    ) -> Result<u64, Error> {
+        let done = AtomicU64::new(0);
         let mut next = runs.start;
         let threads = self.pool.current_num_threads();
         let mut size = threads;
@@ -482,7 +534,7 @@ impl<'a> Crew<'a> {
                 keep(first, rows)?;
             }
         }
-        Ok(())
+        Ok(next - runs.start)
     }
 
     /// Makes run `number` from `choice`, on a thread of the pool.

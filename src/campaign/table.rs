@@ -274,7 +274,10 @@ impl Reader {
     /// The file cannot be read or is no Parquet file.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
-        let inner = SerializedFileReader::new(file).map_err(broken("read", path))?;
+        let inner = SerializedFileReader::new(file).map_err(|e| {
+            let message = format!("it is no Parquet file, or only half of one ({e})");
+            Error::io("read", path, std::io::Error::other(message))
+        })?;
         Ok(Self { path: path.to_owned(), inner })
     }
 

@@ -183,6 +183,7 @@ struct RareReport {
 /// A campaign that cannot be used, files of another one in the way, a file that cannot be read or written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let campaign = Campaign::read(&arguments.campaign)?;
+    let measures = Measures::new(&campaign)?;
     if let Some(range) = arguments.list {
         return list(arguments, &campaign, range);
     }
@@ -221,7 +222,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         campaign::run(&campaign, &options, &stop, &|done| counter.update(done))?
     } else {
         campaign::join(&campaign, &arguments.join, &output)?;
-        Progress { done: all, before: 0, wall_time: Duration::ZERO }
+        Progress { done: all, before: 0, again: 0, wall_time: Duration::ZERO }
     };
 
     // Sum up.
@@ -234,7 +235,6 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         _ => None,
     };
     if let Some(reader) = reader {
-        let measures = Measures::new(&campaign);
         let found = campaign::summary(&reader, &measures, arguments.worst)?;
         if arguments.report {
             pages = report_files(&arguments.campaign, &output, &campaign, &measures, &reader, &found)?;
@@ -257,6 +257,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     // Tell.
     if progress.before > 0 {
         output::note(&format!("note: {} of {all} runs were there already", progress.before));
+    }
+    if progress.again > 0 {
+        output::note(&format!(
+            "note: the kept rows of {} runs were damaged; these were made again",
+            progress.again
+        ));
     }
     if arguments.json {
         output::json(&report);

@@ -74,7 +74,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = format!("is {run}, must be from {} to {}", runs.start, runs.end.saturating_sub(1));
         return Err(Error::configuration("--run", message));
     }
-    let measures = Measures::new(&campaign);
+    let measures = Measures::new(&campaign)?;
     // Rows are in order, in groups of equal size.
     let place = run - runs.start;
     let group = usize::try_from(place / GROUP as u64).unwrap_or(usize::MAX);

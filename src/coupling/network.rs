@@ -1,6 +1,8 @@
 //! Resolves a system file against the descriptions of its FMUs. Names become positions, and every error says
 //! which field of the file it comes from. Runs nothing.
 
+use punctual_fmu::configuration::nearest;
+
 use super::graph::{self, Edge};
 use super::starts::{self, Start};
 use super::system::{Component, Picture, System};
@@ -185,7 +187,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A hint at variables whose name ends alike or contains the name given.
+    /// A hint at variables whose name ends alike, or else nearly is the name given.
     fn similar(&self, component: usize, wanted: &str) -> String {
         let tail = wanted.rsplit('.').next().unwrap_or(wanted);
         let found: Vec<_> = self.descriptions[component]
@@ -195,7 +197,12 @@ impl<'a> Resolver<'a> {
             .filter(|name| !tail.is_empty() && name.rsplit('.').next() == Some(tail))
             .take(3)
             .collect();
-        if found.is_empty() { String::new() } else { format!("; did you mean {}?", found.join(" or ")) }
+        if found.is_empty() {
+            let names: Vec<_> =
+                self.descriptions[component].variables.iter().map(|v| v.name.as_str()).collect();
+            return nearest(wanted, &names);
+        }
+        format!("; did you mean {}?", found.join(" or "))
     }
 
     fn expect_causality(&self, field: &str, port: Port, wanted: Causality) -> Result<(), Error> {

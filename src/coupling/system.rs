@@ -504,7 +504,7 @@ impl System {
         let steps = (stop_time - start_time) / step;
         ensure(steps <= super::grid::MAX_STEPS, "experiment.step", || {
             format!(
-                "is {step} s, which makes {steps:.3e} steps; at most {:e} are allowed",
+                "is {step:?} s, which makes {steps:.3e} steps up to stop_time = {stop_time:?} s; at most {:e} are allowed",
                 super::grid::MAX_STEPS
             )
         })?;
@@ -640,11 +640,7 @@ signals = ["a.y"]
             ("stop_time = 2.0", "stop_time = nan", "experiment.stop_time: is NaN; must be finite"),
             ("stop_time = 2.0", "", "experiment.stop_time: missing, it must be given"),
             ("step = 0.5", "step = -0.5", "experiment.step: is -0.5 s; must be > 0"),
-            (
-                "step = 0.5",
-                "step = 1e-30",
-                "experiment.step: is 0.000000000000000000000000000001 s, which makes",
-            ),
+            ("step = 0.5", "step = 1e-30", "experiment.step: is 1e-30 s, which makes"),
             ("step = 0.5", "step = 0.5\nsteps = 1", "experiment.steps: is no key here (did you mean step?)"),
             (
                 "step = 0.5",

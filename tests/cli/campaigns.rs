@@ -58,7 +58,7 @@ fn workshop(runs: u64, sampling: &str) -> Workshop {
 /// All rows of a result, and the names of its columns.
 pub(crate) fn rows(path: &Path) -> (Vec<String>, Vec<Row>) {
     let (reader, source) = campaign::recorded(path).expect("a result");
-    let measures = Measures::new(&Campaign::of(source, path, path).expect("its campaign"));
+    let measures = Measures::new(&Campaign::of(source, path, path).expect("its campaign")).expect("names");
     let rows = (0..reader.groups()).flat_map(|g| reader.group(g, measures.columns()).expect("a group"));
     (measures.columns().iter().map(|c| c.name.clone()).collect(), rows.collect())
 }
@@ -269,6 +269,61 @@ fn a_campaign_can_be_ended_at_any_point() {
     assert_eq!((worst.len(), &worst[0]["success"]), (10, &false.into()));
 }
 
+/// Rows that are kept and damaged, or gone, are made again, and no others.
+#[test]
+fn what_is_damaged_among_the_rows_kept_is_made_again() {
+    let workshop = workshop(20, "random");
+    workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet"]).success();
+    let (reader, _) = campaign::recorded(&workshop.path("whole.parquet")).expect("a result");
+    let segment = |first: u64, next: u64| {
+        let (runs, part) = (format!("{first}..{next}"), format!("{first}-{next}"));
+        workshop.punctual(["campaign", "c.toml", "--shard", &runs, "-o", &part]).success();
+        let name = format!("cut.parquet.parts/runs-{first:016}-{next:016}.parquet");
+        fs::rename(workshop.path(&part), workshop.path(&name)).expect("a file");
+        name
+    };
+    let resumed = || workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet"]);
+    let begin = || {
+        fs::create_dir(workshop.path("cut.parquet.parts")).expect("a folder");
+        let fingerprint = reader.text("punctual.fingerprint").expect("one");
+        workshop.write("cut.parquet.parts/fingerprint", fingerprint);
+    };
+    let is_whole = || {
+        assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+        assert!(!workshop.path("cut.parquet.parts").exists());
+        fs::remove_file(workshop.path("cut.parquet")).expect("a file");
+    };
+    // Of 20 runs 3 are in half of a file, 4 in one with another bit, 5 in none. 8 are kept.
+    begin();
+    segment(0, 2);
+    let (half, flipped) = (segment(2, 5), segment(5, 9));
+    segment(14, 20);
+    let bytes = workshop.bytes(&half);
+    workshop.write(&half, &bytes[..bytes.len() / 2]);
+    let mut bytes = workshop.bytes(&flipped);
+    // Of the seed of a run: a random number, which stands there as it is.
+    let (_, rows) = rows(&workshop.path("whole.parquet"));
+    let Cell::Count(seed) = rows[6][1] else { panic!("a seed is a count") };
+    let at = bytes.windows(8).position(|w| w == seed.to_le_bytes()).expect("the seed of run 6");
+    bytes[at] ^= 1;
+    workshop.write(&flipped, bytes);
+    let made = resumed();
+    assert_eq!(
+        made.stderr,
+        "note: 8 of 20 runs were there already\nnote: the kept rows of 7 runs were damaged; these were made again\n"
+    );
+    made.success();
+    is_whole();
+    // A run that is there twice is told.
+    begin();
+    segment(3, 8);
+    let twice = segment(7, 9);
+    resumed().fails_like(2, &format!("cannot use {twice}: "), &["its runs 7..9 are there twice"]);
+    fs::remove_file(workshop.path(&twice)).expect("a file");
+    assert_eq!(resumed().stderr, "note: 5 of 20 runs were there already\n");
+    is_whole();
+}
+
 /// A row that differs from its run is told, with the column.
 #[test]
 fn a_row_that_was_changed_is_told() {
@@ -363,13 +418,42 @@ fn each_defect_is_told_with_its_field() {
     };
     varied("plant.x0.q", "plant (plant.toml) has no variable \"x0.q\"");
     varied("plan.x0.x_p", "no component \"plan\"; there are filter, plant");
-    varied("filter.goal.h", "is a Real output; only Real parameters and inputs can be varied");
-    varied("filter.rearm", "is a Boolean input; only Real parameters and inputs can be varied");
-    varied("filter.x.v", "is a connected input, whose values come from there");
+    varied(
+        "filter.goal.h",
+        "is of type Real and causality output; only Real parameters and inputs can be varied",
+    );
+    varied(
+        "filter.rearm",
+        "is of type Boolean and causality input; only Real parameters and inputs can be varied",
+    );
+    varied("filter.x.v", "is an input whose values come from plant.x.v");
     let deadline = "vary.\"filter.goal.deadline\".min";
     fails("plant.x0.x_p", "filter.goal.deadline", deadline, "is 0, must be finite and >= 1e-9");
-    let missing = "cannot read nothing.toml: ";
-    campaign("\"system.toml\"", "\"nothing.toml\"").fails_like(2, missing, &[]);
+    varied("plant.x0.xp", "has no variable \"x0.xp\" (did you mean x0.x_p?)");
+    let quotes = "a name with dots is written in quotes, [vary.\"plant.x0.x_p\"]";
+    fails("\"plant.x0.x_p\"", "plant.x0.x_p", "vary.plant.x0.x_p", quotes);
+    fails("seed = 7", "stop_time = 1e300", "campaign.step", "up to stop_time = 1e300 s; at most 1e12");
+    fails("\"system.toml\"", "\"nothing.toml\"", "system", "there is no file nothing.toml");
+
+    let workshop = workshop(10, "random");
+    workshop.write("old.parquet", "no Parquet");
+    workshop.punctual(["campaign", "c.toml", "-o", "old.parquet"]).fails_like(
+        2,
+        "--output: old.parquet is there already: ",
+        &["it is no Parquet file", "remove it, or give another output"],
+    );
+    // A column for each number of a barrier, and for the peak of each input.
+    workshop.write(
+        "own.toml",
+        "kind = \"filter\"\nname = \"own\"\n\
+         [plant]\nstates = [{ name = \"p\" }]\ninputs = [{ name = \"left\", min = -1, max = 1 }]\nderivatives = { p = \"left\" }\n\
+         [[barrier]]\nname = \"peak\"\nexpression = \"1 - p\"\n",
+    );
+    workshop.write("c.toml", "system = \"own.toml\"\n[campaign]\nruns = 1\n");
+    workshop.punctual(["campaign", "c.toml"]).fails(
+        2,
+        "component: two columns of a row are called filter.peak.left; call its barrier or its input otherwise",
+    );
 }
 
 /// The numbers of a list of JSON; NaN for what is none.
@@ -696,6 +780,13 @@ fn shards_join_to_the_campaign_of_one_machine() {
     let report: Value = serde_json::from_str(&join(&["all", "--json", "--report"]).success()).expect("JSON");
     assert!(workshop.bytes("joined.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
     assert_eq!((&report["runs"], &report["report"][0]), (&20.into(), &"joined.html".into()));
+    // Once more into the same folder: a whole result there is no part.
+    for _ in 0..2 {
+        workshop.punctual(["campaign", "c.toml", "-o", "all/joined.parquet", "--join", "all"]).success();
+    }
+    workshop.punctual(["campaign", "c.toml", "-o", "again.parquet", "--join", "all"]).success();
+    assert!(workshop.bytes("again.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
+    join(&[first, "nothing.parquet"]).fails(2, "--join: nothing.parquet is not there");
     // A part tells its own runs, and no others.
     workshop.punctual(["replay", second, "--run", "6"]).success();
     workshop.punctual(["replay", second, "--run", "12"]).success();

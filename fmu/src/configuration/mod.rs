@@ -38,7 +38,7 @@ pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSecti
 pub use parameter::{Parameter, Range, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, OutputSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
-pub use punctual_models::{Functions, mentions};
+pub use punctual_models::{Functions, mentions, nearest};
 pub use read::{ConfigurationError, read_toml, write_toml};
 pub use reference::{ModelName, ReferenceSection};
 pub use unit::{base_unit, over_seconds, quantity};
