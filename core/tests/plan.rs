@@ -1899,6 +1899,80 @@ fn what_round_off_would_lose_is_not_followed() {
     }
 }
 
+/// A point on a line (m) whose speed (m/s) comes to its input with a lag (s).
+#[derive(Clone, Copy, Debug)]
+struct Lagging {
+    lag: f64,
+}
+
+impl ControlAffine<2, 1> for Lagging {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1], -x[1] / self.lag])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), S::from(1.0 / self.lag)]])
+    }
+}
+
+/// What dies away a hundred times sooner than a hold ends is no reason to refuse. Judged by the exact solution, a hundred times a
+/// hold.
+#[test]
+fn a_lag_far_shorter_than_a_hold_is_promised() {
+    let random = &mut Random(31);
+    for round in 0..24 {
+        let step = random.between(0.01, 0.2);
+        let lag = step / 10.0_f64.powf(random.between(-0.5, 2.0));
+        let (set, most) = (Within(random.between(0.5, 1.5)), random.between(1.0, 3.0));
+        let filter = SafetyFilter::builder(2, 1)
+            .barrier("near", Lagging { lag }, set, BarrierSettings::within(3.0))
+            .and_then(|b| b.bounds(&[-most], &[most]))
+            .and_then(|b| b.sampling(Sampling::Period(step)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, step).expect("a filter that can be assured");
+        let (mut x, mut u) = ([set.0 + random.between(-1.0, 0.5) * most, 0.0], [0.0]);
+        let wanted = [0.0, -1e3, 1e3, 0.7 * most][round % 4];
+        for k in 0..100 {
+            let t = f64::from(k) * step;
+            let standing = filter.step(t, &x, &[wanted], &mut u).expect("dimensions").standing;
+            assert_eq!(standing, Standing::Assured, "round {round}, step {k}: lag {lag}, {step} s, {x:?}");
+            let after = |dt: f64| {
+                let gone = -(-dt / lag).exp_m1();
+                [x[0] + u[0] * dt + (x[1] - u[0]) * lag * gone, x[1] + (u[0] - x[1]) * gone]
+            };
+            for part in 1..=100 {
+                let dt = step * f64::from(part) / 100.0;
+                let place = after(dt)[0];
+                assert!(t + dt < 3.0 || place.abs() <= set.0, "round {round}, step {k}: {place} of {set:?}");
+            }
+            x = after(step);
+        }
+    }
+}
+
+/// What is promised near the origin is promised far from it.
+#[test]
+fn a_place_far_from_the_origin_is_no_other_place() {
+    for far in [0.0, 1e5, 1e6, -2e7] {
+        for vehicle in [Vehicle::PointMass, Vehicle::Unicycle] {
+            let disc = DistanceDisc::new([far + 10.0, far - 5.0], 2.0, 1.0).expect("valid disc");
+            let filter = vehicle
+                .sets((disc, BarrierSettings::within(8.0)), None)
+                .and_then(|b| b.bounds(&[-3.0; 2], &[3.0; 2]))
+                .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+                .and_then(FilterBuilder::build)
+                .expect("valid filter");
+            let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+            let standing = filter
+                .step(0.0, &[far, far, 1.0, 0.0], &[0.0; 2], &mut [0.0; 2])
+                .expect("dimensions")
+                .standing;
+            assert_eq!(standing, Standing::Assured, "{vehicle:?} at {far}");
+        }
+    }
+}
+
 /// A state that creeps on where neither h nor the plant tells of it yet is no rest, if it leads out within the day. Where it
 /// ends inside it may be one.
 #[test]

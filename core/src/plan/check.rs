@@ -48,8 +48,17 @@ pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// How many times a deviation may grow on the way of a plan, and of one that was accepted before: what it begins with is what the
 /// courses of the states miss, far more than round-off.
 const SPREADS: [f64; 2] = [1e4, 1e6];
-/// Part of a state's size by which the plant is moved to see how a deviation grows.
+/// Part of a state's size by which the plant is moved to see how a deviation grows. That size is 1, the way from where the walk began,
+/// and this part of the state itself: far from the origin a deviation is more than round-off, and a place no other place.
 const ASIDE: f64 = 1e-6;
+const FAR: f64 = 1e-6;
+/// The last term of a step along which the plant that was moved is followed, as a part of the deviation: (λτ)⁴/4 of a mode that
+/// grows with λ. And the shortest step, as a part of a piece.
+const BENT: f64 = 0.25;
+const SHORTEST: f64 = 1e-3;
+/// Each stage of Runge and Kutta: where in the step it is, what it counts, and what it counts in the bend.
+const STAGES: [(f64, f64, f64); 4] =
+    [(0.0, 1.0 / 6.0, 1.0), (0.5, 1.0 / 3.0, 0.0), (0.5, 1.0 / 3.0, -2.0), (1.0, 1.0 / 6.0, 1.0)];
 /// Number of holds for which a drift at rest has to leave every set where it is.
 const DRIFT: f64 = 1e3;
 /// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
@@ -66,6 +75,9 @@ const SETTLED: f64 = 64.0 * f64::EPSILON;
 /// all the time that is promised.
 const BESIDE: f64 = 1e-5;
 const GROWS: f64 = 0.1;
+/// Most pieces in which a hold of the braking law at a rest is followed, and the part of one that a kink is passed in.
+const CREPT: u32 = 1000;
+const KINK: f64 = 1.0 / 16.0;
 /// The time in s for which what does not die away has to leave every set where it is.
 const LONG: f64 = 1e5;
 /// Most holds of the braking law after a reference.
@@ -201,10 +213,15 @@ pub(super) struct Walk<'a> {
 
 /// A plant beside that of a roll-out, under the same law.
 struct Aside {
+    /// The state where the walk began.
+    origin: Vec<f64>,
     /// By how much its state and its input differ.
     x: Vec<f64>,
     u: [f64; MAX_INPUTS],
-    path: Vec<Course>,
+    /// Room for a step: slopes of the difference, their mean, and the first less twice the third and the last.
+    slope: Vec<f64>,
+    mean: Vec<f64>,
+    bend: Vec<f64>,
     /// How many times the difference has grown since some instant, at most.
     grown: f64,
 }
@@ -212,33 +229,45 @@ struct Aside {
 impl Aside {
     /// Beside `x`, in a direction that is none of an axis.
     fn new(x: &[f64]) -> Self {
-        let away =
-            |(i, x): (u32, &f64)| (1.0 - 2.0 * f64::from(i % 2)) * ASIDE * size_of(*x) / f64::from(1 + i);
         Self {
-            x: (0_u32..).zip(x).map(away).collect(),
+            origin: x.to_vec(),
+            x: away(x, x).collect(),
             u: [0.0; MAX_INPUTS],
-            path: vec![[0.0; COURSE]; x.len()],
+            slope: x.to_vec(),
+            mean: x.to_vec(),
+            bend: x.to_vec(),
             grown: 1.0,
         }
     }
 
     /// Notes by how much the difference has grown, at `x`, and makes it as small again. Returns that growth.
     fn note(&mut self, x: &[f64]) -> f64 {
-        let size = self.x.iter().zip(x).fold(0.0, |size: f64, (d, x)| size.max(d.abs() / size_of(*x)));
-        let ratio = size / ASIDE;
+        let ratio = part(&self.x, x, &self.origin) / ASIDE;
         self.grown = (self.grown * ratio).max(1.0);
         match ratio > 0.0 && ratio < f64::INFINITY {
             true => self.x.iter_mut().for_each(|d| *d /= ratio),
             // What is no number shows in the states soon enough.
-            false => self.x = Self::new(x).x,
+            false => self.x = away(x, &self.origin).collect(),
         }
         self.grown
     }
 }
 
-/// What a change of a state is small against.
-fn size_of(x: f64) -> f64 {
-    1.0 + x.abs()
+/// A deviation from `x` in a direction that is none of an axis.
+fn away(x: &[f64], origin: &[f64]) -> impl Iterator<Item = f64> {
+    let sizes = x.iter().zip(origin).map(|(x, origin)| size_beside(*x, *origin));
+    (0_u32..).zip(sizes).map(|(i, size)| (1.0 - 2.0 * f64::from(i % 2)) * ASIDE * size / f64::from(1 + i))
+}
+
+/// The largest part of a state's size that a change `d` of it is, at `x`.
+fn part(d: &[f64], x: &[f64], origin: &[f64]) -> f64 {
+    let parts = d.iter().zip(x.iter().zip(origin)).map(|(d, (x, origin))| d.abs() / size_beside(*x, *origin));
+    parts.fold(0.0, f64::max)
+}
+
+/// What a deviation is small against.
+fn size_beside(x: f64, origin: f64) -> f64 {
+    1.0 + (x - origin).abs() + FAR * x.abs()
 }
 
 impl<'a> Walk<'a> {
@@ -461,19 +490,38 @@ impl<'a> Walk<'a> {
         met
     }
 
-    /// Moves the plant aside on by `dt` s, as that on `path` under `u` is.
+    /// Moves the plant aside on by `dt` s, as that on `path` under `u` is: the difference of the two in steps of Runge and Kutta.
     fn move_aside(&mut self, u: &[f64], path: &[Course], dt: f64) {
-        let Aside { x: aside, u: more, path: beside, .. } = &mut self.aside;
-        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&*aside)) {
-            *point = x + d;
-        }
-        let mut held = [0.0; MAX_INPUTS];
-        for (held, (u, more)) in held.iter_mut().zip(u.iter().zip(&*more)) {
-            *held = u + more;
-        }
-        self.model.plant.path(&self.point, &held[..u.len()], beside);
-        for (d, (there, here)) in aside.iter_mut().zip(beside.iter().zip(path)) {
-            *d = at(there, dt) - at(here, dt);
+        let Aside { origin, x: aside, u: more, slope, mean, bend, .. } = &mut self.aside;
+        let held: [f64; MAX_INPUTS] = core::array::from_fn(|i| u.get(i).map_or(0.0, |u| u + more[i]));
+        let (mut from, mut step) = (0.0, dt);
+        while from < dt {
+            step = step.min(dt - from);
+            slope.fill(0.0);
+            mean.fill(0.0);
+            bend.fill(0.0);
+            for (part, weight, bends) in STAGES {
+                let after = from + part * step;
+                for (i, point) in self.point.iter_mut().enumerate() {
+                    *point = at(&path[i], after) + aside[i] + part * step * slope[i];
+                }
+                self.model.plant.rate(&self.point, &held[..u.len()], &mut self.rate);
+                for (i, rate) in self.rate.iter().enumerate() {
+                    slope[i] = rate - course::slope(&path[i], after);
+                    mean[i] += weight * slope[i];
+                    bend[i] += bends * slope[i];
+                }
+            }
+            let part = |d: &[f64]| part(d, &self.x, origin);
+            if step * part(bend) > BENT * part(aside) && step > SHORTEST * dt {
+                step *= 0.5;
+                continue;
+            }
+            for (d, mean) in aside.iter_mut().zip(&*mean) {
+                *d += step * mean;
+            }
+            from = if step < dt - from { from + step } else { dt };
+            step *= 2.0;
         }
     }
 
@@ -730,30 +778,36 @@ impl<'a> Walk<'a> {
         largest_eigenvalue(&moved)
     }
 
-    /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states where they are short, and where they are
-    /// not, or a kink breaks them, in steps of the model.
+    /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states, past a kink that breaks them in a step of
+    /// the model.
     fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
         let (plant, mut left) = (self.model.plant, duration);
-        while left > 0.0 {
+        for _ in 0..CREPT {
             plant.path(x, u, &mut self.path);
-            let least = left.min(self.model.step);
-            let mut dt = self.path.iter().fold(left, |dt, c| course::reach(c, ROUND_OFF * size(c), dt));
-            loop {
-                if dt < least {
-                    return self.model.flow(x, u, left);
-                }
+            // However fast something dies away, its course is as short as that.
+            let smooth = self.path.iter().fold(left, |dt, c| course::reach(c, ROUND_OFF * size(c), dt));
+            let mut dt = smooth;
+            let is_followed = loop {
                 self.miss(u, dt);
                 let mut missed = self.rate.iter().zip(&self.path);
                 if missed.all(|(missed, c)| missed * dt <= SETTLED * size(c)) {
-                    break;
+                    break true;
+                }
+                if dt <= KINK * smooth {
+                    break false;
                 }
                 dt *= 0.5;
-            }
-            for (x, c) in x.iter_mut().zip(&self.path) {
-                *x = at(c, dt);
+            };
+            match is_followed {
+                true => x.iter_mut().zip(&self.path).for_each(|(x, c)| *x = at(c, dt)),
+                false => self.model.flow(x, u, dt),
             }
             left -= dt;
+            if left <= 0.0 {
+                return;
+            }
         }
+        self.model.flow(x, u, left);
     }
 
     /// Whether requirement `i` is met as the states move on, for so many windows of time: each from where it is by its motion.
@@ -909,7 +963,7 @@ fn allowed(over: Interval) -> f64 {
 
 /// The size of a state, by which the last terms of its course are measured.
 fn size(course: &Course) -> f64 {
-    size_of(course[0])
+    1.0 + course[0].abs()
 }
 
 #[cfg(test)]

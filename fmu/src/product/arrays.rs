@@ -104,7 +104,9 @@ pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Ve
     let mut items = Vec::new();
     let mut next = 0;
     while next < variables.len() {
-        let array = arrays.then(|| array_at(variables, next, layout.inputs)).flatten();
+        // The limits of an integrated input are called like the bounds of the others, and come after them.
+        let is_new = |item: &Item| items.iter().all(|other: &Item| other.name != item.name);
+        let array = arrays.then(|| array_at(variables, next, layout.inputs)).flatten().filter(is_new);
         let item = array.unwrap_or_else(|| Item::scalar(&variables[next].name, next));
         next = item.scalars.end;
         items.push(item);

@@ -39,6 +39,14 @@ fn every_product() -> Vec<Product> {
             }
         }
     }
+    // One input, whose limits are called like bounds.
+    for limits in ["", "integrator.min = -1\nintegrator.max = 2\n"] {
+        products.push(product(&format!(
+            "kind = \"filter\"\nintegrator.state = \"a\"\n{limits}[plant]\nderivatives = {{ p = \"v\", v = \"a\", a = \"j\" }}\n\
+             states = [{{ name = \"p\" }}, {{ name = \"v\" }}, {{ name = \"a\" }}]\n\
+             inputs = [{{ name = \"j\", min = -5, max = 5 }}]\n[[barrier]]\nname = \"hi\"\nexpression = \"2 - p\"\ndeadline = 3"
+        )));
+    }
     products.extend(controllers().iter().map(|text| product(text)));
     products
 }
@@ -103,6 +111,7 @@ fn every_unit_has_its_exponents() {
     let table = [
         ("1", si(0, 0, 0)),
         ("1/s", si(0, -1, 0)),
+        ("1/s3", si(0, -3, 0)),
         ("m", si(1, 0, 0)),
         ("m/s", si(1, -1, 0)),
         ("m/s2", si(1, -2, 0)),
