@@ -15,7 +15,7 @@ use crate::sample::Loop;
 use crate::saved::{self, Reduced, Saved};
 
 /// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
-/// same bits.
+/// same bits at the same times: those of the FMU are sums of its steps, so that `t += dt` has its bits, and `t = k * dt` may not.
 ///
 /// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. In a dict a function
 /// may stand in the place of an expression; it is called once, with symbols, and never in a step. A plug-in is loaded
@@ -127,7 +127,8 @@ impl Filter {
         failure.map(|failure| self.configuration.failure(failure))
     }
 
-    /// Starts every deadline anew at the next step.
+    /// Starts every deadline anew at the next step. The plan is forgotten: that step may be refused where the plan would have
+    /// gone on, and a step without a valid state follows none.
     fn rearm(&mut self) {
         self.own.get_mut().unwrap_or_else(PoisonError::into_inner).rearm();
     }

@@ -53,8 +53,10 @@ fn a_picture_with_a_wrong_value() {
 
 #[test]
 fn a_connection_from_an_unknown_variable() {
-    run("plant.x.v", "plant.x.w")
-        .fails(2, "system.toml: connection[0].from: plant (plant.fmu) has no variable \"x.w\"");
+    run("plant.x.v", "plant.x.w").fails(
+        2,
+        "system.toml: connection[0].from: plant (plant.fmu) has no variable \"x.w\" (did you mean x.v?)",
+    );
 }
 
 #[test]

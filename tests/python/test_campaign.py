@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import signal
+import shutil
 import subprocess
 import sys
 import threading
@@ -179,9 +180,12 @@ def test_the_example_makes_it_too(whole, tmp_path):
 def test_what_cannot_be_made_is_refused(whole, client, tmp_path, monkeypatch):
     path, expected = whole
     output, folder = tmp_path / "far.parquet", tmp_path / "far.parquet.shards"
-    for batch in (0, 1 << 20):
-        with pytest.raises(punctual.Error, match=f"^batch: is {batch}, must be from 1 to 16384$"):
+    for batch in (0, 1 << 20, "5", 2.5):
+        with pytest.raises(punctual.Error, match=f"^batch: is {batch!r}, must be a whole number from 1 to 16384$"):
             punctual.campaign(path, output, client=client, batch=batch)
+    with pytest.raises(punctual.Error, match="^client: no scheduler answers at head: "):
+        punctual.campaign(path, output, client="head")
+    shutil.rmtree(folder)
     folder.mkdir()
     (folder / "campaign.json").write_text("another")
     with pytest.raises(punctual.Error, match="^output: .* is of another campaign; remove it, or give another output$"):

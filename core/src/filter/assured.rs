@@ -604,7 +604,8 @@ impl AssuredFilter {
         Ok(())
     }
 
-    /// Forgets promise and plan: the next sample decides anew.
+    /// Forgets promise and plan: the next valid sample decides anew. It may be refused where the plan would have gone on, and
+    /// until it comes no plan is followed.
     pub fn rearm(&mut self) {
         self.rows.filter_mut().rearm();
         self.commitment = Commitment::default();
