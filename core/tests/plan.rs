@@ -2,6 +2,9 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::{SMatrix, SVector};
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc, StateBound};
@@ -1199,59 +1202,127 @@ fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
     }
 }
 
+/// A wall of discs, at x and of a radius in m, with its only near gap at y = 12; and the goal behind it, for a point mass.
+const WALL: [f64; 2] = [8.0, 1.5];
+const BEHIND: ([f64; 2], f64) = ([14.0, 0.0], 1.0);
+
+fn wall() -> impl Iterator<Item = f64> {
+    (-12..=12).map(|k| f64::from(k) * 2.4).filter(|y| (y - 12.0).abs() > 1.3)
+}
+
+fn behind_a_wall() -> AssuredFilter {
+    const BOUND: f64 = 4.0;
+    let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
+    let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(14.0) };
+    let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
+    let mut builder =
+        SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(BEHIND), within).expect("a goal");
+    for (i, y) in wall().enumerate() {
+        let clear = Outside(disc(([WALL[0], y], WALL[1])));
+        builder = builder.barrier(&format!("wall_{i}"), PointMass, clear, keeping).expect("an obstacle");
+    }
+    let builder =
+        builder.bounds(&[-BOUND; 2], &[BOUND; 2]).and_then(|b| b.sampling(Sampling::Period(PERIOD)));
+    AssuredFilter::new(builder.and_then(FilterBuilder::build).expect("valid"), PERIOD).expect("plans")
+}
+
+/// To a point before the gap, to one behind it, to the goal: at a moderate speed, damped.
+fn through_the_gap(x: &[f64], u: &mut [f64]) {
+    let target = match (x[0], x[1]) {
+        (px, py) if px < 5.5 && py < 10.0 => [2.0, 12.0],
+        (px, _) if px < 10.0 => [11.5, 12.0],
+        _ => BEHIND.0,
+    };
+    for i in 0..2 {
+        u[i] = 1.5 * (target[i] - x[i]).clamp(-2.5, 2.5) - 1.5 * x[2 + i];
+    }
+}
+
+fn is_clear_of_the_wall(x: [f64; 4]) -> bool {
+    wall().all(|y| (x[0] - WALL[0]).hypot(x[1] - y) > WALL[1])
+}
+
 #[test]
 fn a_policy_shows_the_way_through_a_gap() {
-    const BOUND: f64 = 4.0;
-    const WALL: [f64; 2] = [8.0, 1.5];
-    let goal = ([14.0, 0.0], 1.0);
-    // A wall with its only near gap at y = 12.
-    let obstacles: Vec<f64> =
-        (-12..=12).map(|k| f64::from(k) * 2.4).filter(|y| (y - 12.0).abs() > 1.3).collect();
-    let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-    let made = || {
-        let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(14.0) };
-        let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
-        let mut builder =
-            SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(goal), within).expect("a goal");
-        for (i, y) in obstacles.iter().enumerate() {
-            let clear = Outside(disc(([WALL[0], *y], WALL[1])));
-            builder = builder.barrier(&format!("wall_{i}"), PointMass, clear, keeping).expect("an obstacle");
-        }
-        let builder =
-            builder.bounds(&[-BOUND; 2], &[BOUND; 2]).and_then(|b| b.sampling(Sampling::Period(PERIOD)));
-        AssuredFilter::new(builder.and_then(FilterBuilder::build).expect("valid"), PERIOD).expect("plans")
-    };
     let start = [0.0; 4];
     assert!(
-        made().foresee(0.0, &start, 1.0).is_err(),
+        behind_a_wall().foresee(0.0, &start, 1.0).is_err(),
         "the search finds the gap by itself, so this shows nothing"
     );
-    // To a point before the gap, to one behind it, to the goal: at a moderate speed, damped.
-    let through = move |_: f64, x: &[f64], u: &mut [f64]| {
-        let target = match (x[0], x[1]) {
-            (px, py) if px < 5.5 && py < 10.0 => [2.0, 12.0],
-            (px, _) if px < 10.0 => [11.5, 12.0],
-            _ => goal.0,
-        };
-        for i in 0..2 {
-            u[i] = 1.5 * (target[i] - x[i]).clamp(-2.5, 2.5) - 1.5 * x[2 + i];
-        }
-    };
-    let mut filter = made().policy(through);
+    let mut filter = behind_a_wall().policy(|_, x, u| through_the_gap(x, u));
     let mut x = start;
     for k in 0..(18.0 / PERIOD) as usize {
         let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
         let assurance = *filter.step(t, &x, &[1.0, -1.0], &mut u).expect("right dimensions");
         assert!(assurance.is_assured(), "at {t}: {assurance:?}");
         x = Vehicle::PointMass.move_by(x, u, PERIOD);
-        let away = obstacles
-            .iter()
-            .map(|y| (x[0] - WALL[0]).hypot(x[1] - y) - WALL[1])
-            .fold(f64::INFINITY, f64::min);
-        assert!(away > 0.0, "at {t}: {x:?}");
+        assert!(is_clear_of_the_wall(x), "at {t}: {x:?}");
         if t > 14.0 {
-            assert!((x[0] - goal.0[0]).hypot(x[1] - goal.0[1]) < goal.1, "at {t}: {x:?}");
+            assert!((x[0] - BEHIND.0[0]).hypot(x[1] - BEHIND.0[1]) < BEHIND.1, "at {t}: {x:?}");
         }
+    }
+}
+
+/// The policy helps once. Armed again on the way, no search finds a plan, and the one at hand will do: also one that was
+/// followed meanwhile because the state was unknown, and one that was put back.
+#[test]
+fn armed_again_it_goes_on_with_the_plan_at_hand() {
+    let helps = Arc::new(AtomicBool::new(true));
+    let made = || {
+        let helps = Arc::clone(&helps);
+        behind_a_wall().policy(move |_, x, u| match helps.load(Ordering::Relaxed) {
+            true => through_the_gap(x, u),
+            false => u.fill(0.0),
+        })
+    };
+    for unknown in [0, 7] {
+        helps.store(true, Ordering::Relaxed);
+        let (mut filter, mut blind) = (made(), made());
+        let (mut x, mut u, again) = ([0.0; 4], [0.0; 2], 100);
+        let wish = [1.0, -1.0];
+        for k in 0..(17.0 / PERIOD) as usize {
+            let t = k as f64 * PERIOD;
+            if k == again {
+                helps.store(false, Ordering::Relaxed);
+                assert!(behind_a_wall().foresee(t, &x, 1.0).is_err(), "a search finds the gap from {x:?}");
+                // What it would do were it not armed again.
+                blind.restore(filter.filter().state(), filter.commitment()).expect("a state of its own");
+                filter.rearm();
+                let (state, commitment) = (filter.filter().state().clone(), filter.commitment().clone());
+                filter = made();
+                filter.restore(&state, &commitment).expect("a state of its own");
+            }
+            let is_unknown = (again..again + unknown).contains(&k);
+            let seen = if is_unknown { [f64::NAN; 4] } else { x };
+            let assurance = *filter.step(t, &seen, &wish, &mut u).expect("right dimensions");
+            if is_unknown {
+                let mut other = [0.0; 2];
+                blind.step(t, &seen, &wish, &mut other).expect("right dimensions");
+                assert_eq!((u, assurance.driver), (other, Driver::Plan), "at {t}");
+                assert_eq!((assurance.standing, assurance.until), (Standing::Undecided, None), "at {t}");
+                assert!(filter.report().barriers.iter().all(|b| !b.guaranteed), "at {t}");
+            } else {
+                assert!(assurance.is_assured(), "{unknown} unknown, at {t}: {assurance:?}");
+            }
+            x = Vehicle::PointMass.move_by(x, u, PERIOD);
+            assert!(is_clear_of_the_wall(x), "at {t}: {x:?}");
+            if t > 14.0 + (again + unknown) as f64 * PERIOD {
+                assert!((x[0] - BEHIND.0[0]).hypot(x[1] - BEHIND.0[1]) < BEHIND.1, "at {t}: {x:?}");
+            }
+        }
+    }
+    // From where the plan keeps nothing it is of no use, and once refused it is gone.
+    let (mut filter, mut u) = (made(), [0.0; 2]);
+    let steps = [
+        ([0.0; 4], Standing::Assured),
+        ([-200.0, 0.0, 0.0, 0.0], Standing::Refused),
+        ([0.0; 4], Standing::Refused),
+    ];
+    for (k, (x, standing)) in (0..).zip(steps) {
+        helps.store(k == 0, Ordering::Relaxed);
+        filter.rearm();
+        let assurance = *filter.step(f64::from(k) * PERIOD, &x, &[0.0; 2], &mut u).expect("right dimensions");
+        assert_eq!(assurance.standing, standing, "{k}");
     }
 }
 

@@ -127,8 +127,8 @@ impl Filter {
         failure.map(|failure| self.configuration.failure(failure))
     }
 
-    /// Starts every deadline anew at the next step. The plan is forgotten: that step may be refused where the plan would have
-    /// gone on, and a step without a valid state follows none.
+    /// Starts every deadline anew at the next step with a valid state, which decides anew on the promise. Where it finds no
+    /// other plan, the one at hand will do if it keeps that; until then it is followed.
     fn rearm(&mut self) {
         self.own.get_mut().unwrap_or_else(PoisonError::into_inner).rearm();
     }

@@ -195,7 +195,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 format!("{} is there already and is no packed campaign; give another name", path.display());
             return Err(Error::configuration("--pack", message));
         }
-        whole::write(path, campaign.packed()?)?;
+        let packed = campaign.packed()?;
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
+        }
+        whole::write(path, packed)?;
         output::result(&format!("written: {}", path.display()));
         return Ok(ExitCode::SUCCESS);
     }

@@ -415,8 +415,8 @@ fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
     let unfinished = match campaign.runs() {
         runs if runs == summary.runs => String::new(),
         runs => format!(
-            "<p class=\"verdict\"><span class=\"word open\">Interrupted: the first {} of {runs} runs.</span></p>\n<p>The same command \
-             goes on from there, and <code>replay</code> takes the results once all runs are made.</p>\n",
+            "<p class=\"verdict\"><span class=\"word open\">Interrupted: {} of {runs} runs are made.</span></p>\n<p>The same command \
+             makes the others, and <code>replay</code> takes the results once all runs are made.</p>\n",
             summary.runs
         ),
     };

@@ -143,6 +143,7 @@ pub struct Commitment {
     failure: Option<Failure>,
     /// One of each barrier; `None` where nothing is promised, or no more.
     promises: Vec<Option<Promise>>,
+    /// The plan; while nothing is decided, one from before [`AssuredFilter::rearm`].
     plan: Plan,
     /// Where the plan was lost: when, in s, and when another one is next searched for.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
@@ -167,6 +168,14 @@ impl Commitment {
             Standing::Withdrawn | Standing::Irregular | Standing::Expired => {
                 self.promises.iter().any(Option::is_some)
             }
+        }
+    }
+
+    /// Forgets what was promised. A plan that stood behind it is kept to go on with, and when the last sample was.
+    fn rearm(&mut self) {
+        let Self { standing, plan, sample, .. } = core::mem::take(self);
+        if matches!(standing, Standing::Assured | Standing::Undecided) {
+            (self.plan, self.sample) = (plan, sample);
         }
     }
 }
@@ -266,6 +275,14 @@ pub struct AssuredFilter {
     /// How the input of that sample moves with it.
     piece: Piece,
     assurance: Assurance,
+}
+
+/// What a first sample is promised with.
+struct First {
+    promises: Vec<Option<Promise>>,
+    plan: Plan,
+    /// Whether the plan is one from before the filter was armed again.
+    is_old: bool,
 }
 
 /// How an input moves with its sample, as long as the piece of the filter is the same.
@@ -544,10 +561,11 @@ impl AssuredFilter {
         &self.commitment
     }
 
-    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first for
-    /// the period.
+    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first and
+    /// after [`Self::rearm`] for the period.
     pub fn usual_hold(&self, t: f64) -> f64 {
-        let Some([last, held]) = self.commitment.sample else { return self.period };
+        let Commitment { standing, sample, .. } = self.commitment;
+        let Some([last, held]) = sample.filter(|_| standing != Standing::Undecided) else { return self.period };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
         if passed > 0.0 && passed.is_finite() && !is_same { passed } else { held }
@@ -573,7 +591,7 @@ impl AssuredFilter {
         if *standing == Standing::Undecided && state.time.is_some() {
             return refuse("standing", "is undecided, beside samples that were decided on");
         }
-        if commitment.is_followed() {
+        if commitment.is_followed() || *standing == Standing::Undecided && !plan.is_empty() {
             if let Some(flaw) = plan.flaw([self.filter().state_dim, self.filter().input_dim]) {
                 return refuse("plan", flaw);
             }
@@ -604,11 +622,11 @@ impl AssuredFilter {
         Ok(())
     }
 
-    /// Forgets promise and plan: the next valid sample decides anew. It may be refused where the plan would have gone on, and
-    /// until it comes no plan is followed.
+    /// Forgets the promise: the next valid sample decides anew. Where it finds no other plan, the one at hand will do if it
+    /// keeps what is promised then; and where x is not finite, that is followed until there is a valid sample.
     pub fn rearm(&mut self) {
         self.rows.filter_mut().rearm();
-        self.commitment = Commitment::default();
+        self.commitment.rearm();
         self.looked = None;
         self.assurance = Assurance::default();
     }
@@ -733,8 +751,10 @@ impl AssuredFilter {
         if t.is_finite() && (is_valid || self.next.sample.is_some()) {
             self.next.sample = Some([t, hold]);
         }
+        let mut is_regular = self.is_regular(t, hold);
         if self.next.standing == Standing::Undecided && is_valid {
-            self.decide(t, hold, x, u);
+            // What is made at a sample is made for it.
+            is_regular |= self.decide(t, hold, x, u);
         } else if self.commitment.is_followed() {
             // What came to its end was kept until then.
             let has_expired = self.commitment.standing == Standing::Expired;
@@ -762,9 +782,15 @@ impl AssuredFilter {
         let is_over = self.next.promises.iter().flatten().all(|promise| promise.until <= t);
         if self.next.standing == Standing::Assured && !is_over {
             self.assurance.driver = match is_valid {
-                true => self.choose(t, hold, x, u_ref, u),
+                true => self.choose(t, hold, x, u_ref, u, is_regular),
                 false => self.go_on(t, hold, u),
             };
+        } else if self.next.standing == Standing::Undecided && !self.next.plan.is_empty() {
+            if self.in_time(t, hold) {
+                self.assurance.driver = self.go_on(t, hold, u);
+            } else {
+                self.next.plan = Plan::default();
+            }
         }
         let Commitment { standing, failure, plan, .. } = &self.next;
         let is_assured = *standing == Standing::Assured;
@@ -816,15 +842,13 @@ impl AssuredFilter {
 
     /// Whether the sample at `t` is one for which the plan was made.
     fn is_regular(&self, t: f64, hold: f64) -> bool {
-        let Commitment { standing, plan, sample, .. } = &self.commitment;
-        // The plan of the first sample is made at it.
-        *standing == Standing::Undecided
-            || sample.is_some_and(|[last, held]| {
-                let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-                plan.witness.is_even
-                    && (t == last || t >= last + held - tolerance)
-                    && (hold - held).abs() <= ON_TIME * held
-            })
+        let Commitment { plan, sample, .. } = &self.commitment;
+        sample.is_some_and(|[last, held]| {
+            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+            plan.witness.is_even
+                && (t == last || t >= last + held - tolerance)
+                && (hold - held).abs() <= ON_TIME * held
+        })
     }
 
     /// Makes the report and the state of the rows, whose answer is `rows`, those of the input `u`, which has a plan behind it
@@ -876,7 +900,10 @@ impl AssuredFilter {
                 *u = self.bounds.clamp(i, input[i]);
             }
         }
-        if is_over || !self.is_regular(t, hold) {
+        let is_lost = is_over || !self.is_regular(t, hold);
+        if is_lost && self.next.standing == Standing::Undecided {
+            self.next.plan = Plan::default();
+        } else if is_lost {
             self.end(if is_over { Standing::Withdrawn } else { Standing::Irregular }, None);
         }
         Driver::Plan
@@ -932,7 +959,7 @@ impl AssuredFilter {
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
         let x = &self.rows.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
-        self.first(promises, (t, self.period), x, &[]).map(|(_, plan)| plan.witness)
+        self.first(promises, (t, self.period), x, &[]).map(|first| first.plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
@@ -942,8 +969,8 @@ impl AssuredFilter {
     }
 
     /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
-    /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one.
-    fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
+    /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one. Whether the plan was made here.
+    fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) -> bool {
         let search = |promises| self.first(promises, (t, hold), x, u);
         let promises = self.promises(t, x, |_| 1.0);
         let mut found = search(promises.clone()).map(|first| (1.0, first));
@@ -955,27 +982,29 @@ impl AssuredFilter {
             found = later.map_or(found, Ok);
         }
         match found {
-            Ok((factor, (promises, plan))) => {
+            Ok((factor, First { promises, plan, is_old })) => {
                 (self.next.promises, self.next.plan) = (promises, plan);
                 self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
                 self.end(Standing::Assured, None);
                 self.postpone(t, hold, factor);
+                !is_old
             }
             Err(failure) => {
-                self.next.promises = promises;
+                (self.next.promises, self.next.plan) = (promises, Plan::default());
                 self.end(Standing::Refused, Some(failure));
+                true
             }
         }
     }
 
-    /// The first plan for `promises`, with their reserve, else without; and what it keeps.
+    /// The first plan for `promises`, with their reserve, else without, else the one at hand.
     fn first(
         &self,
         mut promises: Vec<Option<Promise>>,
         at: (f64, f64),
         x: &[f64],
         u: &[f64],
-    ) -> Result<(Vec<Option<Promise>>, Plan), Failure> {
+    ) -> Result<First, Failure> {
         let search =
             |promises: &[Option<Promise>]| self.planned(promises, at, u, |planner| planner.search(at.0, x));
         let mut found = search(&promises);
@@ -983,7 +1012,23 @@ impl AssuredFilter {
             promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
             found = search(&promises);
         }
-        found.map(|plan| (promises, plan))
+        let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
+        let old = &self.commitment.plan;
+        if self.commitment.standing != Standing::Undecided || old.is_empty() {
+            return Err(failure);
+        }
+        promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+        let is_irregular = !self.is_regular(at.0, at.1);
+        let tail = |planner: &Planner<'_>| planner.irregular(is_irregular).tail(old, at.0, x);
+        match self.planned(&promises, at, u, tail) {
+            // One that ends sooner reaches nothing.
+            Ok((witness, _)) if promises.iter().flatten().all(|promise| promise.from < witness.until) => {
+                let mut plan = old.clone();
+                plan.witness = witness;
+                Ok(First { promises, plan, is_old: true })
+            }
+            _ => Err(failure),
+        }
     }
 
     /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
@@ -1045,8 +1090,7 @@ impl AssuredFilter {
         if let Rows::Integrated(own) = &self.rows {
             planner = planner.integrated(Integral { state: own.of.state, input: own.of.input });
         }
-        let planner = planner.led(&self.policies).until(self.horizon);
-        f(&planner.irregular(!self.is_regular(t, period)))
+        f(&planner.led(&self.policies).until(self.horizon))
     }
 
     /// The limits of the integral as barriers along `plant`.
@@ -1089,8 +1133,16 @@ impl AssuredFilter {
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
-    /// does, else the plan's own.
-    fn choose(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Driver {
+    /// does, else the plan's own. `is_regular` tells whether the plan is one for this sample.
+    fn choose(
+        &mut self,
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &mut [f64],
+        is_regular: bool,
+    ) -> Driver {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
@@ -1119,6 +1171,7 @@ impl AssuredFilter {
             false => (Piece::Searched, share),
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
+            let planner = &planner.irregular(!is_regular);
             let passes = reached && wanted == wish;
             if passes
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
@@ -1200,7 +1253,7 @@ impl AssuredFilter {
                 // A plan that has come to its end was kept.
                 let is_at_its_end = self.next.plan.witness.until <= t + 0.5 * hold;
                 let Commitment { standing, lost, .. } = self.commitment;
-                let (standing, failure) = match self.is_regular(t, hold) {
+                let (standing, failure) = match is_regular {
                     _ if lost.is_some() => (standing, failure),
                     _ if is_at_its_end => (Standing::Expired, longer),
                     true => (Standing::Withdrawn, failure),

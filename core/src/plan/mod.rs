@@ -80,6 +80,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Whether it holds no input: there is no plan.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.witness.inputs.is_empty()
+    }
+
     /// Whether the last input alone holds the plant at the rest of the plan, without feedback.
     pub fn stays(&self) -> bool {
         self.brake.as_ref().is_some_and(|brake| brake.stays())

@@ -184,7 +184,8 @@ impl<'a> Planner<'a> {
 
     /// Searches for a plan that ends at rest, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
-        let mut failure = Failure::NoRest;
+        // What a trial fails at says more than that another grid has no trials.
+        let mut failure: Option<Failure> = None;
         let is_dated = self.last(t) > t || horizon.is_some();
         let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
         for ((part, holds), undated) in GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(longer) {
@@ -197,12 +198,12 @@ impl<'a> Planner<'a> {
             };
             let requirements: Vec<Requirement<'a>> = self.requirements.iter().map(sooner).collect();
             let Some((mut hold, mut times)) = self.grid(t, &requirements, (holds, undated), horizon) else {
-                failure = Failure::TooLong;
+                failure.get_or_insert(Failure::TooLong);
                 continue;
             };
             let resolved = RESOLVED.map(|error| self.resolved(x, hold, error));
             let [Some(coarse), Some(fine)] = resolved else {
-                failure = Failure::Singular;
+                failure.get_or_insert(Failure::Singular);
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
@@ -221,7 +222,10 @@ impl<'a> Planner<'a> {
             let brake = guide.as_ref().and_then(|guide| guide.shorter(&model, self.period));
             let ending = match (horizon, brake) {
                 (Some(_), _) => None,
-                (None, None) => continue,
+                (None, None) => {
+                    failure.get_or_insert(Failure::NoRest);
+                    continue;
+                }
                 (None, Some(brake)) => Some(Arc::new(brake)),
             };
             let guide = Guide(guide);
@@ -256,11 +260,12 @@ impl<'a> Planner<'a> {
                 // Holds that are too long say little: what came nearer is told.
                 Err(Some(Failure::Broken { slack, .. }))
                     if self.last(t) <= t
-                        && matches!(failure, Failure::Broken { slack: nearer, .. } if nearer > slack) => {}
-                Err(found) => failure = found.unwrap_or(failure),
+                        && matches!(failure, Some(Failure::Broken { slack: nearer, .. }) if nearer > slack) =>
+                    {}
+                Err(found) => failure = found.or(failure),
             }
         }
-        Err(failure)
+        Err(failure.unwrap_or(Failure::NoRest))
     }
 
     /// The plan that one of `descents` leads to; or what the nearest fails at, where one was worth the check.
