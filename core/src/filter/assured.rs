@@ -565,7 +565,9 @@ impl AssuredFilter {
     /// after [`Self::rearm`] for the period.
     pub fn usual_hold(&self, t: f64) -> f64 {
         let Commitment { standing, sample, .. } = self.commitment;
-        let Some([last, held]) = sample.filter(|_| standing != Standing::Undecided) else { return self.period };
+        let Some([last, held]) = sample.filter(|_| standing != Standing::Undecided) else {
+            return self.period;
+        };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
         if passed > 0.0 && passed.is_finite() && !is_same { passed } else { held }

@@ -94,9 +94,20 @@ impl Model<'_> {
     /// A state near `x` and an input within the bounds that holds it there for `duration` s: least change by
     /// Gauss-Newton steps. `None` where none is found.
     pub(super) fn rest(&self, x: &[f64], duration: f64) -> Option<(Vec<f64>, Vec<f64>)> {
-        let (nx, nu) = (self.states(), self.inputs());
-        let (mut at, mut u) = (x.to_vec(), vec![0.0; nu]);
+        let mut u = vec![0.0; self.inputs()];
         self.clamp(&mut u);
+        self.rest_from(x, u, duration).or_else(|| {
+            // Without an input a tank may run empty meanwhile.
+            let middle = |i: usize| (self.bounds.min[i] + self.bounds.max[i]) / 2.0;
+            let middle = (0..self.inputs()).map(middle).map(|u| if u.is_finite() { u } else { 0.0 });
+            self.rest_from(x, middle.collect(), duration)
+        })
+    }
+
+    /// That rest, sought from the input `u` on.
+    fn rest_from(&self, x: &[f64], mut u: Vec<f64>, duration: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (nx, nu) = (self.states(), self.inputs());
+        let mut at = x.to_vec();
         for _ in 0..TO_REST {
             let rate = self.rate(&at, &u, duration);
             if !rate.iter().all(|r| r.is_finite()) {
@@ -110,8 +121,21 @@ impl Model<'_> {
             let mut jacobian = DMatrix::zeros(nx, nx + nu);
             jacobian.view_mut((0, 0), (nx, nx)).copy_from(&((a - DMatrix::identity(nx, nx)) / duration));
             jacobian.view_mut((0, nx), (nx, nu)).copy_from(&(b / duration));
-            let svd = jacobian.svd(true, true);
-            let step = svd.solve(&rate, RANK * svd.singular_values.max()).ok()?;
+            // Of what is no number the decomposition need not end.
+            if !jacobian.iter().all(|v| v.is_finite()) {
+                return None;
+            }
+            // An input that its bounds stop leaves the rest of the way to the state.
+            let step = loop {
+                let svd = jacobian.clone().svd(true, true);
+                let step = svd.solve(&rate, RANK * svd.singular_values.max()).ok()?;
+                let is_stopped =
+                    |i: &usize| step[nx + i] != 0.0 && self.bounds.clamp(*i, u[*i] - step[nx + i]) == u[*i];
+                match (0..nu).find(is_stopped) {
+                    Some(i) => jacobian.fill_column(nx + i, 0.0),
+                    None => break step,
+                }
+            };
             for i in 0..nx {
                 at[i] -= step[i];
             }

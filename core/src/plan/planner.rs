@@ -85,6 +85,22 @@ impl Guide {
     }
 }
 
+/// How plans come to their end: at rest under a law, where there is one.
+struct Ending<'a> {
+    model: Model<'a>,
+    /// The length of a hold of the search in s.
+    hold: f64,
+    brake: Option<Arc<Brake>>,
+}
+
+impl Ending<'_> {
+    /// The law around a rest near `x`, for samples that are `period` s apart.
+    fn near(&self, x: &[f64], period: f64) -> Option<Arc<Brake>> {
+        self.brake.as_ref()?;
+        Brake::around(&self.model, x, self.hold)?.shorter(&self.model, period).map(Arc::new)
+    }
+}
+
 /// The plant, its bounds and the requirements at a sample, from which plans are made.
 #[derive(Clone, Copy)]
 pub struct Planner<'a> {
@@ -220,14 +236,12 @@ impl<'a> Planner<'a> {
                 guide = Brake::around(&model, x, hold).or(guide);
             }
             let brake = guide.as_ref().and_then(|guide| guide.shorter(&model, self.period));
-            let ending = match (horizon, brake) {
-                (Some(_), _) => None,
-                (None, None) => {
-                    failure.get_or_insert(Failure::NoRest);
-                    continue;
-                }
-                (None, Some(brake)) => Some(Arc::new(brake)),
-            };
+            if horizon.is_none() && brake.is_none() {
+                failure.get_or_insert(Failure::NoRest);
+                continue;
+            }
+            let brake = brake.filter(|_| horizon.is_none()).map(Arc::new);
+            let ending = Ending { model, hold, brake };
             let guide = Guide(guide);
             let mut search = Search {
                 model: sketch,
@@ -273,7 +287,7 @@ impl<'a> Planner<'a> {
         &self,
         search: &mut Search<'_>,
         mut descents: Vec<Descent>,
-        ending: &Option<Arc<Brake>>,
+        ending: &Ending<'_>,
     ) -> Result<Plan, Option<Failure>> {
         let mut failure = None;
         // A few steps show which guesses lead somewhere.
@@ -365,16 +379,31 @@ impl<'a> Planner<'a> {
         times: &[f64],
         found: &Trajectory,
         gains: Option<Vec<Gain>>,
-        ending: &Option<Arc<Brake>>,
+        ending: &Ending<'_>,
     ) -> Result<Plan, Failure> {
         let (mut inputs, states) = (found.inputs.clone(), found.states.clone());
         inputs.pop();
         let gains = gains.ok_or(Failure::Singular)?;
         let reference = Reference { times: times.to_vec(), inputs, states, gains };
-        let mut plan =
-            Plan { reference: Some(Arc::new(reference)), brake: ending.clone(), witness: Witness::default() };
+        let mut plan = Plan {
+            reference: Some(Arc::new(reference)),
+            brake: ending.brake.clone(),
+            witness: Witness::default(),
+        };
         let grid = Grid { period: self.period, even: true };
-        plan.witness = self.walk(&plan, 1.0, grid, (times[0], &found.states[0]), None, true)?;
+        let walk = |plan: &Plan| self.walk(plan, 1.0, grid, (times[0], &found.states[0]), None, true);
+        plan.witness = walk(&plan).or_else(|failure| {
+            let (end, x) = (times[times.len() - 1], &found.states[found.states.len() - 1]);
+            let is_before = matches!(failure, Failure::Broken { time, .. } if time <= end);
+            // Where not every place is a rest, the law leads back to the one that it is around.
+            match ending.near(x, self.period).filter(|_| !is_before) {
+                None => Err(failure),
+                near => {
+                    plan.brake = near;
+                    walk(&plan).map_err(|_| failure)
+                }
+            }
+        })?;
         Ok(plan)
     }
 
@@ -515,10 +544,12 @@ impl<'a> Planner<'a> {
         self.conclude(walk, plan)
     }
 
-    /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one.
+    /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one; else
+    /// at one of them: at the other a tank runs empty.
     fn resolved(&self, x: &[f64], hold: f64, allowed: f64) -> Option<f64> {
         let nu = self.dims[1];
         let mut step = (hold / 8.0).min((COARSE * self.period).max(hold / FINE));
+        let mut one = None;
         for _ in 0..HALVINGS {
             let is_resolved = |sign: f64| {
                 let mut u: Vec<f64> = (0..nu).map(|i| sign * self.model(step).reach(i, self.size)).collect();
@@ -529,15 +560,18 @@ impl<'a> Planner<'a> {
                     end
                 };
                 let (coarse, fine) = (run(step), run(step / 2.0));
+                let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= allowed * (1.0 + b.abs());
                 // Not-a-number is not.
-                coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() <= allowed * (1.0 + b.abs()))
+                coarse.iter().zip(&fine).all(is_near)
             };
-            if is_resolved(1.0) && is_resolved(-1.0) {
-                return Some(step);
+            match [1.0, -1.0].map(is_resolved) {
+                [true, true] => return Some(step),
+                [true, false] | [false, true] => _ = one.get_or_insert(step),
+                [false, false] => {}
             }
             step /= 2.0;
         }
-        None
+        one
     }
 
     /// The latest deadline in s, or the time of a search from `t` that has none.

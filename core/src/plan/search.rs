@@ -23,6 +23,7 @@ use nalgebra::DMatrix;
 use super::Requirement;
 use super::law::Gain;
 use super::model::{Linear, Model};
+use crate::scalar::all_finite;
 
 /// Price of a violation of the size of h on the way, against the price of full inputs all the time.
 const PENALTY: f64 = 300.0;
@@ -188,11 +189,10 @@ impl Search<'_> {
             violation += part.max(0.0);
             most = most.max(part);
         }
-        of.merit = effort + PENALTY * violation;
-        if !of.merit.is_finite() {
-            of.merit = f64::INFINITY;
+        (of.merit, of.violation) = (effort + PENALTY * violation, most);
+        if !(of.merit.is_finite() && of.states.iter().all(|x| all_finite(x))) {
+            (of.merit, of.violation) = (f64::INFINITY, f64::INFINITY);
         }
-        of.violation = most;
     }
 
     /// Improves the best of `descent`; at most `iterations` quadratic programs.
