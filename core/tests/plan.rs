@@ -1326,6 +1326,130 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     }
 }
 
+/// A tank that runs out at a rate of `self.0` times the root of its level, in m and s.
+#[derive(Clone, Copy, Debug)]
+struct Tank(f64);
+
+impl ControlAffine<1, 1> for Tank {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        SVector::from([x[0].sqrt() * -self.0])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
+        SMatrix::identity()
+    }
+}
+
+/// A number that grows by `self.0` of itself in a second, or dies away.
+#[derive(Clone, Copy, Debug)]
+struct FirstOrder(f64);
+
+impl ControlAffine<1, 1> for FirstOrder {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        SVector::from([x[0] * self.0])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
+        SMatrix::identity()
+    }
+}
+
+/// A motor: its speed and its current die away at these rates, and drive each other.
+#[derive(Clone, Copy, Debug)]
+struct Motor([f64; 2]);
+
+impl ControlAffine<2, 1> for Motor {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1] - x[0] * self.0[0], -(x[1] * self.0[1]) - x[0]])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), S::one()]])
+    }
+}
+
+/// The first state is within `self.1` of `self.0`.
+#[derive(Clone, Copy, Debug)]
+struct Band(f64, f64);
+
+impl<const NX: usize> Barrier<NX> for Band {
+    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+        -(x[0] - self.0).squared() + self.1 * self.1
+    }
+}
+
+/// A plant that stands still at few places only ends its plan at one in the set, not at the one that it began near: a tank
+/// that is filled or emptied, what grows or dies away, a motor. From `from` to `band`, with inputs from `low` to `high`.
+#[test]
+fn a_plant_that_rests_elsewhere_is_promised() {
+    fn kept<P, const NX: usize>(
+        plant: P,
+        from: [f64; NX],
+        band: Band,
+        [low, high]: [f64; 2],
+        deadline: f64,
+        wish: u32,
+    ) where
+        P: ControlAffine<NX, 1> + Copy + Send + core::fmt::Debug + 'static,
+    {
+        let period = deadline / 150.0;
+        let filter = SafetyFilter::builder(NX, 1)
+            .barrier("band", plant, band, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[low], &[high]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        let mut x = SVector::from(from);
+        for k in 0..300_u32 {
+            let (t, mut u) = (f64::from(k) * period, [0.0]);
+            let wanted = match wish {
+                0 => 0.0,
+                1 => low,
+                2 => high,
+                _ => {
+                    if k / 20 % 2 == 0 {
+                        low
+                    } else {
+                        high
+                    }
+                }
+            };
+            let assurance = *filter.step(t, x.as_slice(), &[wanted], &mut u).expect("right dimensions");
+            assert!(
+                assurance.is_assured(),
+                "{plant:?} from {from:?} to {band:?}, wish {wish}, at {t}: {assurance:?}"
+            );
+            assert!((low..=high).contains(&u[0]), "{u:?}");
+            for part in 1..=10_u32 {
+                x = rk4_step(&plant, &x, &SVector::from(u), period / 10.0);
+                let now = t + f64::from(part) * period / 10.0;
+                let away = (x[0] - band.0).abs() - band.1;
+                // An integrator of our own beside that of the plan.
+                assert!(now < deadline + 1e-9 || away <= 1e-9, "{plant:?} from {from:?}, at {now}: {away}");
+            }
+        }
+    }
+    for (seed, wish) in (1..=16_u64).zip((0..4).cycle()) {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        // A level that two thirds of the pump hold, from a tenth to nearly twice of it.
+        let (rate, pump) = (random.between(0.05, 0.3), random.between(0.05, 0.3));
+        let level = (0.66 * pump / rate) * (0.66 * pump / rate);
+        let band = Band(level, random.between(0.05, 0.2) * level);
+        let from = random.between(0.1, 1.8) * level;
+        kept(Tank(rate), [from], band, [0.0, pump], 8.0 * level / pump, wish);
+        // Inputs that hold the number at no more than its start.
+        let rate = random.between(-2.0, 2.0);
+        let hold = 2.0 * rate.abs().max(0.1);
+        let band = Band(random.between(-1.0, 1.0), 0.2);
+        kept(FirstOrder(rate), [random.between(-1.0, 1.0)], band, [-hold, hold], 10.0 / hold, wish);
+        let motor = Motor([random.between(0.05, 1.0), random.between(0.3, 5.0)]);
+        let hold = 1.0 + motor.0[0] * motor.0[1];
+        let band = Band(random.between(-0.6, 0.6), 0.1);
+        kept(motor, [random.between(-0.6, 0.6), 0.0], band, [-hold, hold], 8.0 / motor.0[0].max(0.5), wish);
+    }
+}
+
 #[test]
 fn at_the_edge_the_input_does_not_chatter() {
     const BOUND: f64 = 5.0;

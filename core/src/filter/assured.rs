@@ -561,16 +561,19 @@ impl AssuredFilter {
         &self.commitment
     }
 
-    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first and
-    /// after [`Self::rearm`] for the period.
+    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first, and
+    /// after [`Self::rearm`] at another time than was said, for the period.
     pub fn usual_hold(&self, t: f64) -> f64 {
         let Commitment { standing, sample, .. } = self.commitment;
-        let Some([last, held]) = sample.filter(|_| standing != Standing::Undecided) else {
-            return self.period;
-        };
+        let Some([last, held]) = sample else { return self.period };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-        if passed > 0.0 && passed.is_finite() && !is_same { passed } else { held }
+        match standing {
+            _ if is_same => held,
+            Standing::Undecided => self.period,
+            _ if passed > 0.0 && passed.is_finite() => passed,
+            _ => held,
+        }
     }
 
     /// How long in s the input of the last sample was to be held, if there was one.

@@ -45,6 +45,12 @@ impl Brake {
         Self::at(model, state, input, hold)
     }
 
+    /// The law around the rest near `x` and the input `u`, as [`Self::around`].
+    pub(super) fn beside(model: &Model<'_>, x: &[f64], u: &[f64], hold: f64) -> Option<Self> {
+        let (state, input) = model.rest_from(x, u.to_vec(), hold)?;
+        Self::at(model, state, input, hold)
+    }
+
     /// The same law with shorter holds where the rest is lost sooner; they are so many times `period`.
     pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
         let hold = (self.longest(LOST) / period) as u32;

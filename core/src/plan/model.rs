@@ -105,7 +105,12 @@ impl Model<'_> {
     }
 
     /// That rest, sought from the input `u` on.
-    fn rest_from(&self, x: &[f64], mut u: Vec<f64>, duration: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    pub(super) fn rest_from(
+        &self,
+        x: &[f64],
+        mut u: Vec<f64>,
+        duration: f64,
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
         let (nx, nu) = (self.states(), self.inputs());
         let mut at = x.to_vec();
         for _ in 0..TO_REST {

@@ -94,10 +94,11 @@ struct Ending<'a> {
 }
 
 impl Ending<'_> {
-    /// The law around a rest near `x`, for samples that are `period` s apart.
-    fn near(&self, x: &[f64], period: f64) -> Option<Arc<Brake>> {
+    /// The law around the rest at the end of `found`, for samples that are `period` s apart.
+    fn at_end(&self, found: &Trajectory, period: f64) -> Option<Arc<Brake>> {
         self.brake.as_ref()?;
-        Brake::around(&self.model, x, self.hold)?.shorter(&self.model, period).map(Arc::new)
+        let (x, u) = (found.states.last()?, found.inputs.last()?);
+        Brake::beside(&self.model, x, u, self.hold)?.shorter(&self.model, period).map(Arc::new)
     }
 }
 
@@ -393,10 +394,9 @@ impl<'a> Planner<'a> {
         let grid = Grid { period: self.period, even: true };
         let walk = |plan: &Plan| self.walk(plan, 1.0, grid, (times[0], &found.states[0]), None, true);
         plan.witness = walk(&plan).or_else(|failure| {
-            let (end, x) = (times[times.len() - 1], &found.states[found.states.len() - 1]);
-            let is_before = matches!(failure, Failure::Broken { time, .. } if time <= end);
+            let is_before = matches!(failure, Failure::Broken { time, .. } if time <= times[times.len() - 1]);
             // Where not every place is a rest, the law leads back to the one that it is around.
-            match ending.near(x, self.period).filter(|_| !is_before) {
+            match ending.at_end(found, self.period).filter(|_| !is_before) {
                 None => Err(failure),
                 near => {
                     plan.brake = near;

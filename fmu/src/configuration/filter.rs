@@ -230,8 +230,8 @@ pub(super) static SECTION: Section = Section {
                 "period_max",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "the longest time between two steps; the promises then hold for steps of any length up to it. 0: as long as \
-                 the ones before were",
+                "the longest time between two steps; the rows then hold for steps of any length up to it, and a plan \
+                 seldom ends at one. 0: as long as the ones before were",
             ),
             Key::new(
                 "arm_after",
