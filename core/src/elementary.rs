@@ -228,6 +228,15 @@ pub fn powi(x: f64, exponent: i32) -> f64 {
     if exponent < 0 { 1.0 / power } else { power }
 }
 
+/// `x` moved between `low` and `high`, as [`f64::clamp`] does, but for bounds of which one may be no number.
+pub(crate) fn clamp(x: f64, low: f64, high: f64) -> f64 {
+    match x {
+        _ if x < low => low,
+        _ if x > high => high,
+        _ => x,
+    }
+}
+
 /// Σ a_i b_i over the shorter of the two.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()

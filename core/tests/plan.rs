@@ -1326,6 +1326,36 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     }
 }
 
+/// The hold that a sample is told is that of the one before, whatever the period of the filter: so it is after it was armed
+/// again, and the plan is followed for as long as nobody knows the state.
+#[test]
+fn armed_again_between_samples_of_another_period_it_follows_the_plan() {
+    let (mut filter, mut x, mut u) = (Vehicle::PointMass.assured(8.0, [8.0; 2]), [0.0; 4], [0.0; 2]);
+    for k in 0..60_u32 {
+        let t = f64::from(k) * 0.8 * PERIOD;
+        if k == 20 {
+            filter.rearm();
+        }
+        let is_unknown = (20..26).contains(&k);
+        let seen = if is_unknown { [f64::NAN; 4] } else { x };
+        let hold = filter.usual_hold(t);
+        filter.expect_hold(Some(hold)).expect("a time");
+        let assurance = *filter.step(t, &seen, &[-3.0, 1.0], &mut u).expect("right dimensions");
+        match is_unknown {
+            true => assert_eq!(
+                (assurance.standing, assurance.driver),
+                (Standing::Undecided, Driver::Plan),
+                "at {k}"
+            ),
+            false => assert!(assurance.is_assured(), "at {k}: {assurance:?}"),
+        }
+        x = Vehicle::PointMass.move_by(x, u, 0.8 * PERIOD);
+    }
+    // At another time than was said, samples begin anew.
+    filter.rearm();
+    assert_eq!(filter.usual_hold(100.0), PERIOD);
+}
+
 /// A tank that runs out at a rate of `self.0` times the root of its level, in m and s.
 #[derive(Clone, Copy, Debug)]
 struct Tank(f64);
@@ -1825,6 +1855,29 @@ fn what_has_ended_is_not_guaranteed() {
         x[2] += 0.1 * u[0];
     }
     assert!(guaranteed > 50, "{guaranteed}");
+}
+
+/// A plan that has nothing to keep any more is not followed again by a filter that is armed again.
+#[test]
+fn armed_again_when_all_is_over_it_follows_no_plan() {
+    for (samples, driver) in [(5, Driver::Plan), (12, Driver::Rows)] {
+        let fence = StateBound::at_most(0, 5.0).expect("valid bound");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("fence", PointMass, fence, BarrierSettings::keeping())
+            .and_then(|b| b.window(Begin::AtOnce, End::At(1.0)))
+            .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(0.1)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+        let (at, mut u) = (|k: u32| f64::from(k) * 0.1, [0.0; 2]);
+        for k in 0..samples {
+            filter.step(at(k), &[0.0; 4], &[0.0; 2], &mut u).expect("dimensions");
+        }
+        filter.rearm();
+        let blind = *filter.step(at(samples), &[f64::NAN; 4], &[0.0; 2], &mut u).expect("dimensions");
+        assert_eq!((blind.standing, blind.driver), (Standing::Undecided, driver), "after {samples}");
+    }
 }
 
 /// A speed (m/s) with drag, and a level (m) that rises with it and creeps towards 60 m, at a rate per second.

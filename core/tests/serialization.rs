@@ -17,6 +17,7 @@ use punctual_reference::plants::Unicycle;
 use scenario::{distance_disc, quadratic_disc};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 const STEP: f64 = 0.05;
 const BOUNDS: [f64; 2] = [6.0, 2.0];
@@ -198,4 +199,50 @@ proptest! {
             prop_assert!(u.iter().zip(BOUNDS).all(|(u, b)| u.abs() <= b), "{u:?}");
         }
     }
+}
+
+/// Each number of a state from elsewhere may be any: a step does not end for that, and its input is within the bounds.
+#[test]
+fn no_number_of_a_state_ends_a_step() {
+    fn numbers(value: &mut Value, visit: &mut dyn FnMut(&mut Value)) {
+        match value {
+            Value::Array(all) => all.iter_mut().for_each(|value| numbers(value, visit)),
+            Value::Object(all) => all.values_mut().for_each(|value| numbers(value, visit)),
+            Value::Number(_) => visit(value),
+            Value::String(text) if ["inf", "-inf", "NaN"].contains(&text.as_str()) => visit(value),
+            _ => {}
+        }
+    }
+    let mut restored = 0;
+    // On the way, and inside of both sets.
+    for x in [[0.0, 0.0, 0.3, 1.0], [45.0, 44.5, 0.3, 0.1]] {
+        let (mut one, mut u) = (filter(), [0.0; 2]);
+        for k in 0..4 {
+            one.step(f64::from(k) * STEP, &x, &[1.0, 0.1], &mut u).expect("right lengths");
+        }
+        let mut written = serde_json::to_value(one.state()).expect("serialises");
+        let mut count = 0;
+        numbers(&mut written, &mut |_| count += 1);
+        assert!(count > 20, "{count}");
+        let wrongs =
+            ["NaN", "inf", "-inf"].map(Value::from).into_iter().chain([-1.0, 0.0, 1e300].map(Value::from));
+        for (place, wrong) in (0..count).flat_map(|place| wrongs.clone().map(move |wrong| (place, wrong))) {
+            let (mut damaged, mut at) = (written.clone(), 0);
+            numbers(&mut damaged, &mut |value| {
+                if at == place {
+                    *value = wrong.clone();
+                }
+                at += 1;
+            });
+            let Ok(state) = serde_json::from_value::<FilterState>(damaged) else { continue };
+            restored += 1;
+            let mut other = filter();
+            other.restore(&state).expect("as many barriers");
+            for k in 4..8 {
+                other.step(f64::from(k) * STEP, &x, &[1.0, 0.1], &mut u).expect("right lengths");
+                assert!(u.iter().zip(BOUNDS).all(|(u, bound)| u.abs() <= bound), "{place} is {wrong}: {u:?}");
+            }
+        }
+    }
+    assert!(restored > 200, "{restored}");
 }

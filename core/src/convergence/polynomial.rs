@@ -113,7 +113,7 @@ fn between(q: &[f64], turns: &Roots) -> Roots {
     let mut roots = Roots::default();
     let mut low = -bound;
     for &high in turns.as_slice().iter().chain(&[bound]) {
-        let high = high.clamp(low, bound);
+        let high = elementary::clamp(high, low, bound);
         let (at_low, at_high) = (sign(q, low), sign(q, high));
         if at_low == 0 {
             roots.push(low);

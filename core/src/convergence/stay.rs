@@ -146,7 +146,7 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
     let at_base = affordable_margin(base, h);
     let is_gentle = at_base >= ENOUGH * margin;
     let affordable = if is_gentle { at_base } else { affordable_margin(limit, h) };
-    let kept = affordable.clamp(0.0, if is_gentle { margin } else { ENOUGH * margin });
+    let kept = elementary::clamp(affordable, 0.0, if is_gentle { margin } else { ENOUGH * margin });
     let mut e = *h;
     e[0] -= kept;
     let e = &e;
@@ -159,7 +159,7 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
     // 2. The smallest rate that will do, where the gentle one does not.
     let over_smallest = if N == 2 { OVER_SMALLEST } else { 1.0 };
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
-    let gentle = if is_gentle { base } else { smallest().clamp(base, limit) };
+    let gentle = if is_gentle { base } else { elementary::clamp(smallest(), base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
     let possible = means.drift + means.reach;
     // 3. The plant's own pull is left to later where h can hardly be influenced, or comes back by itself.

@@ -171,10 +171,15 @@ impl Commitment {
         }
     }
 
-    /// Forgets what was promised. A plan that stood behind it is kept to go on with, and when the last sample was.
+    /// Forgets what was promised. A plan that was followed for it is kept to go on with, and when the last sample was.
     fn rearm(&mut self) {
-        let Self { standing, plan, sample, .. } = core::mem::take(self);
-        if matches!(standing, Standing::Assured | Standing::Undecided) {
+        let Self { standing, promises, plan, sample, .. } = core::mem::take(self);
+        let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
+        let is_followed = match standing {
+            Standing::Assured => !sample.is_none_or(is_over),
+            _ => standing == Standing::Undecided,
+        };
+        if is_followed {
             (self.plan, self.sample) = (plan, sample);
         }
     }
