@@ -24,6 +24,8 @@ use crate::scalar::all_finite;
 /// more than a part of the largest h there is: a small set that is far away has no room for it.
 const MARGIN: f64 = 1e-4;
 const ROOM: f64 = 0.05;
+/// Its least size, as that of h where each state is moved so far, and by so much of itself: plans are no better resolved.
+const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
 /// Margin of the rows behind which plans are, in units of theirs.
 const AMPLE: f64 = 2.0;
 /// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
@@ -195,6 +197,9 @@ struct Promise {
     until: f64,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     margin: f64,
+    /// From when in s it has to be there: what begins at the edge of its set has a period to leave it.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    firm: f64,
     /// What new plans keep, ≥ 0: a reserve where it is more than the margin.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     reserve: f64,
@@ -611,8 +616,10 @@ impl AssuredFilter {
             if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
                 return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
             }
-            let is_promise =
-                |p: &Promise| p.from.is_finite() && !p.until.is_nan() && p.margin >= 0.0 && p.reserve >= 0.0;
+            let is_promise = |p: &Promise| {
+                let is_timed = p.from.is_finite() && p.firm.is_finite() && !p.until.is_nan();
+                is_timed && p.margin >= 0.0 && p.reserve >= 0.0
+            };
             if !promises.iter().flatten().all(is_promise) {
                 return refuse("promises", "have a time or a margin that is no number");
             }
@@ -946,11 +953,12 @@ impl AssuredFilter {
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
+            let firm = if from == t && h < AMPLE * margin { t + self.period } else { from };
             // Half of the user's, so that a plan stands behind the rows, which aim at all of it.
             let reserve = slot.promise.settings().margin / AMPLE;
             // What is kept from now on may be nearer to its edge.
             let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
-            (!soft && until > from).then_some(Promise { from, until, margin, reserve })
+            (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
         };
         self.filter().slots.iter().zip(self.models()).map(promise).collect()
     }
@@ -1081,9 +1089,13 @@ impl AssuredFilter {
             .models()
             .zip(promises)
             .enumerate()
-            .filter_map(|(barrier, (model, promise))| {
-                let Promise { from, until, margin, reserve } = (*promise)?;
-                Some(Requirement { barrier, is_limit: false, model, from, until, margin, reserve })
+            .filter_map(|(barrier, (model, promise))| Some((barrier, model, (*promise)?)))
+            .flat_map(|(barrier, model, Promise { from, until, margin, firm, reserve })| {
+                let all = Requirement { barrier, is_limit: false, model, from, until, margin, reserve };
+                let edge = Requirement { until: firm, margin: 0.0, reserve: 0.0, ..all };
+                let is_at_edge = from < firm && t < firm;
+                let rest = if is_at_edge { Requirement { from: firm, ..all } } else { all };
+                is_at_edge.then_some(edge).into_iter().chain([rest])
             })
             .collect();
         if requirements.is_empty() {
@@ -1328,9 +1340,27 @@ impl Looked {
 
 /// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
 fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
-    let wanted = MARGIN * h.abs();
+    let mut gradient = x.to_vec();
+    slopes(model, t, &mut x.to_vec(), &mut gradient);
+    let resolved: f64 =
+        x.iter().zip(&gradient).map(|(x, g)| g.abs() * (RESOLVED[0] + RESOLVED[1] * x.abs())).sum();
+    // Not-a-number is no size.
+    let wanted = (MARGIN * h.abs()).max(resolved);
     let highest = highest(model, t, x, wanted / ROOM);
     if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
+}
+
+/// Writes the slope of h at `t` and `x` along each state, by central differences.
+fn slopes(model: &dyn Predict, t: f64, x: &mut [f64], gradient: &mut [f64]) {
+    for i in 0..x.len() {
+        let (at, size) = (x[i], 1e-6 * (1.0 + x[i].abs()));
+        let [above, below] = [size, -size].map(|by| {
+            x[i] = at + by;
+            model.value(t, x)
+        });
+        x[i] = at;
+        gradient[i] = (above - below) / (2.0 * size);
+    }
 }
 
 /// The largest h found uphill from `x` at `t`, up to `enough`.
@@ -1340,15 +1370,7 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
     let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
     let mut h = model.value(t, &x);
     for _ in 0..STEPS {
-        for i in 0..x.len() {
-            let (at, size) = (x[i], 1e-6 * (1.0 + x[i].abs()));
-            let [above, below] = [size, -size].map(|by| {
-                x[i] = at + by;
-                model.value(t, &x)
-            });
-            x[i] = at;
-            gradient[i] = (above - below) / (2.0 * size);
-        }
+        slopes(model, t, &mut x, &mut gradient);
         let steepness: f64 = gradient.iter().map(|g| g * g).sum();
         let mut length = (enough - h) / steepness;
         let climbs = (0..HALVINGS).any(|_| {

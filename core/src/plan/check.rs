@@ -201,6 +201,8 @@ pub(super) struct Walk<'a> {
     /// Enclosures of those courses and of the rate on a piece.
     over: Vec<CourseOver>,
     rate_over: Vec<RateOver>,
+    /// The courses beside those of the states.
+    beside: Vec<Course>,
     pieces: u32,
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
@@ -291,6 +293,7 @@ impl<'a> Walk<'a> {
             rate: x.to_vec(),
             over: Vec::with_capacity(x.len()),
             rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
+            beside: vec![[0.0; COURSE]; x.len()],
             pieces: 0,
             longest: f64::INFINITY,
             growth: LONGER,
@@ -463,6 +466,9 @@ impl<'a> Walk<'a> {
                 return Err(Failure::Singular);
             }
         }
+        if !self.is_smooth_beside(u) {
+            return Err(Failure::Singular);
+        }
         self.longest *= self.growth;
         self.growth *= self.growth;
         let end = if dt < whole { self.t + dt } else { node };
@@ -545,6 +551,21 @@ impl<'a> Walk<'a> {
             }
         }
         false
+    }
+
+    /// Whether the plant has a course beside its state too, in one of four directions, by as much as that which is moved: where a
+    /// tank runs dry its rate has an infinite slope, and no course tells what comes after. A piece that ends near such a place
+    /// was cut short before it.
+    fn is_smooth_beside(&mut self, u: &[f64]) -> bool {
+        if self.longest == f64::INFINITY || self.strictness <= 0.0 {
+            return true;
+        }
+        for (i, (point, x)) in (0_u32..).zip(self.point.iter_mut().zip(&self.x)) {
+            let sign = if (self.pieces + i * (self.pieces / 2)).is_multiple_of(2) { 1.0 } else { -1.0 };
+            *point = x + sign * self.strictness * ASIDE * size_beside(*x, self.aside.origin[i as usize]);
+        }
+        self.model.plant.path(&self.point, u, &mut self.beside);
+        all_finite(self.beside.as_flattened())
     }
 
     /// Writes what the course of each state misses its rate by `after` s after its begin to `rate`.
