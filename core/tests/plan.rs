@@ -1480,6 +1480,74 @@ fn a_plant_that_rests_elsewhere_is_promised() {
     }
 }
 
+/// A tank that nobody fills runs dry, and from there no course tells what comes: a plan stops before, and what is promised is
+/// not lost. Judged by a plant that stays empty.
+#[test]
+fn no_plan_lets_a_tank_run_dry() {
+    let random = &mut Random(41);
+    for round in 0..12 {
+        let (rate, pump) = (random.between(0.1, 0.4), random.between(0.2, 0.6));
+        let (limit, period) = (random.between(0.5, 2.0), random.between(0.1, 2.0));
+        let mut x = limit * random.between(0.3, 0.99);
+        let filter = SafetyFilter::builder(1, 1)
+            .barrier(
+                "level",
+                Tank(rate),
+                StateBound::at_most(0, limit).expect("a bound"),
+                BarrierSettings::keeping(),
+            )
+            .and_then(|b| b.bounds(&[0.0], &[pump]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        for k in 0..300 {
+            let (t, mut u) = (f64::from(k) * period, [0.0]);
+            let assurance = *filter.step(t, &[x], &[0.0], &mut u).expect("dimensions");
+            assert!(assurance.is_assured(), "{round}, at {t}, {x}: {assurance:?}");
+            for _ in 0..200 {
+                // Not-a-number is empty.
+                x = rk4_step(&Tank(rate), &[x].into(), &u.into(), period / 200.0)[0].max(0.0);
+            }
+            assert!(x <= limit, "{round}, at {t}: {x}");
+        }
+    }
+}
+
+/// What begins at the edge of its set, or hardly inside, is promised with a margin that a plan resolves, and not lost to round-off.
+#[test]
+fn a_start_at_the_edge_is_not_lost_to_round_off() {
+    let random = &mut Random(43);
+    let mut assured = [0; 6];
+    for round in 0..120 {
+        let inside = [0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4][round % 6];
+        let (limit, period) = (random.between(0.2, 0.9), 10.0_f64.powf(random.between(-2.0, -0.5)));
+        let speed = [0.0, -1e-3, -0.1][round / 6 % 3];
+        let edge = StateBound::at_most(0, limit).expect("a bound");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("edge", PointMass, edge, BarrierSettings::keeping())
+            .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2]))
+            .and_then(|b| b.sampling(Sampling::Period(period)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        let mut x = [limit - inside, 0.0, speed, 0.0];
+        for k in 0..200 {
+            let wish = if round % 2 == 0 { 1.0 } else { random.between(-1.0, 1.0) };
+            let (t, mut u) = (f64::from(k) * period, [0.0; 2]);
+            let assurance = *filter.step(t, &x, &[wish, 0.0], &mut u).expect("dimensions");
+            if k == 0 && !assurance.is_assured() {
+                break;
+            }
+            assured[round % 6] += u32::from(k == 0);
+            assert!(assurance.is_assured(), "{round}, {inside} inside, at {t}: {assurance:?}");
+            x = Vehicle::PointMass.move_by(x, u, period);
+            assert!(x[0] <= limit + 1e-15, "{round}, at {t}: {x:?}");
+        }
+    }
+    assert!(assured.iter().all(|count| *count > 18), "{assured:?}");
+}
+
 #[test]
 fn at_the_edge_the_input_does_not_chatter() {
     const BOUND: f64 = 5.0;

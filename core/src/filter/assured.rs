@@ -953,7 +953,7 @@ impl AssuredFilter {
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
-            let firm = if from == t && h < AMPLE * margin { t + self.period } else { from };
+            let firm = if from == t && h < AMPLE * margin { after(self.period) } else { t };
             // Half of the user's, so that a plan stands behind the rows, which aim at all of it.
             let reserve = slot.promise.settings().margin / AMPLE;
             // What is kept from now on may be nearer to its edge.
@@ -1089,13 +1089,9 @@ impl AssuredFilter {
             .models()
             .zip(promises)
             .enumerate()
-            .filter_map(|(barrier, (model, promise))| Some((barrier, model, (*promise)?)))
-            .flat_map(|(barrier, model, Promise { from, until, margin, firm, reserve })| {
-                let all = Requirement { barrier, is_limit: false, model, from, until, margin, reserve };
-                let edge = Requirement { until: firm, margin: 0.0, reserve: 0.0, ..all };
-                let is_at_edge = from < firm && t < firm;
-                let rest = if is_at_edge { Requirement { from: firm, ..all } } else { all };
-                is_at_edge.then_some(edge).into_iter().chain([rest])
+            .filter_map(|(barrier, (model, promise))| {
+                let Promise { from, until, margin, firm, reserve } = (*promise)?;
+                Some(Requirement { barrier, is_limit: false, model, from, until, margin, firm, reserve })
             })
             .collect();
         if requirements.is_empty() {
@@ -1106,7 +1102,16 @@ impl AssuredFilter {
         let limits = self.limits(plant);
         requirements.extend(limits.iter().zip(promises.len()..).map(|(limit, barrier)| {
             let (from, until) = (t, f64::INFINITY);
-            Requirement { barrier, is_limit: true, model: limit, from, until, margin: 0.0, reserve: 0.0 }
+            Requirement {
+                barrier,
+                is_limit: true,
+                model: limit,
+                from,
+                until,
+                margin: 0.0,
+                firm: t,
+                reserve: 0.0,
+            }
         }));
         let mut planner = Planner::new(plant, dims, &self.bounds, &requirements, period, size);
         if let Rows::Integrated(own) = &self.rows {

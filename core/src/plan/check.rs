@@ -33,6 +33,8 @@ const RESIDUAL: f64 = 1e-8;
 const ORDERS: [usize; 2] = [FEW_ORDERS, COURSE - 1];
 /// How much longer than a piece that has been halved the next may be. The one after that by the square of it, and so on.
 const LONGER: f64 = 1.2;
+/// The margin at the edge of a set, in units of that inside: what round-off may miss.
+const EDGE: f64 = -1e-6;
 /// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
 const HALVINGS: u32 = 14;
 const SHARPER: u32 = 3;
@@ -320,12 +322,18 @@ impl<'a> Walk<'a> {
 
     /// The least value of requirement `i`. With less strictness the reserve may be used up.
     fn least_of(&self, i: usize) -> f64 {
-        let reserve = if self.strictness >= 1.0 { self.requirements[i].reserve } else { f64::NEG_INFINITY };
+        let is_new = self.strictness >= 1.0 && self.is_firm(i);
+        let reserve = if is_new { self.requirements[i].reserve } else { f64::NEG_INFINITY };
         self.margin(i).max(reserve)
     }
 
     fn margin(&self, i: usize) -> f64 {
-        self.strictness * self.requirements[i].margin
+        self.strictness * self.requirements[i].margin * if self.is_firm(i) { 1.0 } else { EDGE }
+    }
+
+    /// Whether the margin of requirement `i` has to be there.
+    fn is_firm(&self, i: usize) -> bool {
+        self.t >= self.requirements[i].firm
     }
 
     /// Notes that h of requirement `i` is at least `h` around `t`.
@@ -707,6 +715,10 @@ impl<'a> Walk<'a> {
 
     /// Whether the plant that stands still under `u`, the input of `brake`, can stay here for ever. Notes what is tightest there.
     fn stays(&mut self, brake: &Brake, hold: f64, u: &[f64]) -> Result<bool, Failure> {
+        // Not at the edge of a set, where a margin has to be there later.
+        if !(0..self.requirements.len()).all(|i| self.is_firm(i)) {
+            return Ok(false);
+        }
         let tightest = self.witness.tightest;
         let stays = self.rests(u, hold).map(|rests| rests && self.settles(brake, hold));
         if !matches!(stays, Ok(true)) {

@@ -54,6 +54,8 @@ pub struct Requirement<'a> {
     pub until: f64,
     /// Least value in the unit of h, ≥ 0.
     pub margin: f64,
+    /// From when in s it has to be there: what begins at the edge has some time to leave it.
+    pub firm: f64,
     /// Least value that a new plan keeps, in the unit of h, ≥ 0: what is more than the margin is a reserve for a plant that is
     /// not quite the model. The rest of a plan may use it up.
     pub reserve: f64,
