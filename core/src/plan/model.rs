@@ -131,13 +131,17 @@ impl Model<'_> {
                 return None;
             }
             // An input that its bounds stop leaves the rest of the way to the state.
+            let mut stopped = vec![false; nu];
             let step = loop {
                 let svd = jacobian.clone().svd(true, true);
                 let step = svd.solve(&rate, RANK * svd.singular_values.max()).ok()?;
-                let is_stopped =
-                    |i: &usize| step[nx + i] != 0.0 && self.bounds.clamp(*i, u[*i] - step[nx + i]) == u[*i];
-                match (0..nu).find(is_stopped) {
-                    Some(i) => jacobian.fill_column(nx + i, 0.0),
+                let stops =
+                    |i: usize| step[nx + i] != 0.0 && self.bounds.clamp(i, u[i] - step[nx + i]) == u[i];
+                match (0..nu).find(|i| !stopped[*i] && stops(*i)) {
+                    Some(i) => {
+                        stopped[i] = true;
+                        jacobian.fill_column(nx + i, 0.0);
+                    }
                     None => break step,
                 }
             };
