@@ -396,13 +396,9 @@ impl<'a> Planner<'a> {
         plan.witness = walk(&plan).or_else(|failure| {
             let is_before = matches!(failure, Failure::Broken { time, .. } if time <= times[times.len() - 1]);
             // Where not every place is a rest, the law leads back to the one that it is around.
-            match ending.at_end(found, self.period).filter(|_| !is_before) {
-                None => Err(failure),
-                near => {
-                    plan.brake = near;
-                    walk(&plan).map_err(|_| failure)
-                }
-            }
+            let near = if is_before { None } else { ending.at_end(found, self.period) };
+            plan.brake = Some(near.ok_or(failure)?);
+            walk(&plan).map_err(|_| failure)
         })?;
         Ok(plan)
     }
