@@ -1408,58 +1408,61 @@ impl<const NX: usize> Barrier<NX> for Band {
     }
 }
 
-/// A plant that stands still at few places only ends its plan at one in the set, not at the one that it began near: a tank
-/// that is filled or emptied, what grows or dies away, a motor. From `from` to `band`, with inputs from `low` to `high`.
-#[test]
-fn a_plant_that_rests_elsewhere_is_promised() {
-    fn kept<P, const NX: usize>(
-        plant: P,
-        from: [f64; NX],
-        band: Band,
-        [low, high]: [f64; 2],
-        deadline: f64,
-        wish: u32,
-    ) where
-        P: ControlAffine<NX, 1> + Copy + Send + core::fmt::Debug + 'static,
-    {
-        let period = deadline / 150.0;
-        let filter = SafetyFilter::builder(NX, 1)
-            .barrier("band", plant, band, BarrierSettings::within(deadline))
-            .and_then(|b| b.bounds(&[low], &[high]))
-            .and_then(|b| b.sampling(Sampling::Period(period)))
-            .and_then(FilterBuilder::build)
-            .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("plans");
-        let mut x = SVector::from(from);
-        for k in 0..300_u32 {
-            let (t, mut u) = (f64::from(k) * period, [0.0]);
-            let wanted = match wish {
-                0 => 0.0,
-                1 => low,
-                2 => high,
-                _ => {
-                    if k / 20 % 2 == 0 {
-                        low
-                    } else {
-                        high
-                    }
+/// A plant with one input, from `from` to `band` by its deadline and twice as long, with inputs from `low` to `high`, held for
+/// that deadline over `steps`: it is promised, and kept at all instants, whatever is wanted.
+fn kept<P, const NX: usize>(
+    plant: P,
+    from: [f64; NX],
+    band: Band,
+    [low, high]: [f64; 2],
+    (deadline, steps): (f64, u32),
+    wish: u32,
+) where
+    P: ControlAffine<NX, 1> + Copy + Send + core::fmt::Debug + 'static,
+{
+    let period = deadline / f64::from(steps);
+    let filter = SafetyFilter::builder(NX, 1)
+        .barrier("band", plant, band, BarrierSettings::within(deadline))
+        .and_then(|b| b.bounds(&[low], &[high]))
+        .and_then(|b| b.sampling(Sampling::Period(period)))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let mut filter = AssuredFilter::new(filter, period).expect("plans");
+    let mut x = SVector::from(from);
+    for k in 0..2 * steps {
+        let (t, mut u) = (f64::from(k) * period, [0.0]);
+        let wanted = match wish {
+            0 => 0.0,
+            1 => low,
+            2 => high,
+            _ => {
+                if k / 20 % 2 == 0 {
+                    low
+                } else {
+                    high
                 }
-            };
-            let assurance = *filter.step(t, x.as_slice(), &[wanted], &mut u).expect("right dimensions");
-            assert!(
-                assurance.is_assured(),
-                "{plant:?} from {from:?} to {band:?}, wish {wish}, at {t}: {assurance:?}"
-            );
-            assert!((low..=high).contains(&u[0]), "{u:?}");
-            for part in 1..=10_u32 {
-                x = rk4_step(&plant, &x, &SVector::from(u), period / 10.0);
-                let now = t + f64::from(part) * period / 10.0;
-                let away = (x[0] - band.0).abs() - band.1;
-                // An integrator of our own beside that of the plan.
-                assert!(now < deadline + 1e-9 || away <= 1e-9, "{plant:?} from {from:?}, at {now}: {away}");
             }
+        };
+        let assurance = *filter.step(t, x.as_slice(), &[wanted], &mut u).expect("right dimensions");
+        assert!(
+            assurance.is_assured(),
+            "{plant:?} from {from:?} to {band:?}, wish {wish}, at {t}: {assurance:?}"
+        );
+        assert!((low..=high).contains(&u[0]), "{u:?}");
+        for part in 1..=10_u32 {
+            x = rk4_step(&plant, &x, &SVector::from(u), period / 10.0);
+            let now = t + f64::from(part) * period / 10.0;
+            let away = (x[0] - band.0).abs() - band.1;
+            // An integrator of our own beside that of the plan.
+            assert!(now < deadline + 1e-9 || away <= 1e-9, "{plant:?} from {from:?}, at {now}: {away}");
         }
     }
+}
+
+/// A plant that stands still at few places only ends its plan at one in the set, not at the one that it began near: a tank
+/// that is filled or emptied, what grows or dies away, a motor.
+#[test]
+fn a_plant_that_rests_elsewhere_is_promised() {
     for (seed, wish) in (1..=16_u64).zip((0..4).cycle()) {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         // A level that two thirds of the pump hold, from a tenth to nearly twice of it.
@@ -1467,16 +1470,86 @@ fn a_plant_that_rests_elsewhere_is_promised() {
         let level = (0.66 * pump / rate) * (0.66 * pump / rate);
         let band = Band(level, random.between(0.05, 0.2) * level);
         let from = random.between(0.1, 1.8) * level;
-        kept(Tank(rate), [from], band, [0.0, pump], 8.0 * level / pump, wish);
+        kept(Tank(rate), [from], band, [0.0, pump], (8.0 * level / pump, 150), wish);
         // Inputs that hold the number at no more than its start.
         let rate = random.between(-2.0, 2.0);
         let hold = 2.0 * rate.abs().max(0.1);
         let band = Band(random.between(-1.0, 1.0), 0.2);
-        kept(FirstOrder(rate), [random.between(-1.0, 1.0)], band, [-hold, hold], 10.0 / hold, wish);
+        kept(FirstOrder(rate), [random.between(-1.0, 1.0)], band, [-hold, hold], (10.0 / hold, 150), wish);
         let motor = Motor([random.between(0.05, 1.0), random.between(0.3, 5.0)]);
         let hold = 1.0 + motor.0[0] * motor.0[1];
         let band = Band(random.between(-0.6, 0.6), 0.1);
-        kept(motor, [random.between(-0.6, 0.6), 0.0], band, [-hold, hold], 8.0 / motor.0[0].max(0.5), wish);
+        kept(
+            motor,
+            [random.between(-0.6, 0.6), 0.0],
+            band,
+            [-hold, hold],
+            (8.0 / motor.0[0].max(0.5), 150),
+            wish,
+        );
+    }
+}
+
+/// A pendulum without friction: its angle in rad from where it hangs, and its rate. g = 9.81 m/s2 over 1 m.
+#[derive(Clone, Copy, Debug)]
+struct Pendulum;
+
+impl ControlAffine<2, 1> for Pendulum {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1], x[0].sin() * -9.81])
+    }
+
+    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), S::one()]])
+    }
+}
+
+/// A steel ball below a magnet: its distance in m and its rate. The input is the square of the current, in some unit.
+#[derive(Clone, Copy, Debug)]
+struct Magnet;
+
+impl ControlAffine<2, 1> for Magnet {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        SVector::from([x[1], S::from(9.81)])
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+        SMatrix::from([[S::zero(), -(S::one() / x[0].squared())]])
+    }
+}
+
+/// What grows by `self.0 - x` of itself in a second, and is taken away at the rate of the input.
+#[derive(Clone, Copy, Debug)]
+struct Harvest(f64);
+
+impl ControlAffine<1, 1> for Harvest {
+    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
+        SVector::from([x[0] * (-x[0] + self.0)])
+    }
+
+    fn input_map<S: Scalar>(&self, x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
+        SMatrix::from([[-x[0]]])
+    }
+}
+
+/// A search begins with a rest within the set too, and a plan may end under the law that leads there: the rest near the start is
+/// far away, falls by itself, or is lost within a hold, and no input to either side comes near.
+#[test]
+fn a_plan_leads_to_a_rest_within_the_set() {
+    for (seed, wish) in (1..=8_u64).zip((0..4).cycle()) {
+        let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
+        let mut about = |value: f64| random.between(0.95, 1.05) * value;
+        kept(
+            FirstOrder(-about(0.027)),
+            [about(0.33)],
+            Band(about(2.1), 0.064),
+            [0.0, 0.45],
+            (14.2, 10),
+            wish,
+        );
+        kept(Pendulum, [about(2.45), 0.0], Band(2.55, about(0.25)), [-8.3, 8.3], (6.1, 50), wish);
+        kept(Magnet, [about(0.76), about(0.14)], Band(0.8, about(0.08)), [0.0, 11.7], (3.1, 10), wish);
+        kept(Harvest(about(1.8)), [about(0.37)], Band(0.27, about(0.04)), [0.0, 1.75], (15.0, 400), wish);
     }
 }
 

@@ -16,7 +16,9 @@ use crate::convergence::FixedTimeState;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Tightest, Witness};
+use crate::plan::{
+    Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Tightest, Witness, slopes,
+};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -1346,26 +1348,13 @@ impl Looked {
 /// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
 fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
     let mut gradient = x.to_vec();
-    slopes(model, t, &mut x.to_vec(), &mut gradient);
+    slopes(model, t, x, &mut gradient);
     let resolved: f64 =
         x.iter().zip(&gradient).map(|(x, g)| g.abs() * (RESOLVED[0] + RESOLVED[1] * x.abs())).sum();
     // Not-a-number is no size.
     let wanted = (MARGIN * h.abs()).max(resolved);
     let highest = highest(model, t, x, wanted / ROOM);
     if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
-}
-
-/// Writes the slope of h at `t` and `x` along each state, by central differences.
-fn slopes(model: &dyn Predict, t: f64, x: &mut [f64], gradient: &mut [f64]) {
-    for i in 0..x.len() {
-        let (at, size) = (x[i], 1e-6 * (1.0 + x[i].abs()));
-        let [above, below] = [size, -size].map(|by| {
-            x[i] = at + by;
-            model.value(t, x)
-        });
-        x[i] = at;
-        gradient[i] = (above - below) / (2.0 * size);
-    }
 }
 
 /// The largest h found uphill from `x` at `t`, up to `enough`.
@@ -1375,7 +1364,7 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
     let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
     let mut h = model.value(t, &x);
     for _ in 0..STEPS {
-        slopes(model, t, &mut x, &mut gradient);
+        slopes(model, t, &x, &mut gradient);
         let steepness: f64 = gradient.iter().map(|g| g * g).sum();
         let mut length = (enough - h) / steepness;
         let climbs = (0..HALVINGS).any(|_| {

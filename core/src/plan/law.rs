@@ -41,14 +41,27 @@ const STILL: f64 = 1e-8;
 impl Brake {
     /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
     pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
-        let (state, input) = model.rest(x, hold)?;
+        let (state, input) = model.rest(x)?;
         Self::at(model, state, input, hold)
     }
 
     /// The law around the rest near `x` and the input `u`, as [`Self::around`].
     pub(super) fn beside(model: &Model<'_>, x: &[f64], u: &[f64], hold: f64) -> Option<Self> {
-        let (state, input) = model.rest_from(x, u.to_vec(), hold)?;
+        let (state, input) = model.rest_from(x, u.to_vec())?;
         Self::at(model, state, input, hold)
+    }
+
+    /// The law that leads from `x` to the rest at `state` under `input`: it asks for the place too, as a reference does.
+    pub(super) fn to(
+        model: &Model<'_>,
+        x: &[f64],
+        (state, input): (Vec<f64>, Vec<f64>),
+        hold: f64,
+    ) -> Option<Self> {
+        let Linear { a, b } = model.linear(&state, &input, hold);
+        let (growth, (q, r)) = (largest_eigenvalue(&a), prices(model, &[x, &state], &[&input]));
+        let gain = regulator(&a, &b, &q, &r).filter(|gain| gain.iter().all(|v| v.is_finite()))?;
+        growth.is_finite().then_some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
     /// The same law with shorter holds where the rest is lost sooner; they are so many times `period`.
@@ -185,22 +198,7 @@ impl Gain {
         inputs: &[Vec<f64>],
         linear: &[Linear],
     ) -> Option<Vec<Self>> {
-        let (nx, nu) = (model.states(), model.inputs());
-        // A deviation is priced by how far its state moves along the reference, an input by its bounds.
-        let span = |i: usize| {
-            let (low, high) = states
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
-            high - low
-        };
-        let largest = (0..nx).map(span).fold(0.0, f64::max);
-        let size = |i: usize| if largest > 0.0 { span(i).max(0.01 * largest) } else { 1.0 };
-        let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / size(i))));
-        let inputs = &inputs[..linear.len()];
-        let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u[i].abs())).max(1e-3);
-        let r = DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| {
-            0.01 * square(1.0 / model.reach(i, reached(i)))
-        }));
+        let (q, r) = prices(model, states, &inputs[..linear.len()]);
         let mut p = &q * 10.0;
         let mut gains = Vec::with_capacity(linear.len());
         for Linear { a, b } in linear.iter().rev() {
@@ -211,6 +209,30 @@ impl Gain {
         gains.reverse();
         gains.iter().all(|gain| all_finite(&gain.0)).then_some(gains)
     }
+}
+
+/// The prices of a deviation and of an input along `states` and `inputs`: a deviation is priced by how far its state moves
+/// there, an input by its bounds.
+fn prices(
+    model: &Model<'_>,
+    states: &[impl AsRef<[f64]>],
+    inputs: &[impl AsRef<[f64]>],
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (nx, nu) = (model.states(), model.inputs());
+    let span = |i: usize| {
+        let (low, high) = states.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            let x = x.as_ref()[i];
+            (low.min(x), high.max(x))
+        });
+        high - low
+    };
+    let largest = (0..nx).map(span).fold(0.0, f64::max);
+    let size = |i: usize| if largest > 0.0 { span(i).max(0.01 * largest) } else { 1.0 };
+    let q = DMatrix::from_diagonal(&DVector::from_fn(nx, |i, _| square(1.0 / size(i))));
+    let reached = |i: usize| inputs.iter().fold(0.0, |m: f64, u| m.max(u.as_ref()[i].abs())).max(1e-3);
+    let r =
+        DMatrix::from_diagonal(&DVector::from_fn(nu, |i, _| 0.01 * square(1.0 / model.reach(i, reached(i)))));
+    (q, r)
 }
 
 /// The gain that is best in the long run, where the Riccati equation settles.

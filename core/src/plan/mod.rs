@@ -30,6 +30,7 @@ pub(crate) use check::ON_TIME;
 pub use check::{Failure, Tightest, Witness};
 pub use integral::Integral;
 pub(crate) use integral::Limit;
+pub(crate) use model::slopes;
 pub use planner::Planner;
 
 use alloc::boxed::Box;

@@ -91,41 +91,54 @@ impl Model<'_> {
         DVector::from_iterator(x.len(), end.iter().zip(x).map(|(e, x)| (e - x) / duration))
     }
 
-    /// A state near `x` and an input within the bounds that holds it there for `duration` s: least change by
-    /// Gauss-Newton steps. `None` where none is found.
-    pub(super) fn rest(&self, x: &[f64], duration: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// A state near `x` and an input within the bounds that holds it there for a step: least change by Gauss-Newton steps.
+    /// `None` where none is found.
+    pub(super) fn rest(&self, x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let mut u = vec![0.0; self.inputs()];
         self.clamp(&mut u);
-        self.rest_from(x, u, duration).or_else(|| {
+        self.rest_from(x, u).or_else(|| {
             // Without an input a tank may run empty meanwhile.
             let middle = |i: usize| (self.bounds.min[i] + self.bounds.max[i]) / 2.0;
             let middle = (0..self.inputs()).map(middle).map(|u| if u.is_finite() { u } else { 0.0 });
-            self.rest_from(x, middle.collect(), duration)
+            self.rest_from(x, middle.collect())
         })
     }
 
     /// That rest, sought from the input `u` on.
-    pub(super) fn rest_from(
+    pub(super) fn rest_from(&self, x: &[f64], u: Vec<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
+        self.rest_within(x, u, |_, _| {})
+    }
+
+    /// The same within sets: `missing` tells at a state of each set that it is outside of how much h lacks there, > 0, over
+    /// the length of its gradient, and that gradient over its length.
+    pub(super) fn rest_within(
         &self,
         x: &[f64],
         mut u: Vec<f64>,
-        duration: f64,
+        missing: impl Fn(&[f64], &mut Vec<(f64, Vec<f64>)>),
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let (nx, nu) = (self.states(), self.inputs());
-        let mut at = x.to_vec();
+        let (mut at, mut outside, duration) = (x.to_vec(), Vec::new(), self.step);
         for _ in 0..TO_REST {
             let rate = self.rate(&at, &u, duration);
             if !rate.iter().all(|r| r.is_finite()) {
                 return None;
             }
+            outside.clear();
+            missing(&at, &mut outside);
             let still = |(x, r): (&f64, &f64)| r.abs() <= 1e-9 + ROUND_OFF * x.abs() / duration;
-            if at.iter().zip(rate.iter()).all(still) {
+            if outside.is_empty() && at.iter().zip(rate.iter()).all(still) {
                 return Some((at, u));
             }
             let Linear { a, b } = self.linear(&at, &u, duration);
-            let mut jacobian = DMatrix::zeros(nx, nx + nu);
+            let mut jacobian = DMatrix::zeros(nx + outside.len(), nx + nu);
             jacobian.view_mut((0, 0), (nx, nx)).copy_from(&((a - DMatrix::identity(nx, nx)) / duration));
             jacobian.view_mut((0, nx), (nx, nu)).copy_from(&(b / duration));
+            let lacking = outside.iter().map(|(lacks, _)| -lacks);
+            let wanted = DVector::from_iterator(nx + outside.len(), rate.iter().copied().chain(lacking));
+            for (i, (_, gradient)) in outside.iter().enumerate() {
+                jacobian.view_mut((nx + i, 0), (1, nx)).copy_from_slice(gradient);
+            }
             // Of what is no number the decomposition need not end.
             if !jacobian.iter().all(|v| v.is_finite()) {
                 return None;
@@ -134,7 +147,7 @@ impl Model<'_> {
             let mut stopped = vec![false; nu];
             let step = loop {
                 let svd = jacobian.clone().svd(true, true);
-                let step = svd.solve(&rate, RANK * svd.singular_values.max()).ok()?;
+                let step = svd.solve(&wanted, RANK * svd.singular_values.max()).ok()?;
                 let stops =
                     |i: usize| step[nx + i] != 0.0 && self.bounds.clamp(i, u[i] - step[nx + i]) == u[i];
                 match (0..nu).find(|i| !stopped[*i] && stops(*i)) {
@@ -154,6 +167,20 @@ impl Model<'_> {
             self.clamp(&mut u);
         }
         None
+    }
+}
+
+/// Writes the slope of h at `t` and `x` along each state, by central differences.
+pub(crate) fn slopes(h: &dyn Predict, t: f64, x: &[f64], out: &mut [f64]) {
+    let mut moved = x.to_vec();
+    for (i, slope) in out.iter_mut().enumerate() {
+        let size = DIFFERENCE * (1.0 + x[i].abs());
+        let [above, below] = [size, -size].map(|by| {
+            moved[i] = x[i] + by;
+            h.value(t, &moved)
+        });
+        moved[i] = x[i];
+        *slope = (above - below) / (2.0 * size);
     }
 }
 

@@ -6,12 +6,12 @@ use alloc::vec::Vec;
 
 use super::check::{Failure, Grid, Walk, Witness};
 use super::law::{Brake, Gain, Reference};
-use super::model::Model;
+use super::model::{Model, slopes};
 use super::search::{Descent, Search, Trajectory};
 use super::{Integral, Plan, Policy, Requirement};
-use crate::MAX_INPUTS;
 use crate::lie::Predict;
 use crate::qp::Bounds;
+use crate::{MAX_INPUTS, elementary};
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
@@ -23,6 +23,8 @@ const UNDATED: usize = 5;
 const LONGER: [usize; 2] = [40, 320];
 /// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
+/// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
+const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
@@ -54,6 +56,10 @@ const HALVINGS: u32 = 7;
 const ASKED: f64 = 16.0;
 /// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
 const GUESSES: [[f64; 2]; 3] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0]];
+/// What is gone for, of how deep inside a set it has to be: round-off is not missing then.
+const BEYOND: f64 = 1.5;
+/// How many times as deep inside the sets a rest is sought as the one before, and how often.
+const DEEPER: (f64, usize) = (4.0, 10);
 /// How far a plan without a rest is sought, in units of how far it has to reach: the next search is that much later.
 const AMPLE: f64 = 1.5;
 
@@ -91,6 +97,8 @@ struct Ending<'a> {
     /// The length of a hold of the search in s.
     hold: f64,
     brake: Option<Arc<Brake>>,
+    /// The law that leads to a rest within the sets.
+    aim: Option<Arc<Brake>>,
 }
 
 impl Ending<'_> {
@@ -236,15 +244,19 @@ impl<'a> Planner<'a> {
                 (hold, times) = grid;
                 guide = Brake::around(&model, x, hold).or(guide);
             }
-            let brake = guide.as_ref().and_then(|guide| guide.shorter(&model, self.period));
-            if horizon.is_none() && brake.is_none() {
+            let mut guide = Guide(guide);
+            let aim = self.aim(&sketch, &requirements, &guide, (times[times.len() - 1], hold), x);
+            guide.0 = guide.0.or_else(|| aim.clone());
+            let law = |at: &Option<Brake>| {
+                let shorter = at.as_ref().filter(|_| horizon.is_none())?.shorter(&model, self.period);
+                shorter.map(Arc::new)
+            };
+            let ending = Ending { model, hold, brake: law(&guide.0), aim: law(&aim) };
+            if horizon.is_none() && ending.brake.is_none() {
                 failure.get_or_insert(Failure::NoRest);
                 continue;
             }
-            let brake = brake.filter(|_| horizon.is_none()).map(Arc::new);
-            let ending = Ending { model, hold, brake };
-            let guide = Guide(guide);
-            let mut search = Search {
+            let search = Search {
                 model: sketch,
                 requirements,
                 strictness: SEARCHED,
@@ -253,24 +265,24 @@ impl<'a> Planner<'a> {
                 size: self.size,
                 rests: horizon.is_none(),
             };
+            let begin = |inputs: Vec<Vec<f64>>| Descent::from(search.run(inputs));
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
                 let held = |hold: &[f64]| before.mean(hold[0], hold[1])[..self.dims[1]].to_vec();
                 let mut inputs: Vec<Vec<f64>> = times.windows(2).map(held).collect();
                 inputs.push(guide.rest(&sketch));
-                let (descents, asked) =
-                    (vec![Descent::from(search.run(inputs))], search.requirements.clone());
-                if let Ok(plan) = self.descend(&mut search, descents, &ending) {
+                if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &ROUNDS, &ending) {
                     return Ok(plan);
                 }
-                search.requirements = asked;
+            }
+            let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times)).map(begin);
+            if let Ok(plan) = self.descend(&search, aimed.collect(), AIMED, &ending) {
+                return Ok(plan);
             }
             let policies = self.policies.iter().map(|policy| self.follow(&sketch, policy, &guide, x, &times));
-            let mut descents: Vec<Descent> = policies
-                .chain(self.guesses(&sketch, &guide, x, &times))
-                .map(|inputs| Descent::from(search.run(inputs)))
-                .collect();
+            let mut descents: Vec<Descent> =
+                policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin).collect();
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            match self.descend(&mut search, descents, &ending) {
+            match self.descend(&search, descents, &ROUNDS, &ending) {
                 Ok(plan) => return Ok(plan),
                 // Holds that are too long say little: what came nearer is told.
                 Err(Some(Failure::Broken { slack, .. }))
@@ -286,13 +298,14 @@ impl<'a> Planner<'a> {
     /// The plan that one of `descents` leads to; or what the nearest fails at, where one was worth the check.
     fn descend(
         &self,
-        search: &mut Search<'_>,
+        search: &Search<'_>,
         mut descents: Vec<Descent>,
+        rounds: &[(usize, u32)],
         ending: &Ending<'_>,
     ) -> Result<Plan, Option<Failure>> {
-        let mut failure = None;
+        let (mut failure, mut search) = (None, search.clone());
         // A few steps show which guesses lead somewhere.
-        for (most, iterations) in ROUNDS {
+        for &(most, iterations) in rounds {
             // What the user thinks of is never dropped.
             let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
             descents.sort_by(|a, b| {
@@ -393,14 +406,20 @@ impl<'a> Planner<'a> {
         };
         let grid = Grid { period: self.period, even: true };
         let walk = |plan: &Plan| self.walk(plan, 1.0, grid, (times[0], &found.states[0]), None, true);
-        plan.witness = walk(&plan).or_else(|failure| {
-            let is_before = matches!(failure, Failure::Broken { time, .. } if time <= times[times.len() - 1]);
-            // Where not every place is a rest, the law leads back to the one that it is around.
-            let near = if is_before { None } else { ending.at_end(found, self.period) };
-            plan.brake = Some(near.ok_or(failure)?);
-            walk(&plan).map_err(|_| failure)
-        })?;
-        Ok(plan)
+        let failure = match walk(&plan) {
+            Ok(witness) => return Ok(Plan { witness, ..plan }),
+            Err(failure) => failure,
+        };
+        // Where not every place is a rest, the law leads back to the one that it is around.
+        if !matches!(failure, Failure::Broken { time, .. } if time < times[times.len() - 1]) {
+            for law in [ending.at_end(found, self.period), ending.aim.clone()].into_iter().flatten() {
+                plan.brake = Some(law);
+                if let Ok(witness) = walk(&plan) {
+                    return Ok(Plan { witness, ..plan });
+                }
+            }
+        }
+        Err(failure)
     }
 
     /// A witness that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
@@ -606,6 +625,54 @@ impl<'a> Planner<'a> {
         let mut inputs: Vec<Vec<f64>> = times.windows(2).map(mean).collect();
         inputs.push(guide.rest(model));
         inputs
+    }
+
+    /// The law that leads from `x` to a rest within every set that is asked for at `end`, as deep inside as one is found.
+    fn aim(
+        &self,
+        model: &Model<'_>,
+        requirements: &[Requirement<'_>],
+        guide: &Guide,
+        (end, hold): (f64, f64),
+        x: &[f64],
+    ) -> Option<Brake> {
+        let within = |x: &[f64], u: &[f64], depth: f64| {
+            model.rest_within(x, u.to_vec(), |x, missing| {
+                for requirement in requirements.iter().filter(|r| r.until > end) {
+                    let (wanted, h) = (depth * requirement.margin, requirement.model.value(end, x));
+                    // Not-a-number is missing.
+                    if !(h >= wanted) {
+                        let mut gradient = vec![0.0; x.len()];
+                        slopes(requirement.model, end, x, &mut gradient);
+                        let steepness = elementary::sqrt(gradient.iter().map(|g| g * g).sum());
+                        gradient.iter_mut().for_each(|g| *g /= steepness);
+                        missing.push(((BEYOND * wanted - h) / steepness, gradient));
+                    }
+                }
+            })
+        };
+        let near = guide.0.as_ref().and_then(|brake| within(&brake.state, &brake.input, SEARCHED));
+        let mut aim = near.or_else(|| within(x, &guide.rest(model), SEARCHED))?;
+        let (deeper, times) = DEEPER;
+        let depths = core::iter::successors(Some(SEARCHED * deeper), |depth| Some(depth * deeper));
+        for depth in depths.take(times) {
+            let Some(found) = within(&aim.0, &aim.1, depth) else { break };
+            aim = found;
+        }
+        Brake::to(model, x, aim, hold)
+    }
+
+    /// Guesses that lead to the rest of `aim`: by its law, and by the input that rests there.
+    fn aimed(&self, model: &Model<'_>, aim: &Brake, x: &[f64], times: &[f64]) -> [Vec<Vec<f64>>; 2] {
+        let (mut x, mut u) = (x.to_vec(), vec![0.0; model.inputs()]);
+        let led = |hold: &[f64]| {
+            aim.input(model, &x, &mut u);
+            model.flow(&mut x, &u, hold[1] - hold[0]);
+            u.clone()
+        };
+        let mut inputs: Vec<Vec<f64>> = times.windows(2).map(led).collect();
+        inputs.push(aim.input.clone());
+        [inputs, vec![aim.input.clone(); times.len()]]
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.

@@ -22,7 +22,7 @@ use nalgebra::DMatrix;
 
 use super::Requirement;
 use super::law::Gain;
-use super::model::{Linear, Model};
+use super::model::{Linear, Model, slopes};
 use crate::scalar::all_finite;
 
 /// Price of a violation of the size of h on the way, against the price of full inputs all the time.
@@ -39,6 +39,7 @@ const AS_EXPECTED: f64 = 0.7;
 const BENT: f64 = 0.2;
 
 /// A search: the start, the grid and what has to be met there.
+#[derive(Clone)]
 pub(super) struct Search<'a> {
     pub(super) model: Model<'a>,
     pub(super) requirements: Vec<Requirement<'a>>,
@@ -317,7 +318,7 @@ impl Search<'_> {
         let mut gradient = vec![0.0; nx];
         for (row, &(i, k, value)) in at.values.iter().enumerate() {
             let size = at.sizes[i].max(f64::MIN_POSITIVE);
-            self.gradient(i, k, &at.states[k], &mut gradient);
+            slopes(self.requirements[i].model, self.times[k], &at.states[k], &mut gradient);
             for j in 0..nx {
                 entry(b.len(), state(k, j), -gradient[j] / size);
             }
@@ -431,7 +432,7 @@ impl Search<'_> {
             let size = 1e-3 * (1.0 + x[j].abs());
             for (end, sign) in ends.iter_mut().zip([size, -size]) {
                 moved[j] = x[j] + sign;
-                self.gradient(i, k, &moved, end);
+                slopes(self.requirements[i].model, self.times[k], &moved, end);
             }
             moved[j] = x[j];
             for r in 0..nx {
@@ -443,21 +444,5 @@ impl Search<'_> {
         let most = parts.eigenvalues.amax();
         let kept = parts.eigenvalues.map(|v| if v > 1e-4 * most { v } else { 0.0 });
         &parts.eigenvectors * DMatrix::from_diagonal(&kept) * parts.eigenvectors.transpose()
-    }
-
-    /// ∂h/∂x of requirement `i` at node `k`, by central differences.
-    fn gradient(&self, i: usize, k: usize, x: &[f64], out: &mut [f64]) {
-        let model = self.requirements[i].model;
-        let (t, mut moved) = (self.times[k], x.to_vec());
-        for (j, out) in out.iter_mut().enumerate() {
-            let size = 1e-6 * (1.0 + x[j].abs());
-            let mut ends = [0.0; 2];
-            for (end, sign) in ends.iter_mut().zip([size, -size]) {
-                moved[j] = x[j] + sign;
-                *end = model.value(t, &moved);
-            }
-            moved[j] = x[j];
-            *out = (ends[0] - ends[1]) / (2.0 * size);
-        }
     }
 }
