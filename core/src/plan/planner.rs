@@ -641,13 +641,14 @@ impl<'a> Planner<'a> {
                 for requirement in requirements.iter().filter(|r| r.until > end) {
                     let (wanted, h) = (depth * requirement.margin, requirement.model.value(end, x));
                     // Not-a-number is missing.
-                    if !(h >= wanted) {
-                        let mut gradient = vec![0.0; x.len()];
-                        slopes(requirement.model, end, x, &mut gradient);
-                        let steepness = elementary::sqrt(gradient.iter().map(|g| g * g).sum());
-                        gradient.iter_mut().for_each(|g| *g /= steepness);
-                        missing.push(((BEYOND * wanted - h) / steepness, gradient));
+                    if h >= wanted {
+                        continue;
                     }
+                    let mut gradient = vec![0.0; x.len()];
+                    slopes(requirement.model, end, x, &mut gradient);
+                    let steepness = elementary::sqrt(gradient.iter().map(|g| g * g).sum());
+                    gradient.iter_mut().for_each(|g| *g /= steepness);
+                    missing.push(((BEYOND * wanted - h) / steepness, gradient));
                 }
             })
         };
