@@ -31,6 +31,8 @@ pub(super) struct Brake {
 
 /// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
 const STAYS: f64 = 1.0 + 1e-4;
+/// Least part of a deviation that moves over a hold, against the largest, beside a rest that has no other beside it.
+const SOLE: f64 = 1e-6;
 /// Growth of a deviation from a rest over the longest hold that holds it there.
 const LOST: f64 = 1.35;
 /// How fast a rest that does not stay is come to, against how fast it is lost.
@@ -77,6 +79,14 @@ impl Brake {
     /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
     pub(super) fn stays(&self) -> bool {
         self.growth <= STAYS
+    }
+
+    /// Whether the plant rests at other places beside this one under the same input, as a vehicle does, and a motor not.
+    pub(super) fn is_one_of_many(&self, model: &Model<'_>) -> bool {
+        let Linear { a, .. } = model.linear(&self.state, &self.input, self.hold);
+        let moved = &a - DMatrix::identity(a.nrows(), a.ncols());
+        let sizes = moved.singular_values();
+        sizes.min() <= SOLE * sizes.max()
     }
 
     /// The time in s in which a deviation from the rest grows so many times; at most a hold.

@@ -274,15 +274,26 @@ impl<'a> Planner<'a> {
                     return Ok(plan);
                 }
             }
-            let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times)).map(begin);
-            if let Ok(plan) = self.descend(&search, aimed.collect(), AIMED, &ending) {
+            let lead = || {
+                let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times));
+                self.descend(&search, aimed.map(begin).collect(), AIMED, &ending)
+            };
+            // What rests at few places is led to one of them at once, if the user knows no other way.
+            let leads_first = self.policies.is_empty()
+                && guide.0.as_ref().is_some_and(|rest| !rest.is_one_of_many(&sketch));
+            if leads_first && let Ok(plan) = lead() {
                 return Ok(plan);
             }
             let policies = self.policies.iter().map(|policy| self.follow(&sketch, policy, &guide, x, &times));
             let mut descents: Vec<Descent> =
                 policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin).collect();
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            match self.descend(&search, descents, &ROUNDS, &ending) {
+            let found = self.descend(&search, descents, &ROUNDS, &ending);
+            let found = found.or_else(|failure| match leads_first {
+                true => Err(failure),
+                false => lead().map_err(|_| failure),
+            });
+            match found {
                 Ok(plan) => return Ok(plan),
                 // Holds that are too long say little: what came nearer is told.
                 Err(Some(Failure::Broken { slack, .. }))
