@@ -14,6 +14,8 @@ from ._punctual import Filter, Plan
 def plan(configuration: Configuration, x0: ArrayLike | Mapping[str, float]) -> Plan:
     """The plan of a filter from a start: inputs within the bounds that keep every promise, and the way that they lead.
 
+    It begins at `experiment.start_time`, as `check` does.
+
     - `x0`: the start, in the units of the states: by state, those not named are 0; or all in the order of `Filter.states`.
 
     Raises `Error` where there is none, with the barrier that fails and when; for a configuration that cannot be used; for
@@ -26,7 +28,7 @@ def plan(configuration: Configuration, x0: ArrayLike | Mapping[str, float]) -> P
             if name not in filter.states:
                 raise Error(f"x0.{name}: unknown state, must be one of {', '.join(filter.states)}")
         x0 = [x0.get(name, 0.0) for name in filter.states]
-    step = filter.step(0.0, x0)
+    step = filter.step(filter.start_time, x0)
     found = filter.plan
     if found is None:
         if step.assurance is None:

@@ -29,17 +29,19 @@ def simulate(
     *,
     stop_time: float,
     step_size: float,
+    start_time: float | None = None,
     start: Mapping[str, float] | None = None,
     nominal: _Nominal | None = None,
     parameters: Mapping[str, float] | None = None,
     record: Sequence[str] | None = None,
 ) -> NDArray[np.void]:
-    """Couples a filter FMU with a plant FMU in FMPy from t = 0 to `stop_time` in steps of `step_size` (s).
+    """Couples a filter FMU with a plant FMU in FMPy from `start_time` to `stop_time` in steps of `step_size` (s).
 
     Equal names connect: `x.v` of the plant to `x.v` of the filter, `u.a` of the filter to `u.a` of the plant. At every
     communication point the filter is stepped first, then the plant with what the filter gives: the calls of
     `punctual run` in Gauss-Seidel order, and the same numbers bit for bit.
 
+    - `start_time`: default: that of the filter's default experiment (`experiment.start_time`), or 0.
     - `start`: start values of the plant by name; `v` is short for `x0.v`. Also of inputs that the filter does not give.
     - `nominal`: the wanted input. A dict of terms that are linear in what the plant gives, such as `{"a": ("v", -1.0)}`
       for u_ref.a = -1.0 x.v, or with an offset `("v", -1.0, 3.0)`; or a function of the time in s and of what the plant
@@ -56,15 +58,19 @@ def simulate(
     Raises `ImportError` without FMPy (`pip install fmpy`); `Error` for names or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
     """
-    for field, value in [("stop_time", stop_time), ("step_size", step_size)]:
-        if not 0.0 < value < math.inf:
-            raise Error(f"{field}: is {value}, must be finite and > 0")
+    if not 0.0 < step_size < math.inf:
+        raise Error(f"step_size: is {step_size}, must be finite and > 0")
     with opened("filter", filter_fmu) as own, opened("plant", plant_fmu) as plant:
+        begin = own.suggested_start if start_time is None else float(start_time)
+        if not math.isfinite(begin):
+            raise Error(f"start_time: is {begin}, must be finite")
+        if not begin < stop_time < math.inf:
+            raise Error(f"stop_time: is {stop_time}, must be finite and > start_time = {begin}")
         starts = _starts(own, "parameters", parameters or {}), _starts(plant, "start", start or {})
         pair = _Pair(own, plant, starts, record)
         pair.wish(nominal)
-        pair.begin(stop_time)
-        return pair.run(stop_time, step_size)
+        pair.begin(begin, stop_time)
+        return pair.run(begin, stop_time, step_size)
 
 
 def _starts(slave: Slave, field: str, given: Mapping[str, float]) -> dict[str, float]:
@@ -209,15 +215,15 @@ class _Pair:
             raise Error(f"nominal.{name}: {source!r} is no output of the plant, which has {', '.join(gives)}")
         return self.slots[self.own, full], self.slots[self.plant, output], float(factor), float(offset)
 
-    def begin(self, stop: float) -> None:
+    def begin(self, begin: float, stop: float) -> None:
         """Start values, then initialization mode: values are passed on until they stay the same."""
         for slave, starts in zip((self.own, self.plant), self.starts):
-            slave.begin(stop, starts)
+            slave.begin(begin, stop, starts)
         before = None
         # Enough for two.
         for _ in range(3):
             make(self.give)
-            self.want(0.0)
+            self.want(begin)
             make(chain(self.take, self.answer, self.drive))
             now = bytes(self.reals) + bytes(self.numbers)
             if now == before:
@@ -227,14 +233,14 @@ class _Pair:
             make([slave.prepared("fmi2ExitInitializationMode")])
         make(self.give if self.own.direct else [*self.answer, *self.give])
 
-    def run(self, stop: float, step: float) -> NDArray[np.void]:
+    def run(self, begin: float, stop: float, step: float) -> NDArray[np.void]:
         """Steps to the stop time; returns the rows."""
         import numpy
 
-        ratio = stop / step
+        ratio = (stop - begin) / step
         whole = round(ratio) >= 1 and abs(ratio - round(ratio)) <= _WHOLE
         steps = round(ratio) if whole else max(math.ceil(ratio), 1)
-        times = numpy.append(numpy.arange(steps) * step, stop)
+        times = numpy.append(begin + numpy.arange(steps) * step, stop)
         reals = numpy.empty((steps + 1, len(self.reals)))
         numbers = numpy.empty((steps + 1, len(self.numbers)), numpy.int32)
 

@@ -39,6 +39,8 @@ class Slave:
         self.name = name
         self._fmu, self._said = fmu, ""
         self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
+        experiment = description.defaultExperiment
+        self.suggested_start = float((experiment and experiment.startTime) or 0.0)
         depends = {o.variable.name: o.dependencies for o in description.outputs}
         self.direct = {
             output
@@ -91,10 +93,10 @@ class Slave:
         reason = self._said.removeprefix(f"{function}: ") or f"status {status}"
         return Error(f"{function} of the {self.name}{when} was refused: {reason}")
 
-    def begin(self, stop: float, start: Mapping[str, float]) -> None:
+    def begin(self, begin: float, stop: float, start: Mapping[str, float]) -> None:
         """Sets start values, and enters initialization mode."""
-        zero, yes = ctypes.c_double(0.0), ctypes.c_int(1)
-        setup = (ctypes.c_int(0), zero, zero, yes, ctypes.c_double(stop))
+        no, yes = ctypes.c_int(0), ctypes.c_int(1)
+        setup = (no, ctypes.c_double(0.0), ctypes.c_double(begin), yes, ctypes.c_double(stop))
         make([self.prepared("fmi2SetupExperiment", *setup)])
         for name, value in start.items():
             kind = self.kind(name)

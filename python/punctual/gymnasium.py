@@ -49,11 +49,25 @@ def _state(state: State) -> Callable[[Any], Any]:
     return lambda observation: np.array(function(observation))
 
 
-def _in_space(space: gymnasium.Space, to_action: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _in_space(space: gymnasium.Space, to_action: Map) -> Callable[[Any], Any]:
     """`to_action`, with the type and shape of a box."""
+    function = to_action or _same
     if not isinstance(space, gymnasium.spaces.Box):
-        return to_action
-    return lambda u: np.array(to_action(u), space.dtype).reshape(space.shape)
+        return function
+    return lambda u: np.array(function(u), space.dtype).reshape(space.shape)
+
+
+def _check_bounds(filter: Filter | FilterBatch, space: gymnasium.Space, to_action: Map) -> None:
+    """Refuses bounds beyond the actions that an environment takes, where these are the inputs: it may cut them."""
+    if to_action is not None or not isinstance(space, gymnasium.spaces.Box) or space.shape != (len(filter.inputs),):
+        return
+    for name, least, most in zip(filter.inputs, space.low, space.high):
+        low, high = np.array(filter.bounds.get(name, (-np.inf, np.inf)), space.dtype)
+        if low < least or high > most:
+            raise Error(
+                f"bounds.{name}: is {low:g} to {high:g}, must be within the actions of the environment, {least:g} to {most:g};"
+                " where an action is something else, give to_input and to_action"
+            )
 
 
 def _period(env: Any, filter: Filter | FilterBatch, dt: float | None) -> float:
@@ -78,7 +92,8 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
       the action space.
     - `dt`: the time between two steps in s, > 0. Default: `dt` or `tau` of the environment.
 
-    `reset` lets the filter forget everything: deadlines count from the first step of the episode. `step` adds to `info`:
+    `reset` lets the filter forget everything: deadlines count from the first step of the episode, and so does the time of what
+    moves, from `experiment.start_time` on. `step` adds to `info`:
 
     - `filter_changed`: whether the filter changed the action; if not, it is passed on as it is.
     - `filter_nominal`: the action wanted; `filter_action`: the one that was done.
@@ -87,8 +102,8 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
 
     The promise is one about the model of the filter: what the environment does differently, its margins have to cover.
 
-    Raises `punctual.Error` for a configuration that cannot be used, and for a `dt` that is not known or another one
-    than the filter's.
+    Raises `punctual.Error` for a configuration that cannot be used, for a `dt` that is not known or another one than the
+    filter's, and for bounds beyond the box of actions, which the environment may cut.
     """
 
     def __init__(
@@ -108,7 +123,8 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
         self.filter = copy(filter) if isinstance(filter, Filter) else Filter(filter)
         self.dt = _period(env.unwrapped, self.filter, dt)
         self._state, self._to_input = _state(state), to_input or _same
-        self._to_action = _in_space(env.action_space, to_action or _same)
+        _check_bounds(self.filter, env.action_space, to_action)
+        self._to_action = _in_space(env.action_space, to_action)
         self._steps, self._x = 0, None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -123,7 +139,9 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
         if self._x is None:
             raise gymnasium.error.ResetNeeded("step before the first reset: call reset")
         u_ref = self._to_input(action)
-        step = self.filter.step(self._steps * self.dt, self._x, u_ref)
+        if u_ref is None:
+            raise TypeError("action: is None, must be what the policy wants")
+        step = self.filter.step(self.filter.start_time + self._steps * self.dt, self._x, u_ref)
         changed = step.u.tolist() != np.asarray(u_ref).tolist()
         applied = self._to_action(step.u) if changed else action
         observation, reward, terminated, truncated, info = self.env.step(applied)
@@ -143,7 +161,7 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
 
     The arguments are those of `SafetyFilterEnv`, with functions of all rows at once; `filter` is a configuration or a
     `FilterBatch` of `env.num_envs` rows, which is copied. The keys of `info` hold an array each, a row for each environment;
-    `filter_status` has the numbers of the statuses. A row whose episode is over starts anew with the next one,
+    `filter_status` has the numbers of the statuses. A row whose episode is over starts anew with the next one, its time too,
     whichever mode of automatic resets the environment has.
     """
 
@@ -164,8 +182,9 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         first = getattr(env.unwrapped, "envs", [env])[0].unwrapped
         self.dt = _period(first, self.filter, dt)
         self._state, self._to_input = _state(state), to_input or _same
-        self._to_action = _in_space(env.action_space, to_action or _same)
-        self._steps, self._x = 0, None
+        _check_bounds(self.filter, getattr(env, "single_action_space", env.action_space), to_action)
+        self._to_action = _in_space(env.action_space, to_action)
+        self._steps, self._x = np.zeros(env.num_envs), None
         self._over = np.zeros(env.num_envs, bool)
 
     def reset(
@@ -176,9 +195,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         rows = (options or {}).get("reset_mask")
         observation, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         self.filter.reset(rows)
-        if rows is None:
-            self._steps, rows = 0, slice(None)
-        self._over[rows] = False
+        rows = slice(None) if rows is None else rows
+        self._steps[rows], self._over[rows] = 0, False
         self._x = self._state(observation)
         return observation, info
 
@@ -187,7 +205,7 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         if self._x is None:
             raise gymnasium.error.ResetNeeded("step before the first reset: call reset")
         u_ref = np.asarray(self._to_input(actions))
-        u, status, _ = self.filter.step(self._steps * self.dt, self._x, u_ref)
+        u, status, _ = self.filter.step(self.filter.start_time + self._steps * self.dt, self._x, u_ref)
         # Before a reset below ends it.
         guaranteed = self.filter.guaranteed.all(axis=1)
         changed = (u != u_ref).any(axis=1)
@@ -197,10 +215,11 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         over = terminated | truncated
         mode = self.env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         begun = {AutoresetMode.NEXT_STEP: self._over, AutoresetMode.SAME_STEP: over}.get(mode)
+        self._steps += 1
         if begun is not None and begun.any():
             self.filter.reset(begun)
-        self._over = over
-        self._steps, self._x = self._steps + 1, self._state(observation)
+            self._steps[begun] = 0
+        self._over, self._x = over, self._state(observation)
         told = {
             "filter_changed": changed,
             "filter_nominal": actions,

@@ -47,6 +47,21 @@ pub(crate) fn numbers(
     copy(array.cast::<PyArrayDyn<f64>>()?, name, shape, meaning, into)
 }
 
+/// The real numbers of `argument`, called `name`: any number of rows, whose components are `meaning`.
+pub(crate) fn rows(argument: &Bound<'_, PyAny>, name: &str, meaning: &[String]) -> PyResult<Vec<f64>> {
+    let wanted = || format!("real numbers of shape (m, {}) ({})", meaning.len(), meaning.join(", "));
+    let array = as_array(argument, name, &wanted)?;
+    let &[count, _] = array.shape() else {
+        let (found, components) = (shape_text(array.shape()), meaning.len());
+        let message =
+            format!("{name}: has shape {found}, must have (m, {components}) ({})", meaning.join(", "));
+        return Err(PyValueError::new_err(message));
+    };
+    let mut into = vec![0.0; count * meaning.len()];
+    numbers(&array, name, &[count, meaning.len()], meaning, &mut into)?;
+    Ok(into)
+}
+
 /// Copies the vector `argument`, called `name`, to `into`: truth values.
 pub(crate) fn mask(argument: &Bound<'_, PyAny>, name: &str, into: &mut [bool]) -> PyResult<()> {
     let shape = [into.len()];

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::loading::{Interface, Signals, configuration, refused};
+use crate::loading::{self, Interface, Signals, configuration, refused};
 use crate::sample::Loop;
 use crate::saved::{self, Reduced, Saved};
 use crate::{arrays, pool};
@@ -39,6 +39,7 @@ pub(crate) struct FilterBatch {
     /// Loops, one for each part. The memory of a row is put into its loop before each row.
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     loops: Mutex<Vec<Loop>>,
+    t: Vec<f64>,
     x: Vec<f64>,
     u_ref: Vec<f64>,
     /// Whether a plan keeps the promise of each barrier after the last step, row after row.
@@ -58,6 +59,18 @@ impl FilterBatch {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, Vec<bool>)>> {
         let saved = saved::save(&self.configuration, &self.memories)?;
         saved::reduced(py, "unpickled_batch", (saved, self.guaranteed.clone()))
+    }
+
+    /// The least and the largest value of each input that has bounds, by name, in its unit.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        loading::bounds(py, &self.configuration, &self.interface.inputs.names)
+    }
+
+    /// Time in s at which a run begins: `experiment.start_time`.
+    #[getter]
+    fn start_time(&self) -> f64 {
+        self.configuration.experiment.start_time
     }
 
     /// Time in s for which the first input counts as held: `experiment.step_size`.
@@ -98,6 +111,7 @@ impl FilterBatch {
 
     /// Computes the safe inputs of all loops at time `t` (s) and remembers the samples.
     ///
+    /// - `t`: one time for all, or one for each loop: real numbers of shape (n,).
     /// - `x`: the states, an array of real numbers of shape (n, states). One of float64 is the fastest.
     /// - `u_ref`: the inputs wanted, of shape (n, inputs), likewise. Default: zeros.
     ///
@@ -107,12 +121,16 @@ impl FilterBatch {
     fn step<'py>(
         &mut self,
         py: Python<'py>,
-        t: f64,
+        t: &Bound<'py, PyAny>,
         x: &Bound<'py, PyAny>,
         u_ref: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Rows<'py>> {
         let n = self.memories.len();
         let Interface { states, inputs, barriers } = &self.interface;
+        match t.extract::<f64>() {
+            Ok(all) => self.t.fill(all),
+            Err(_) => arrays::numbers(t, "t", &[n], &["s".to_owned()], &mut self.t)?,
+        }
         arrays::numbers(x, "x", &[n, states.len()], &states.names, &mut self.x)?;
         match u_ref {
             Some(u_ref) => {
@@ -129,14 +147,15 @@ impl FilterBatch {
         }
         let [nx, nu, nb] = [states, inputs, barriers].map(Signals::len);
         let (mut u, mut statuses, mut h) = (vec![0.0; n * nu], vec![0; n], vec![0.0; n * nb]);
-        let given = self.x.chunks(rows * nx).zip(self.u_ref.chunks(rows * nu));
+        let given = self.t.chunks(rows).zip(self.x.chunks(rows * nx)).zip(self.u_ref.chunks(rows * nu));
         let said = u.chunks_mut(rows * nu).zip(statuses.chunks_mut(rows)).zip(h.chunks_mut(rows * nb));
         let said = said.zip(self.guaranteed.chunks_mut(rows * nb));
         let mut parts: Vec<_> = (loops.iter_mut().zip(self.memories.chunks_mut(rows)))
             .zip(given.zip(said))
-            .map(|((own, memories), ((x, u_ref), (((u, statuses), h), guaranteed)))| Part {
+            .map(|((own, memories), (((t, x), u_ref), (((u, statuses), h), guaranteed)))| Part {
                 own,
                 memories,
+                t,
                 x,
                 u_ref,
                 u,
@@ -146,8 +165,8 @@ impl FilterBatch {
             })
             .collect();
         let done = py.detach(|| match &mut parts[..] {
-            [one] => one.step(t),
-            parts => threads.install(|| parts.par_iter_mut().try_for_each(|part| part.step(t))),
+            [one] => one.step(),
+            parts => threads.install(|| parts.par_iter_mut().try_for_each(Part::step)),
         });
         done.map_err(|e| refused(&e))?;
         let (u, h) = (u.into_pyarray(py).reshape([n, nu])?, h.into_pyarray(py).reshape([n, nb])?);
@@ -192,6 +211,7 @@ impl FilterBatch {
             memories: vec![fresh.clone(); n],
             fresh,
             loops: Mutex::new(vec![own]),
+            t: vec![0.0; n],
             x: vec![0.0; n * interface.states.len()],
             u_ref: vec![0.0; n * interface.inputs.len()],
             guaranteed: vec![false; n * interface.barriers.len()],
@@ -223,6 +243,7 @@ impl FilterBatch {
 struct Part<'a> {
     own: &'a mut Loop,
     memories: &'a mut [LoopState],
+    t: &'a [f64],
     x: &'a [f64],
     u_ref: &'a [f64],
     u: &'a mut [f64],
@@ -232,13 +253,13 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    fn step(&mut self, t: f64) -> Result<(), punctual_core::Error> {
+    fn step(&mut self) -> Result<(), punctual_core::Error> {
         let n = self.memories.len();
         let [nx, nu, nb] = [self.x.len(), self.u.len(), self.h.len()].map(|all| all / n);
         for (i, memory) in self.memories.iter_mut().enumerate() {
             let (x, u_ref) = (&self.x[i * nx..][..nx], &self.u_ref[i * nu..][..nu]);
             self.own.restore(memory)?;
-            let report = self.own.step(t, x, u_ref, &mut self.u[i * nu..][..nu])?;
+            let report = self.own.step(self.t[i], x, u_ref, &mut self.u[i * nu..][..nu])?;
             self.statuses[i] = report.status as i32;
             for (k, barrier) in report.barriers.iter().enumerate() {
                 self.h[i * nb + k] = barrier.h;

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays;
-use crate::loading::{Interface, configuration, refused};
+use crate::loading::{self, Interface, configuration, refused};
 use crate::plan::Plan;
 use crate::report::Step;
 use crate::sample::Loop;
@@ -53,6 +53,18 @@ impl Filter {
         let saved = saved::save(&self.configuration, &[memory])?;
         let (t, x) = self.seen.clone();
         saved::reduced(py, "unpickled_filter", (saved, t, x))
+    }
+
+    /// The least and the largest value of each input that has bounds, by name, in its unit.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        loading::bounds(py, &self.configuration, &self.interface.inputs.names)
+    }
+
+    /// Time in s at which a run begins: `experiment.start_time`.
+    #[getter]
+    fn start_time(&self) -> f64 {
+        self.configuration.experiment.start_time
     }
 
     /// Time in s for which the first input counts as held: `experiment.step_size`.

@@ -93,6 +93,21 @@ impl Signals {
     }
 }
 
+/// The bounds of the inputs called `names`, in order: name to the least and the largest value. What has none is left out.
+pub(crate) fn bounds<'py>(
+    py: Python<'py>,
+    configuration: &FilterConfiguration,
+    names: &[String],
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for name in names {
+        if let Some([low, high]) = configuration.bounds.get(name) {
+            dict.set_item(name, (low, high))?;
+        }
+    }
+    Ok(dict)
+}
+
 /// Inputs and outputs of a filter.
 pub(crate) struct Interface {
     /// Measured inputs: the states of the plant but an integrated one, then the inputs of the barriers.

@@ -1,14 +1,14 @@
 //! `Plan`: what keeps the promise of a filter that follows plans.
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use punctual_core::plan::Witness;
 use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::FilterConfiguration;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::loading::{Signals, refused};
+use crate::arrays;
+use crate::loading::{self, Signals, refused};
 
 /// Points of the way, at least.
 const POINTS: f64 = 200.0;
@@ -132,37 +132,25 @@ impl Plan {
     /// The least and the largest value of each input.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for name in &self.inputs.names {
-            if let Some([low, high]) = self.configuration.bounds.get(name) {
-                dict.set_item(name, (low, high))?;
-            }
-        }
-        Ok(dict)
+        loading::bounds(py, &self.configuration, &self.inputs.names)
     }
 
-    /// h of the barriers that it keeps at time `t` (s) and other states, an array of shape (m, states): shape (m, barriers).
+    /// h of the barriers that it keeps at time `t` (s) and other states, real numbers of shape (m, states): shape (m, barriers).
     ///
     /// Raises `TypeError` or `ValueError` for an array of another type or shape.
     fn values<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: &Bound<'py, PyArray2<f64>>,
+        x: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let [count, states] = [x.shape()[0], self.states.len()];
-        if x.shape()[1] != states {
-            let message = format!(
-                "x: has shape ({count}, {}), must have ({count}, {states}) ({})",
-                x.shape()[1],
-                self.states.names.join(", ")
-            );
-            return Err(PyValueError::new_err(message));
-        }
+        let states = self.states.len();
+        let places = arrays::rows(x, "x", &self.states.names)?;
+        let count = places.len() / states;
         let filter = self.configuration.build().map_err(|e| refused(&e))?;
         let (mut h, mut values) = (Vec::new(), vec![0.0; self.configuration.barrier.len()]);
-        for row in x.readonly().as_array().rows() {
-            filter.barrier_values(t, &row.to_vec(), &mut values).map_err(|e| refused(&e))?;
+        for row in places.chunks(states) {
+            filter.barrier_values(t, row, &mut values).map_err(|e| refused(&e))?;
             h.extend(self.kept.iter().map(|(i, _)| values[*i]));
         }
         h.into_pyarray(py).reshape([count, self.kept.len()])

@@ -34,6 +34,10 @@ impl<'a> Tried<'a> {
 }
 
 impl PluginLoader for Tried<'_> {
+    fn digest(&self, name: &str) -> Result<(String, String), String> {
+        self.folder.digest(name)
+    }
+
     fn load(&self, name: &str) -> Result<Plugin, String> {
         let tried = || {
             let child = Child::new()?;

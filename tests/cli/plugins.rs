@@ -259,6 +259,23 @@ fn configurations_that_are_refused() {
     assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"));
 }
 
+/// What is not the file that an FMU was made with is refused before anything of it runs: a library that was cut short may end the
+/// process that loads it.
+#[test]
+fn a_file_that_was_cut_short_is_told_by_its_digest() {
+    let workshop = Workshop::with_library();
+    let library = plugin_file_name("fixture");
+    fixture(&workshop, &[]);
+    let whole = workshop.bytes(&library);
+    workshop.write("g.toml", FILTER.replace("\"fixture\"", "\"fixture\", plugin_digest = \"1\""));
+    for length in [0, 100, whole.len() / 4, whole.len() - 1] {
+        workshop.write(&library, &whole[..length]);
+        let done = workshop.punctual(["check", "g.toml"]);
+        let words = "plant.plugin_digest: is \"1\", but ";
+        assert!(done.code == 2 && done.stderr.contains(words), "{length}: {done:?}");
+    }
+}
+
 /// Two compilations, two GUIDs; the same twice, the same bytes.
 #[test]
 fn the_guid_and_the_fmu_depend_on_the_library() {
@@ -292,7 +309,7 @@ fn an_fmu_with_another_library_is_refused() {
     for (exchange, message) in [
         (Some(other), "plant.plugin_digest: is \""),
         (None, "plant.plugin: is \"fixture\", but "),
-        (Some(b"text".to_vec()), "plant.plugin: "),
+        (Some(b"text".to_vec()), "plant.plugin_digest: is \""),
     ] {
         workshop.punctual(["build", "f.toml", "-o", "f.fmu"]).success();
         workshop.punctual(["run", "s.toml", "--out", "out"]).success();

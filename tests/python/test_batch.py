@@ -50,6 +50,28 @@ def test_every_row_is_that_of_a_filter_of_its_own(n):
         assert len(statuses) > 1
 
 
+def test_every_row_may_have_a_time_of_its_own():
+    n = 40
+    moving = FILTER["barrier"] + [{"name": "cart", "shape": "obstacle", "centre": [9.0, 9.0], "velocity": [0.5, -1.0], "radius": 1.0}]
+    configuration = FILTER | {"barrier": moving}
+    x, u_ref = drawn(n)
+    batch, singles = punctual.FilterBatch(configuration, n), [punctual.Filter(configuration) for _ in range(n)]
+    begin = 7.0 * np.random.default_rng(3).random(n)
+    for k in range(STEPS):
+        t = begin + k * STEP
+        u, status, h = batch.step(t.tolist() if k % 2 else t, x[k], u_ref[k])
+        for i, single in enumerate(singles):
+            step = single.step(t[i], x[k, i], u_ref[k, i])
+            assert (step.u.tolist(), int(step.status)) == (u[i].tolist(), status[i]), (k, i)
+            assert [barrier.h for barrier in step.barriers.values()] == h[i].tolist()
+    # One time for all, in every way that a number may be held.
+    kinds = [float, int, np.float32, np.int64, np.array, lambda t: np.full(n, t), lambda t: [t] * n]
+    assert len({copy.copy(batch).step(kind(9), x[0])[0].tobytes() for kind in kinds}) == 1
+    for wrong, words in [(t[:-1], r"^t: has shape \(39,\), must have \(40,\) \(s\)$"), ("now", "^t: is str of")]:
+        with pytest.raises((TypeError, ValueError), match=words):
+            batch.step(wrong, x[0])
+
+
 def test_an_integrated_input_belongs_to_its_row():
     file, n = ROOT / "examples" / "vehicles" / "car-filter.toml", 40
     x, u_ref = drawn(n)

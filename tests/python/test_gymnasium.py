@@ -160,6 +160,61 @@ def test_every_row_is_an_environment_of_its_own(mode):
     assert again.tolist() == [env.reset(seed=seed + i)[0].tolist() for i, env in enumerate(singles)]
 
 
+class Crossing(gymnasium.Env):
+    """A mass on a plane; across its way goes a disc that begins at the same place in every episode."""
+
+    dt, begin = DT, 0.0
+    action_space = gymnasium.spaces.Box(-9.0, 9.0, (2,), np.float64)
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float64)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.x, self.steps = np.zeros(4), 0
+        return self.x.copy(), {}
+
+    def step(self, u):
+        nearest = np.inf
+        for part in range(16):
+            # Exact: the acceleration is constant.
+            self.x[:2] += DT / 16 * self.x[2:] + (DT / 16) ** 2 / 2 * u
+            self.x[2:] += DT / 16 * u
+            t = self.begin + DT * (self.steps + (part + 1) / 16)
+            nearest = min(nearest, np.hypot(self.x[0] - 6.0, self.x[1] - (6.0 - t)) - 2.0)
+        self.steps += 1
+        return self.x.copy(), 0.0, False, self.steps == 384, {"nearest": nearest}
+
+
+def crossed(begin):
+    """The filter for it, of a run that begins at that time."""
+    goal = {"name": "goal", "centre": [12.0, 0.0], "radius": 1.0, "deadline": 9.0}
+    cart = {"name": "cart", "shape": "obstacle", "centre": [6.0, 6.0], "velocity": [0.0, -1.0], "radius": 2.0}
+    bounds = {"u_x": [-2.0, 2.0], "u_y": [-2.0, 2.0]}
+    experiment = {"step_size": DT, "start_time": begin, "stop_time": begin + 12.0}
+    return {"kind": "filter", "plant": {"model": "point_mass"}, "bounds": bounds, "barrier": [goal, cart], "experiment": experiment}
+
+
+@pytest.mark.parametrize("mode", [None, *AutoresetMode])
+@pytest.mark.parametrize("begin", [0.0, 1.0])
+def test_what_moves_begins_anew_with_every_episode(mode, begin):
+    bare = type("Begun", (Crossing,), {"begin": begin})
+    if mode is None:
+        env = SafetyFilterEnv(bare(), crossed(begin))
+    else:
+        env = SafetyFilterVectorEnv(SyncVectorEnv([bare, bare], autoreset_mode=mode), crossed(begin))
+    seen, _ = env.reset()
+    over, episodes = np.zeros(() if mode is None else 2, bool), 0
+    for _ in range(3 * 385):
+        if over.all() and mode in (None, AutoresetMode.DISABLED):
+            seen, _ = env.reset(options=None if mode is None else {"reset_mask": over})
+        restarts = mode is AutoresetMode.NEXT_STEP and over.all()
+        # Straight on, through the disc.
+        seen, _, _, over, info = env.step(np.stack([1.5 - seen[..., 2], -seen[..., 3]], axis=-1))
+        over, episodes = np.asarray(over), episodes + np.all(over)
+        told = info["final_info"] if mode is AutoresetMode.SAME_STEP and over.all() else info
+        assert np.all(info["filter_guaranteed"]) and (restarts or np.min(told["nearest"]) >= 0.0), episodes
+    assert episodes == 3 or mode is AutoresetMode.NEXT_STEP and episodes >= 2
+
+
 def test_the_checker_of_gymnasium_finds_nothing_new():
     def warned(env):
         with warnings.catch_warnings(record=True) as said:
@@ -181,13 +236,24 @@ def test_what_does_not_fit_is_refused():
     car = gymnasium.make("MountainCarContinuous-v0")
     with pytest.raises(punctual.Error, match="^dt: is not given, and the environment has no dt or tau; must be"):
         SafetyFilterEnv(car, UPRIGHT)
-    assert SafetyFilterEnv(car, UPRIGHT, dt=DT).dt == DT
+    assert SafetyFilterEnv(car, UPRIGHT, dt=DT, to_action=lambda u: u / 2.0).dt == DT
+    # An environment that cuts what it is given is not the plant any more.
+    for wrapper, env in [(SafetyFilterEnv, car), (SafetyFilterVectorEnv, SyncVectorEnv([lambda: car]))]:
+        with pytest.raises(punctual.Error, match="^bounds.torque: is -2 to 2, must be within the actions .*, -1 to 1;"):
+            wrapper(env, UPRIGHT, dt=DT)
+    for bounds in ({"torque": [-2.0, 2.1]}, {"torque": [-2.1, 2.0]}):
+        with pytest.raises(punctual.Error, match="^bounds.torque: is .* must be within .* -2 to 2;"):
+            SafetyFilterEnv(Upright(), UPRIGHT | {"bounds": bounds})
     envs = SyncVectorEnv([Upright, Upright])
     with pytest.raises(punctual.Error, match="^filter: has 3 rows, must have 2, one for each environment$"):
         SafetyFilterVectorEnv(envs, punctual.FilterBatch(UPRIGHT, 3))
     for env, action in [(SafetyFilterEnv(Upright(), UPRIGHT), [0.0]), (SafetyFilterVectorEnv(envs, UPRIGHT), [[0.0]] * 2)]:
         with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
             env.step(action)
+    single = SafetyFilterEnv(Upright(), UPRIGHT, state=state)
+    single.reset()
+    with pytest.raises(TypeError, match="^action: is None, must be what the policy wants$"):
+        single.step(None)
     # The observation as it is has three components.
     env.reset()
     with pytest.raises(ValueError, match=r"x: has shape \(2, 3\), must have \(2, 2\) \(y, omega\)"):

@@ -28,12 +28,22 @@ def test_a_plan_from_a_start_and_its_frame():
     assert way.values(0.0, way.x).tobytes() == way.h.tobytes()
     with pytest.raises(ValueError, match=r"^x: has shape \(2, 3\), must have \(2, 2\) \(p, v\)$"):
         way.values(0.0, np.zeros((2, 3)))
+    # Numbers of every kind; one state is a row too.
+    assert way.values(0.0, [[1, 0], [2, 5]]).tolist() == [[2.0], [1.0]] == way.values(0.0, np.array([[1, 0], [2, 5]])).tolist()
+    with pytest.raises(ValueError, match=r"^x: has shape \(2,\), must have \(m, 2\) \(p, v\)$"):
+        way.values(0.0, [1.0, 2.0])
     assert way.x[0].tolist() == [0.0, 1.0] and (3.0 - way.x[:, 0]).min() >= 0.0 and np.abs(way.u).max() <= 4.0
     same = punctual.plan(wall(), [0.0, 1.0])
     assert same.x.tobytes() == way.x.tobytes()
     frame = punctual.to_pandas(way)
     assert list(frame) == ["x.p", "x.v", "u.a", "wall.h"] and frame.index.name == "time"
     assert frame["x.v"].tolist() == way.x[:, 1].tolist() and frame.index.tolist() == way.times.tolist()
+
+
+def test_a_plan_begins_when_its_run_does():
+    wall_moves = [{"name": "wall", "expression": "3 - p + 0.1 * min(t, 9)", "unit": "m"}]
+    found = punctual.plan(wall(barrier=wall_moves, plan_horizon=5.0, experiment={"step_size": STEP, "start_time": 4.0, "stop_time": 5.0}), {"v": 1.0})
+    assert found.times[0] == 4.0 and found.h[0, 0] == 3.0 + 0.1 * 4.0
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,19 @@ def test_other_filters_too(kind, tmp_path):
     assert_same(punctual.simulate(*fmus, stop_time=3.0, step_size=STEP, nominal=DAMPING), columns)
 
 
+def test_it_begins_when_the_filter_says_or_is_told(tmp_path):
+    cart = {"name": "cart", "shape": "obstacle", "centre": [12.0, 10.0], "velocity": [0.0, -1.0], "radius": 1.0}
+    experiment = {"step_size": STEP, "start_time": 4.0, "stop_time": 12.0}
+    moving = FILTER | {"barrier": [goal(), cart], "experiment": experiment}
+    pair = punctual.build(moving, tmp_path / "filter.fmu"), punctual.build(PLANT, tmp_path / "plant.fmu")
+    columns = recorded(tmp_path, *pair, f"start_time = 4.0\nstop_time = 8.0\nstep = {STEP}", DAMPED)
+    result = punctual.simulate(*pair, stop_time=8.0, step_size=STEP, nominal=DAMPING)
+    assert result["time"][0] == 4.0
+    assert_same(result, columns)
+    sooner = punctual.simulate(*pair, start_time=0.0, stop_time=8.0, step_size=STEP, nominal=DAMPING)
+    assert sooner["time"][0] == 0.0 and sooner["cart.h"][0] != result["cart.h"][0]
+
+
 def test_a_function_as_nominal_controller(fmus):
     seen = []
 
@@ -130,7 +143,9 @@ def test_the_result_is_one_of_fmpy(fmus, tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (dict(stop_time=0.0), "stop_time: is 0.0, must be finite and > 0"),
+        (dict(stop_time=0.0), "stop_time: is 0.0, must be finite and > start_time = 0.0"),
+        (dict(start_time=0.2), "stop_time: is 0.1, must be finite and > start_time = 0.2"),
+        (dict(start_time=math.inf), "start_time: is inf, must be finite"),
         (dict(step_size=math.nan), "step_size: is nan, must be finite and > 0"),
         (dict(start={"w": 1.0}), "start: 'w' is no parameter or input of the plant, which has x0.x_p"),
         (dict(parameters={"goal.T": 1.0}), "parameters: 'goal.T' is no parameter or input of the filter"),

@@ -88,13 +88,16 @@ pub fn loadable(path: &Path) -> PathBuf {
 }
 
 impl PluginLoader for PluginFolder {
-    fn load(&self, name: &str) -> Result<Plugin, String> {
-        let (path, file) = (self.file(name), file_name(name));
+    fn digest(&self, name: &str) -> Result<(String, String), String> {
+        let path = self.file(name);
         let bytes = std::fs::read(&path)
             .map_err(|e| format!("is {name:?}, but {} cannot be read: {e}", path.display()))?;
-        let digest = Uuid::new_v5(&Uuid::NAMESPACE_OID, &bytes).to_string();
-        drop(bytes);
-        loaded(&path, &file, self.watch)
+        Ok((file_name(name), Uuid::new_v5(&Uuid::NAMESPACE_OID, &bytes).to_string()))
+    }
+
+    fn load(&self, name: &str) -> Result<Plugin, String> {
+        let (file, digest) = self.digest(name)?;
+        loaded(&self.file(name), &file, self.watch)
             .map(|plugin| Plugin { digest, file: file.clone(), ..plugin })
             .map_err(|problem| format!("{file}: {problem}"))
     }

@@ -50,15 +50,14 @@ pub enum PluginDigest {
 }
 
 impl PluginDigest {
-    /// Refuses a plug-in whose bytes have another digest on this platform.
-    fn check(&self, plugin: &Plugin) -> Result<(), ConfigurationError> {
-        let (file, found) = (&plugin.file, &plugin.digest);
+    /// Refuses a file whose bytes have another digest on this platform.
+    fn check(&self, file: &str, found: &str) -> Result<(), ConfigurationError> {
         let (field, wanted) = match self {
             Self::One(wanted) => ("plant.plugin_digest".to_owned(), Some(wanted)),
             Self::Each(wanted) => (format!("plant.plugin_digest.{PLATFORM}"), wanted.get(PLATFORM)),
         };
         let message = match wanted {
-            Some(wanted) if wanted == found => return Ok(()),
+            Some(wanted) if *wanted == found => return Ok(()),
             Some(wanted) => {
                 format!("is {wanted:?}, but {file} has {found:?}: it is not the file that this was made with")
             }
@@ -70,6 +69,13 @@ impl PluginDigest {
 
 /// Finds plug-ins by their names.
 pub trait PluginLoader {
+    /// The name of the file of the plug-in `name`, a C identifier, and the digest of its bytes. Nothing of it runs.
+    ///
+    /// # Errors
+    ///
+    /// The reason why there is none.
+    fn digest(&self, name: &str) -> Result<(String, String), String>;
+
     /// The plug-in `name`, a C identifier.
     ///
     /// # Errors
@@ -82,6 +88,10 @@ pub trait PluginLoader {
 pub(super) struct NoPlugins;
 
 impl PluginLoader for NoPlugins {
+    fn digest(&self, name: &str) -> Result<(String, String), String> {
+        self.load(name).map(|plugin| (plugin.file, plugin.digest))
+    }
+
     fn load(&self, name: &str) -> Result<Plugin, String> {
         Err(format!("is {name:?}, but this text is in no folder from which a plug-in could be loaded"))
     }
@@ -160,12 +170,17 @@ impl PluginSection {
             return Err(ConfigurationError::new("plant.derivatives", message));
         }
         check_identifier("plant.plugin", &name)?;
-        let plugin = loader.load(&name).map_err(|e| ConfigurationError::new("plant.plugin", e))?;
+        let none = |problem| ConfigurationError::new("plant.plugin", problem);
+        if let Some(wanted) = &raw.plugin_digest {
+            // Before anything of it runs: a file that was cut short may end the process.
+            let (file, found) = loader.digest(&name).map_err(none)?;
+            wanted.check(&file, &found)?;
+        }
+        let plugin = loader.load(&name).map_err(none)?;
         if let Err(error) = plugin.check() {
             return refuse(format!("{}: {error}", plugin.file));
         }
         let plugin_digest = raw.plugin_digest.unwrap_or_else(|| PluginDigest::One(plugin.digest.clone()));
-        plugin_digest.check(&plugin)?;
         let section = Self {
             plugin: name,
             plugin_digest,
