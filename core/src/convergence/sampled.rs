@@ -79,15 +79,16 @@ impl PeriodBound {
         divisor: f64,
     ) -> Weighted {
         let (mut sum, mut terms, mut normal) = (-self.floor, self.floor.abs(), [0.0; MAX_INPUTS]);
+        let per = 1.0 / divisor;
         for (k, value) in value.iter().enumerate() {
             let weight = self.weights[k];
             sum += weight * value;
             terms += (weight * value).abs();
             for (a, d) in normal[..inputs].iter_mut().zip(&gradient[k]) {
-                *a += weight * d / divisor;
+                *a += weight * per * d;
             }
         }
-        Weighted { value: sum / divisor, terms: terms / divisor, normal }
+        Weighted { value: sum * per, terms: terms * per, normal }
     }
 
     /// (5): how far e may fall below 0 within the `period` (s), `[h]`, where the pointwise constraint

@@ -41,10 +41,11 @@ pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> 
 }
 
 impl Outlook<'_> {
-    /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order n of h, with h⁽ⁿ⁾ = `highest`.
-    fn foreseen(&self, j: usize, highest: f64, s: f64) -> f64 {
+    /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order `n` of h, with h⁽ⁿ⁾ = `highest`.
+    #[inline(always)]
+    fn foreseen(&self, n: usize, j: usize, highest: f64, s: f64) -> f64 {
         // Horner's scheme.
-        (j..self.n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
+        (j..n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
     }
 
     /// The shortfall `s` seconds later.
@@ -53,11 +54,12 @@ impl Outlook<'_> {
     }
 
     /// The most by which the terms of that polynomial after the first can move h.
-    fn moved(&self, highest: f64, s: f64) -> f64 {
+    #[inline(always)]
+    fn moved<const N: usize>(&self, highest: f64, s: f64) -> f64 {
         let (mut power, mut sum) = (1.0, 0.0);
-        for k in 1..=self.n {
+        for k in 1..=N {
             power *= s / k as f64;
-            sum += power * if k == self.n { highest } else { self.drift[k] }.abs();
+            sum += power * if k == N { highest } else { self.drift[k] }.abs();
         }
         sum
     }
@@ -66,12 +68,34 @@ impl Outlook<'_> {
     pub(super) fn row_at(&self, requirement: &Requirement, normal: &[f64; MAX_INPUTS]) -> Row {
         let s = requirement.ahead;
         let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
-        let floor = (requirement.bound.floor - self.foreseen(0, self.drift[self.n], s)) / power;
+        let floor = (requirement.bound.floor - self.foreseen(self.n, 0, self.drift[self.n], s)) / power;
         Row { normal: *normal, floor }
     }
 
     /// The instant of the [`span`] at which the promise is broken along the model, if it is.
     pub(super) fn look(
+        &self,
+        promise: &FixedTimeState,
+        held: &Hold,
+        normal: &[f64; MAX_INPUTS],
+        span: [f64; 2],
+        scratch: &mut [f64],
+    ) -> Option<Lowest> {
+        // With n known to the compiler the short loops unroll.
+        match self.n {
+            1 => self.look_to::<1>(promise, held, normal, span, scratch),
+            2 => self.look_to::<2>(promise, held, normal, span, scratch),
+            3 => self.look_to::<3>(promise, held, normal, span, scratch),
+            4 => self.look_to::<4>(promise, held, normal, span, scratch),
+            5 => self.look_to::<5>(promise, held, normal, span, scratch),
+            6 => self.look_to::<6>(promise, held, normal, span, scratch),
+            7 => self.look_to::<7>(promise, held, normal, span, scratch),
+            _ => self.look_to::<8>(promise, held, normal, span, scratch),
+        }
+    }
+
+    /// [`Self::look`] for n = `N`.
+    fn look_to<const N: usize>(
         &self,
         promise: &FixedTimeState,
         held: &Hold,
@@ -83,10 +107,10 @@ impl Outlook<'_> {
         const ROUND_OFF: f64 = 1e-12;
         // What is left at the end of the hold is the least: a shortfall grows.
         let h = self.drift[0] - self.short(hold);
-        let highest = self.drift[self.n] + dot(normal, held.u);
-        let is_far = h > 0.0 && self.moved(highest, hold) <= (1.0 - CLEAR) * h;
+        let highest = self.drift[N] + dot(normal, held.u);
+        let is_far = h > 0.0 && self.moved::<N>(highest, hold) <= (1.0 - CLEAR) * h;
         let floor = if is_far { held.floor(hold) } else { None };
-        if floor.map_or(is_far && self.agrees(held, highest, h, hold), |floor| floor >= 0.0) {
+        if floor.map_or(is_far && self.agrees::<N>(held, highest, h, hold), |floor| floor >= 0.0) {
             return None;
         }
         let size = promise.anchor[0].abs() + promise.margin + h.abs();
@@ -102,28 +126,28 @@ impl Outlook<'_> {
     /// time. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
     /// radians shows where the hold ends.
     #[inline(always)]
-    fn agrees(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
-        if self.n == 1 {
+    fn agrees<const N: usize>(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
+        if N == 1 {
             return false;
         }
         let allowed = 0.5 * CLEAR * h;
         if let Some((s, known)) = self.known.filter(|(s, _)| *s <= hold) {
             let part = s / hold;
-            let allowed = (0..self.n).fold(allowed * part, |allowed, _| allowed * part);
-            if self.is_near(&known[..self.n], s, highest, allowed) {
+            let allowed = (0..N).fold(allowed * part, |allowed, _| allowed * part);
+            if self.is_near::<N>(&known[..N], s, highest, allowed) {
                 return true;
             }
         }
-        held.derivatives(hold).is_none_or(|end| self.is_near(&end[..=self.n], hold, highest, allowed))
+        held.derivatives(hold).is_none_or(|end| self.is_near::<N>(&end[..=N], hold, highest, allowed))
     }
 
     /// Whether `derivatives` of h are those foreseen `s` seconds later, but for what moves h by so much `allowed`.
     #[inline(always)]
-    fn is_near(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
+    fn is_near<const N: usize>(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
         let mut power = 1.0;
         derivatives.iter().enumerate().all(|(k, h)| {
             power *= if k == 0 { 1.0 } else { s / k as f64 };
-            power * (h - self.foreseen(k, highest, s)).abs() <= allowed
+            power * (h - self.foreseen(N, k, highest, s)).abs() <= allowed
         })
     }
 
@@ -132,7 +156,7 @@ impl Outlook<'_> {
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)
-            .map(|i| Lowest { h: self.foreseen(0, highest, at(i)) - self.short(at(i)), at: at(i) })
+            .map(|i| Lowest { h: self.foreseen(self.n, 0, highest, at(i)) - self.short(at(i)), at: at(i) })
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
