@@ -131,6 +131,11 @@ fn windows_are_checked() {
     assert_eq!(window(Begin::At(4.0), End::Never), "goal.begin: is 4, must be < deadline = 4");
     assert_eq!(window(Begin::At(-1.0), End::Never), "goal.begin: is -1, must be finite and >= 0");
     assert_eq!(window(Begin::At(2.0), End::At(2.0)), "goal.end: is 2, must be > begin = 2");
+    let before = "goal.end: is 3.5, must be >= deadline = 4, the promise to keep";
+    for begin in [Begin::AtOnce, Begin::At(2.0)] {
+        assert_eq!(window(begin, End::At(3.5)), before);
+        assert!(with().and_then(|b| b.window(begin, End::At(4.0))).is_ok());
+    }
     assert_eq!(
         window(Begin::AfterArrival(0), End::Never),
         "goal.begin: waits for barrier 0, must be one added before"

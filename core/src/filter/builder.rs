@@ -218,7 +218,8 @@ impl FilterBuilder {
     ///
     /// # Errors
     ///
-    /// No barrier yet; a time out of range; a barrier to wait for that was not added before.
+    /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; a barrier to wait for that
+    /// was not added before.
     pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
         let Some(index) = self.slots.len().checked_sub(1) else {
             return Err(Error::new(ErrorKind::Dimension, "window", "there is no barrier yet to have one"));
@@ -245,6 +246,14 @@ impl FilterBuilder {
             && positive("end", seconds).map_err(named)? <= opens
         {
             return range("end", format!("is {seconds}, must be > begin = {opens}"));
+        }
+        // After another's arrival the deadline counts from there.
+        let deadline = slot.promise.deadline();
+        if let (Begin::AtOnce | Begin::At(_), End::At(seconds)) = (begin, end)
+            && deadline.is_finite()
+            && seconds < deadline
+        {
+            return range("end", format!("is {seconds}, must be >= deadline = {deadline}, the promise to keep"));
         }
         (slot.begin, slot.end) = (begin, end);
         Ok(self)

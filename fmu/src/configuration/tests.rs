@@ -181,6 +181,8 @@ defects! {
         "barrier[0].begin: is 10, must be < deadline = 10";
     end_before_the_begin: FILTER, "radius = 2.0" => "radius = 2.0\nbegin = 5.0\nend = 4.0",
         "barrier[0].end: is 4, must be > begin = 5";
+    end_before_the_deadline: FILTER, "radius = 2.0" => "radius = 2.0\nend = 4.0",
+        "barrier[0].end: is 4, must be >= deadline = 10, the promise to keep";
     two_ends: FILTER, "radius = 2.0" => "radius = 2.0\nuntil_arrival = true\nend = 4.0",
         "barrier[0].end: is 4, must be 0 beside `until_arrival`";
     rates_of_another_number: FILTER, "radius = 2.0" => "radius = 2.0\nrates = [1.0, 2.0, 3.0]",

@@ -197,7 +197,7 @@ static KEYS: [Row; 33] = [
             name: "end",
             value: Number(S, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "after the first step, after `begin`: let go then; 0: never",
+            meaning: "after the first step, after `begin`, at or after `deadline`: let go then; 0: never",
         },
         parameters: &[whole("time from the first step to be let go; 0: never", |b| b.end.as_mut())],
     },
