@@ -253,7 +253,10 @@ impl FilterBuilder {
             && deadline.is_finite()
             && seconds < deadline
         {
-            return range("end", format!("is {seconds}, must be >= deadline = {deadline}, the promise to keep"));
+            return range(
+                "end",
+                format!("is {seconds}, must be >= deadline = {deadline}, the promise to keep"),
+            );
         }
         (slot.begin, slot.end) = (begin, end);
         Ok(self)
