@@ -128,18 +128,15 @@ pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<()
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
     let mut trial = Trial { file, told: HashSet::new() };
-    let tried = trial.all(path).and_then(|fmu| match references {
-        Some(tolerance) => trial.references(&fmu, tolerance),
-        None => Ok(()),
-    });
-    if let Err(error) = tried {
-        let rule = match error.as_call() {
-            Some(call) if call.status.is_some_and(Status::is_discard) => "trial.discard",
-            Some(_) => "trial.call",
-            None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
-            None => "trial.load",
-        };
-        trial.tell(rule, None, &error.to_string());
+    match Fmu::open(path).map(Rc::new) {
+        Ok(fmu) => {
+            trial.note(|trial| trial.all(&fmu));
+            // Whatever became of the calls above, what was asked for is compared.
+            if let Some(tolerance) = references {
+                trial.note(|trial| trial.references(&fmu, tolerance));
+            }
+        }
+        Err(error) => trial.note(|_| Err(error)),
     }
     journal::finish();
     Ok(())
@@ -163,8 +160,19 @@ impl Trial {
         let _ = serde_json::to_string(&finding).map(|line| self.file.write_all((line + "\n").as_bytes()));
     }
 
-    fn all(&mut self, path: &Path) -> Result<Rc<Fmu>, Error> {
-        let fmu = Rc::new(Fmu::open(path)?);
+    /// Tells what ends a part of the trial early.
+    fn note(&mut self, part: impl FnOnce(&mut Self) -> Result<(), Error>) {
+        let Err(error) = part(self) else { return };
+        let rule = match error.as_call() {
+            _ if is_discarded(&error) => "trial.discard",
+            Some(_) => "trial.call",
+            None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
+            None => "trial.load",
+        };
+        self.tell(rule, None, &error.to_string());
+    }
+
+    fn all(&mut self, fmu: &Rc<Fmu>) -> Result<(), Error> {
         let description = Rc::clone(fmu.description());
         let wanted: &[&str] = match description.version() {
             Version::Fmi2 => &["2.0", "default"],
@@ -200,9 +208,9 @@ impl Trial {
             );
         }
         if !description.only_once {
-            self.two_instances(&fmu, slave, plan);
+            self.two_instances(fmu, slave, plan);
         }
-        Ok(fmu)
+        Ok(())
     }
 
     /// Compares with the results that the FMU carries.
@@ -215,7 +223,14 @@ impl Trial {
             );
             return Ok(());
         };
-        for Difference { name, time, value, reference } in references.compare(fmu, tolerance)? {
+        let differences = match references.compare(fmu, tolerance) {
+            Err(error) if error.as_call().is_some() => {
+                self.tell("trial.references", None, &format!("cannot be compared: {error}"));
+                return Ok(());
+            }
+            other => other?,
+        };
+        for Difference { name, time, value, reference } in differences {
             let text = format!(
                 "is {value} at t = {} s, where its reference is {reference}; allowed is a share of {tolerance}",
                 crate::error::brief_time(time)
@@ -388,7 +403,11 @@ impl Trial {
             }));
         }
         for (output, input) in pairs.into_iter().take(PAIRS) {
-            self.derivative(slave, array(output), array(input), description.derivatives[1])?;
+            match self.derivative(slave, array(output), array(input), description.derivatives[1]) {
+                // It has none here, such as at a kink: nothing to compare with.
+                Err(error) if is_discarded(&error) => {}
+                other => other?,
+            }
         }
         Ok(())
     }
@@ -502,6 +521,10 @@ impl Plan {
 /// Whether two scalars that stand together are elements of one array.
 fn same(a: &Variable, b: &Variable) -> bool {
     b.element == a.element + 1
+}
+
+fn is_discarded(error: &Error) -> bool {
+    error.as_call().and_then(|call| call.status).is_some_and(Status::is_discard)
 }
 
 fn is_set_by_importers(v: &Variable) -> bool {
