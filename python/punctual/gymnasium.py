@@ -162,7 +162,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
     The arguments are those of `SafetyFilterEnv`, with functions of all rows at once; `filter` is a configuration or a
     `FilterBatch` of `env.num_envs` rows, which is copied. The keys of `info` hold an array each, a row for each environment;
     `filter_status` has the numbers of the statuses. A row whose episode is over starts anew with the next one, its time too,
-    whichever mode of automatic resets the environment has.
+    whichever mode of automatic resets the environment has. A row that a step has only begun anew did no action: its keys are
+    masked (`_filter_action` and so on).
     """
 
     def __init__(
@@ -215,6 +216,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         over = terminated | truncated
         mode = self.env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         begun = {AutoresetMode.NEXT_STEP: self._over, AutoresetMode.SAME_STEP: over}.get(mode)
+        # Rows that this step has begun anew in place of an action.
+        done = ~self._over if mode == AutoresetMode.NEXT_STEP else np.ones(len(over), bool)
         self._steps += 1
         if begun is not None and begun.any():
             self.filter.reset(begun)
@@ -227,6 +230,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
             "filter_status": status,
             "filter_guaranteed": guaranteed,
         }
-        # Gymnasium's convention: which rows have the key.
-        has = {f"_{key}": np.ones(len(over), bool) for key in told}
-        return observation, reward, terminated, truncated, info | told | has
+        # Gymnasium's convention: which rows have the key; the others are zero.
+        for key, values in list(told.items()):
+            told[key], told[f"_{key}"] = np.array(values), done.copy()
+            told[key][~done] = 0
+        return observation, reward, terminated, truncated, info | told
