@@ -16,7 +16,8 @@ pub enum Phase {
     Approach = 1,
     /// The deadline passed outside the safe set; the approach goes on.
     Late = 2,
-    /// To be kept: inside, from the start or since it has been reached, under the stay constraint.
+    /// To be kept: inside, from the start or since it has been reached, under the stay constraint. Before the deadline a plan
+    /// that decides may leave it once more.
     Stay = 3,
     /// Outside again after having been inside, with no recovery time set, or outside from the start without a
     /// deadline; the stay constraint pulls back, without a deadline.

@@ -467,7 +467,7 @@ impl AssuredFilter {
         one_plant(filter, period)?;
         for slot in &filter.slots {
             if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
-                let message = "moves with time, so that no plan ends; with a horizon one may end before";
+                let message = "moves with time, so that no plan ends; with a horizon (`plan_horizon`) one may end before";
                 return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
             }
         }
@@ -642,7 +642,8 @@ impl AssuredFilter {
     }
 
     /// Forgets the promise: the next valid sample decides anew. Where it finds no other plan, the one at hand will do if it
-    /// keeps what is promised then; and where x is not finite, that is followed until there is a valid sample.
+    /// keeps what is promised then; and where x is not finite, that is followed until there is a valid sample. A set that x
+    /// is inside of then is to be kept from there on, also one that was to be left once more before its deadline.
     pub fn rearm(&mut self) {
         self.rows.filter_mut().rearm();
         self.commitment.rearm();

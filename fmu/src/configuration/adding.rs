@@ -221,6 +221,7 @@ impl FilterConfiguration {
                 (None, RelativeDegree::Mixed(orders)) => uneven(&integrators(orders, name)),
                 (None, RelativeDegree::Varying(_)) => uneven(""),
                 (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)".to_owned(),
+                (Some(_), RelativeDegree::NotFinite) => "; its numbers are too large".to_owned(),
                 _ => String::new(),
             };
             let (plant, found) = (self.plant.name(), found.describe(name));

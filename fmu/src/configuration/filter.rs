@@ -627,7 +627,9 @@ impl FilterConfiguration {
         match (self.assurance, free) {
             (AssuranceName::Off, _) => "assurance is \"off\"".to_owned(),
             (AssuranceName::On, _) => String::new(),
-            (AssuranceName::Auto, Some(signal)) => format!("{} has no bounds", signal.name),
+            (AssuranceName::Auto, Some(signal)) => {
+                format!("{0} has {1}", signal.name, self.lacking(&signal.name))
+            }
             (AssuranceName::Auto, None) => self.unaccounted().unwrap_or_default(),
         }
     }

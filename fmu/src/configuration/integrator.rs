@@ -136,9 +136,21 @@ impl FilterConfiguration {
 
     /// The bounds of a signal that the filter [hands out](Self::commanded), where it has both.
     pub fn limits(&self, name: &str) -> Option<[f64; 2]> {
+        self.limits_given(name).filter(|limits| limits.iter().all(|limit| limit.abs() < UNBOUNDED))
+    }
+
+    /// What such a signal lacks of its bounds, in words.
+    pub(super) fn lacking(&self, name: &str) -> &'static str {
+        match self.limits_given(name).map(|limits| limits.map(|limit| limit.abs() < UNBOUNDED)) {
+            Some([true, false]) => "no upper bound",
+            Some([false, true]) => "no lower bound",
+            _ => "no bounds",
+        }
+    }
+
+    fn limits_given(&self, name: &str) -> Option<[f64; 2]> {
         let integrator = self.integrator.as_ref().filter(|i| i.state == name);
-        let given = integrator.map(IntegratorSection::limits).or(self.bounds.get(name).copied());
-        given.filter(|limits| limits.iter().all(|limit| limit.abs() < UNBOUNDED))
+        integrator.map(IntegratorSection::limits).or(self.bounds.get(name).copied())
     }
 
     /// The signals that the filter hands out and is asked for: the inputs of the plant, the integrated state in
@@ -215,7 +227,11 @@ impl FilterConfiguration {
                 AssuredFilter::integrated(integrated, pace)
             }
         }
-        .map_err(|e| e.to_string())?;
+        .map_err(|e| match e.field().strip_suffix(".source") {
+            // No key has this name: it is of what the barrier is.
+            Some(barrier) => format!("{barrier} {}", e.message()),
+            None => e.to_string(),
+        })?;
         let Some(policy) = &self.policy else { return Ok(assured) };
         let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
         let functions = RefCell::new(functions);

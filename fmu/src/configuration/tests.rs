@@ -168,6 +168,8 @@ defects! {
     a_centre_input_of_an_ellipse: FILTER,
         "radius = 2.0" => "shape = \"ellipse\"\nhalf_axes = [1.0, 2.0]\ncentre_input = true",
         "barrier[0].centre_input: ellipse has none";
+    a_centre_that_is_nowhere: FILTER, "centre = [45.0, 44.0]" => "centre = [45.0, 1e300]",
+        "barrier[0]: its relative degree along unicycle is not known: model or barrier is not finite at any sample state; its numbers are too large";
     an_unknown_state: FILTER,
         "centre = [45.0, 44.0]\nradius = 2.0" => "shape = \"at_most\"\nstate = \"w\"\nbound = 1.0",
         "barrier[0].state: is \"w\", must be one of x_p, y_p, theta, v";
@@ -549,6 +551,12 @@ fn expressions_of_inputs_are_checked() {
             ", omega = [-2.0, 2.0] }",
             " }",
             "policy: is for plans, of which there are none: omega has no bounds",
+        ),
+        (
+            POLICY,
+            "omega = [-2.0,",
+            "omega = [-inf,",
+            "policy: is for plans, of which there are none: omega has no lower bound",
         ),
     ] {
         assert_eq!(refusal(valid, from, to), wanted, "{to}");
