@@ -375,7 +375,7 @@ fn sets_that_move_for_ever_need_a_horizon() {
     let refused = |horizon| fleeing(horizon).err().map(|e| e.to_string()).unwrap_or_default();
     assert_eq!(
         refused(None),
-        "strip.source: moves with time, so that no plan ends; with a horizon (`plan_horizon`) one may end before"
+        "strip.source: moves with time, so that no plan ends; with a horizon one may end before"
     );
     assert_eq!(refused(Some(0.0)), "horizon: is 0, must be finite and > 0");
     assert_eq!(refused(Some(f64::NAN)), "horizon: is NaN, must be finite and > 0");

@@ -839,9 +839,7 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     let moves = AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string());
     assert_eq!(
         moves.as_deref(),
-        Some(
-            "goal.source: moves with time, so that no plan ends; with a horizon (`plan_horizon`) one may end before"
-        )
+        Some("goal.source: moves with time, so that no plan ends; with a horizon one may end before")
     );
 }
 

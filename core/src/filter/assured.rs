@@ -467,7 +467,7 @@ impl AssuredFilter {
         one_plant(filter, period)?;
         for slot in &filter.slots {
             if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
-                let message = "moves with time, so that no plan ends; with a horizon (`plan_horizon`) one may end before";
+                let message = "moves with time, so that no plan ends; with a horizon one may end before";
                 return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
             }
         }

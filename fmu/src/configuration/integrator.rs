@@ -228,8 +228,8 @@ impl FilterConfiguration {
             }
         }
         .map_err(|e| match e.field().strip_suffix(".source") {
-            // No key has this name: it is of what the barrier is.
-            Some(barrier) => format!("{barrier} {}", e.message()),
+            // No key has this name. A barrier without a model is refused above, and one that moves wants the key of a horizon.
+            Some(barrier) => format!("{barrier} {} (`plan_horizon`)", e.message()),
             None => e.to_string(),
         })?;
         let Some(policy) = &self.policy else { return Ok(assured) };
