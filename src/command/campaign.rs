@@ -268,6 +268,20 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             progress.again
         ));
     }
+    if let Some(summary) = &report.summary
+        && summary.worst.iter().any(|case| case.failure.is_none())
+    {
+        let unseen = |name: &&str| {
+            let column = format!("{name}.least_h");
+            summary.spreads.iter().any(|spread| spread.column == column && spread.count == 0)
+        };
+        for barrier in measures.barriers().filter(unseen) {
+            output::note(&format!(
+                "note: {barrier}: no run has an h after its deadline; {}",
+                early(&campaign)
+            ));
+        }
+    }
     if arguments.json {
         output::json(&report);
     } else if let Some(summary) = &report.summary {
@@ -370,6 +384,12 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
             return Ok(ExitCode::from(INTERRUPTED));
         }
     };
+    if found.worst.least_h.is_none() {
+        output::note(&format!(
+            "note: the worst run has no h after a deadline: it failed before, or {}",
+            early(campaign)
+        ));
+    }
     let report = RareReport {
         campaign: arguments.campaign.display().to_string(),
         file: output.display().to_string(),
@@ -381,6 +401,11 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
         output::result(&rare_text(&report));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a run without h after a deadline may be due to.
+fn early(campaign: &Campaign) -> String {
+    format!("stop_time = {} s may be too early", campaign.system().experiment().stop_time)
 }
 
 fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {

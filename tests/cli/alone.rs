@@ -397,6 +397,34 @@ fn two_vehicles_in_one_model_avoid_each_other() {
 }
 
 /// What is promised of it has an end, which `check` and the run tell, and which is put off.
+/// A set that moves for good has no plan that ends. The key that helps is said.
+#[test]
+fn a_set_that_moves_asks_for_a_horizon() {
+    let workshop = Workshop::new();
+    let text = r#"kind = "filter"
+[plant]
+states = [{ name = "x", unit = "m" }]
+inputs = [{ name = "u", unit = "m/s", min = -5.0, max = 5.0 }]
+parameters = [{ name = "speed", start = 1.0, unit = "m/s" }]
+derivatives = { x = "u" }
+[[barrier]]
+name = "goal"
+expression = "2 - x + speed * t"
+deadline = 12.0
+"#;
+    let reason =
+        "goal moves with time, so that no plan ends; with a horizon one may end before (`plan_horizon`)";
+    workshop.write("moving.toml", text);
+    let checked = workshop.punctual(["check", "moving.toml"]).success();
+    assert!(checked.contains(&format!("plans: none, since {reason}\n")), "{checked}");
+    workshop.write("moving.toml", format!("assurance = \"on\"\n{text}"));
+    let message = format!("moving.toml: assurance: is \"on\", must be \"off\": {reason}");
+    workshop.punctual(["check", "moving.toml"]).fails(2, &message);
+    workshop.write("moving.toml", format!("plan_horizon = 2.0\n{text}"));
+    let checked = workshop.punctual(["check", "moving.toml"]).success();
+    assert!(!checked.contains("plans: none"), "{checked}");
+}
+
 #[test]
 fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
     let workshop = Workshop::new();

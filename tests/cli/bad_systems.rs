@@ -94,6 +94,15 @@ fn a_start_value_that_is_not_a_number() {
         .fails(2, "system.toml: component[1].start.\"x0.v\": is NaN; must be finite");
 }
 
+/// The header that is meant has the keys of the tables around it, and no positions.
+#[test]
+fn start_values_as_a_list_of_tables() {
+    run("fmu = \"filter.fmu\"", "fmu = \"filter.fmu\"\nstart = [{ \"goal.deadline\" = 9.0 }]").fails(
+        2,
+        "system.toml: component[0].start: is a list, must be a table; one table is written [component.start] (line 13)",
+    );
+}
+
 #[test]
 fn a_start_value_of_an_output() {
     let start = "fmu = \"plant.fmu\"\nstart = { \"x.v\" = 1.0 }";

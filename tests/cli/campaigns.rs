@@ -951,6 +951,25 @@ fn a_rare_failure_is_estimated_and_shown() {
     refused(narrow, "--rare: found no way to a failure: the least h that ");
 }
 
+/// Runs that end before a deadline keep no promise: the reason is said, whatever is asked.
+#[test]
+fn runs_that_end_before_a_deadline_say_so() {
+    let workshop = Workshop::new();
+    let deadline = |seconds: f64| {
+        workshop.write("c.toml", drifting(&workshop, -30.0));
+        workshop.write("filter.toml", workshop.text("filter.toml") + &format!("deadline = {seconds:?}\n"));
+    };
+    deadline(3.0);
+    let noted = |arguments: &[&str]| workshop.punctual(arguments.iter().copied()).stderr;
+    let note = "note: filter.wall: no run has an h after its deadline; stop_time = 2 s may be too early";
+    assert!(noted(&["campaign", "c.toml"]).contains(note));
+    let note = "note: the worst run has no h after a deadline: it failed before, or stop_time = 2 s may be too early";
+    assert!(noted(&["campaign", "c.toml", "--rare=5"]).contains(note));
+    // With a deadline in time there is nothing to say.
+    deadline(1.5);
+    assert!(!noted(&["campaign", "c.toml", "-o", "in_time.parquet"]).contains("note: filter.wall"));
+}
+
 /// A wall that noise alone comes to: as often by `--rare` as by plain sampling, and the worst course again.
 #[test]
 fn a_rare_course_of_noise_is_estimated_and_shown() {

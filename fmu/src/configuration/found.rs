@@ -21,6 +21,16 @@ pub(super) struct Refusal {
     pub(super) message: String,
     /// The bytes of the text that it is about.
     pub(super) place: Option<Range<usize>>,
+    /// Where a table is found for a list of tables or the other way round: what was meant, and its header as far as it is
+    /// known, which is the path without positions.
+    meant: Option<(Meant, String)>,
+}
+
+/// What a header is for.
+#[derive(Debug)]
+enum Meant {
+    ListOfTables,
+    Table,
 }
 
 impl Refusal {
@@ -33,6 +43,20 @@ impl Refusal {
     fn within(mut self, outer: &str) -> Self {
         let dot = if self.path.is_empty() || self.path.starts_with('[') { "" } else { "." };
         self.path = format!("{outer}{dot}{}", self.path);
+        if let Some((_, header)) = self.meant.as_mut().filter(|_| !outer.starts_with('[')) {
+            let dot = if header.is_empty() { "" } else { "." };
+            *header = format!("{outer}{dot}{header}");
+        }
+        self
+    }
+
+    /// The same refusal, once its path is whole: with the header that was meant.
+    fn told(mut self) -> Self {
+        self.message += &match &self.meant {
+            Some((Meant::ListOfTables, header)) => format!("; a list of tables is written [[{header}]]"),
+            Some((Meant::Table, header)) => format!("; one table is written [{header}]"),
+            None => String::new(),
+        };
         self
     }
 }
@@ -137,19 +161,16 @@ impl serde::de::Error for Refusal {
 
 /// Reads a value from the tables of a text.
 pub(super) fn read<T: DeserializeOwned>(table: &DeTable<'_>) -> Result<T, Refusal> {
-    T::deserialize(MapAccessDeserializer::new(Entries::of(table)))
+    T::deserialize(MapAccessDeserializer::new(Entries::of(table))).map_err(Refusal::told)
 }
 
-/// A value, and the key that it or its list stands under.
-struct Found<'a> {
-    value: &'a Spanned<DeValue<'a>>,
-    key: &'a str,
-}
+/// A value.
+struct Found<'a>(&'a Spanned<DeValue<'a>>);
 
 impl Found<'_> {
     /// The refusal of this value where something else is wanted.
     fn refused(&self, wanted: &dyn Expected) -> Refusal {
-        let found = match self.value.get_ref() {
+        let found = match self.0.get_ref() {
             DeValue::String(text) => Unexpected::Str(text),
             DeValue::Integer(number) => Unexpected::Other(number.as_str()),
             DeValue::Float(number) => Unexpected::Other(number.as_str()),
@@ -163,33 +184,30 @@ impl Found<'_> {
 }
 
 impl<'a> Found<'a> {
-    /// Adds to a refusal of a table or a list how the other one is written.
-    fn written(&self, mut refusal: Refusal) -> Refusal {
+    /// Adds to a refusal of a table or a list what was meant.
+    fn meant(&self, refusal: Refusal) -> Refusal {
         let tables = |list: &toml::de::DeArray<'_>| {
             !list.is_empty() && list.iter().all(|entry| matches!(entry.get_ref(), DeValue::Table(_)))
         };
-        let key = shown(self.key);
-        match self.value.get_ref() {
-            DeValue::Table(_) => refusal.message += &format!("; a list of tables is written [[{key}]]"),
-            DeValue::Array(list) if tables(list) => {
-                refusal.message += &format!("; one table is written [{key}]");
-            }
-            _ => {}
-        }
-        refusal
+        let meant = match self.0.get_ref() {
+            DeValue::Table(_) => Some(Meant::ListOfTables),
+            DeValue::Array(list) if tables(list) => Some(Meant::Table),
+            _ => None,
+        };
+        Refusal { meant: meant.map(|meant| (meant, String::new())), ..refusal }
     }
 
     fn list<V: Visitor<'a>>(&self, visitor: V, fixed: bool) -> Result<V::Value, Refusal> {
-        let DeValue::Array(list) = self.value.get_ref() else {
-            return Err(self.written(self.refused(&visitor)));
+        let DeValue::Array(list) = self.0.get_ref() else {
+            return Err(self.meant(self.refused(&visitor)));
         };
-        let items = Items { rest: list.iter(), next: 0, key: self.key, fixed };
+        let items = Items { rest: list.iter(), next: 0, fixed };
         visitor.visit_seq(items)
     }
 
     fn table<V: Visitor<'a>>(&self, visitor: V) -> Result<V::Value, Refusal> {
-        let DeValue::Table(table) = self.value.get_ref() else {
-            return Err(self.written(self.refused(&visitor)));
+        let DeValue::Table(table) = self.0.get_ref() else {
+            return Err(self.meant(self.refused(&visitor)));
         };
         visitor.visit_map(Entries::of(table))
     }
@@ -200,7 +218,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
         let refuse = |message: String| Err(Refusal::custom(message));
-        match self.value.get_ref() {
+        match self.0.get_ref() {
             DeValue::Array(_) => self.list(visitor, false),
             DeValue::Table(_) => self.table(visitor),
             DeValue::String(text) => visitor.visit_str(text),
@@ -243,7 +261,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
 
     /// A list with a fixed number of entries.
     fn deserialize_tuple<V: Visitor<'de>>(self, length: usize, visitor: V) -> Result<V::Value, Refusal> {
-        match self.value.get_ref() {
+        match self.0.get_ref() {
             DeValue::Array(list) if list.len() == length => self.list(visitor, true),
             DeValue::Array(list) => {
                 let message = match list.len() {
@@ -275,7 +293,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
         words: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Refusal> {
-        let DeValue::String(text) = self.value.get_ref() else {
+        let DeValue::String(text) = self.0.get_ref() else {
             return Err(self.refused(&one_of(words).as_str()));
         };
         let word: StrDeserializer<'_, Refusal> = text.as_ref().into_deserializer();
@@ -296,8 +314,6 @@ impl<'de> Deserializer<'de> for Found<'de> {
 struct Items<'a> {
     rest: std::slice::Iter<'a, Spanned<DeValue<'a>>>,
     next: usize,
-    /// The key of the list.
-    key: &'a str,
     /// Whether the number of entries is fixed. These are counted from 1, as FMI counts the components of a vector.
     fixed: bool,
 }
@@ -309,7 +325,7 @@ impl<'de> SeqAccess<'de> for Items<'de> {
         let Some(value) = self.rest.next() else { return Ok(None) };
         let place = format!("[{}]", self.next + usize::from(self.fixed));
         self.next += 1;
-        let read = seed.deserialize(Found { value, key: self.key });
+        let read = seed.deserialize(Found(value));
         read.map(Some).map_err(|e| e.at(value.span()).within(&place))
     }
 }
@@ -317,13 +333,13 @@ impl<'de> SeqAccess<'de> for Items<'de> {
 /// The keys and values of a table.
 struct Entries<'a> {
     rest: Box<dyn Iterator<Item = (&'a Spanned<DeString<'a>>, &'a Spanned<DeValue<'a>>)> + 'a>,
-    /// The value of the key read last.
-    value: Option<Found<'a>>,
+    /// The key read last and its value.
+    last: Option<(&'a str, Found<'a>)>,
 }
 
 impl<'a> Entries<'a> {
     fn of(table: &'a DeTable<'a>) -> Self {
-        Self { rest: Box::new(table.iter()), value: None }
+        Self { rest: Box::new(table.iter()), last: None }
     }
 }
 
@@ -332,14 +348,14 @@ impl<'de> MapAccess<'de> for Entries<'de> {
 
     fn next_key_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, Refusal> {
         let Some((key, value)) = self.rest.next() else { return Ok(None) };
-        self.value = Some(Found { value, key: key.get_ref() });
+        self.last = Some((key.get_ref(), Found(value)));
         let name: StrDeserializer<'_, Refusal> = key.get_ref().as_ref().into_deserializer();
         seed.deserialize(name).map(Some).map_err(|e| e.at(key.span()))
     }
 
     fn next_value_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<T::Value, Refusal> {
-        let found = self.value.take().ok_or_else(|| Refusal::custom("is a value without a key"))?;
-        let (key, place) = (shown(found.key), found.value.span());
-        seed.deserialize(found).map_err(|e| e.at(place).within(&key))
+        let (key, found) = self.last.take().ok_or_else(|| Refusal::custom("is a value without a key"))?;
+        let place = found.0.span();
+        seed.deserialize(found).map_err(|e| e.at(place).within(&shown(key)))
     }
 }

@@ -342,7 +342,9 @@ impl ExperimentSection {
         Range::FINITE.check("experiment.stop_time", self.stop_time)?;
         Range::POSITIVE.check("experiment.step_size", self.step_size)?;
         if self.stop_time <= self.start_time {
-            let message = format!("is {}, must be > start_time = {}", self.stop_time, self.start_time);
+            let default = if self.stop_time == Self::default().stop_time { " (its default)" } else { "" };
+            let message =
+                format!("is {}{default}, must be > start_time = {}", self.stop_time, self.start_time);
             return Err(ConfigurationError::new("experiment.stop_time", message));
         }
         if self.fmi == FmiVersion::Two && !self.arrays {

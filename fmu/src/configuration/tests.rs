@@ -217,7 +217,9 @@ defects! {
     step_size_zero: FILTER, "[[barrier]]" => "[experiment]\nstep_size = 0.0\n[[barrier]]",
         "experiment.step_size: is 0, must be finite and >= 1e-9";
     stop_before_start: FILTER, "[[barrier]]" => "[experiment]\nstart_time = 20.0\n[[barrier]]",
-        "experiment.stop_time: is 10, must be > start_time = 20";
+        "experiment.stop_time: is 10 (its default), must be > start_time = 20";
+    stop_at_start: FILTER, "[[barrier]]" => "[experiment]\nstart_time = 20.0\nstop_time = 20.0\n[[barrier]]",
+        "experiment.stop_time: is 20, must be > start_time = 20";
     nan_start_value: PLANT, "v = 1.5" => "v = nan", "x0.v: is NaN, must be finite";
     unknown_state: PLANT, "v = 1.5" => "w = 1.5", "x0.w: unknown state, must be one of x_p, y_p, theta, v";
     zero_length: PLANT, "l_r = 3.0" => "l_r = 0.0", "plant.l_r: is 0, must be finite and >= 1e-9";
@@ -373,6 +375,12 @@ fn unknown_and_missing_keys_and_wrong_types() {
             "[integration]",
             "[[integration]]",
             "integration: is a list, must be a table; one table is written [integration] (line 5)",
+        ),
+        (
+            FILTER,
+            "\"unicycle\" }",
+            "\"unicycle\", inputs = { a = 1 } }",
+            "plant.inputs: is a table, must be a list; a list of tables is written [[plant.inputs]] (line 3)",
         ),
         (
             PLANT,
