@@ -51,7 +51,7 @@ def campaign(
     """
     path = Path(file)
     result = path.with_suffix(".parquet") if output is None else Path(output)
-    if batch is not None and not (isinstance(batch, int) and 1 <= batch <= _MOST):
+    if batch is not None and (isinstance(batch, bool) or not isinstance(batch, int) or not 1 <= batch <= _MOST):
         raise Error(f"batch: is {batch!r}, must be a whole number from 1 to {_MOST}")
     folder = Path(f"{result}.shards")
     # One that is complete is only summed up; one of another campaign is refused.
@@ -69,10 +69,15 @@ def campaign(
         before = kept.done
         try:
             with nullcontext(client) if isinstance(client, Client) else _connected(client) as cluster:
-                _spread(cluster, kept, batch)
+                # What waits for futures takes the current client, which without this may be another one.
+                with cluster.as_current():
+                    _spread(cluster, kept, batch)
         except (CancelledError, OSError) as error:
-            raise Error(f"client: the scheduler was lost: {type(error).__name__}; {kept.told()}") from error
-        joined = run(("campaign", kept.packed, "--join", folder, "-o", result, "--json"), accepted=(0,))
+            raise Error(f"client: the scheduler was lost, or the client closed: {type(error).__name__}; {kept.told()}") from error
+        try:
+            joined = run(("campaign", kept.packed, "--join", folder, "-o", result, "--json"), accepted=(0,))
+        except Error as error:
+            raise Error(f"{error}; {kept.told()}") from None
     shutil.rmtree(folder, ignore_errors=True)
     seconds = time.perf_counter() - begin
     report: dict[str, Any] = json.loads(joined)
@@ -83,8 +88,11 @@ def campaign(
 def _connected(address: str) -> _Client:
     from distributed import Client
 
+    if not isinstance(address, str):
+        raise Error(f"client: is {address!r}, must be a distributed.Client, or the address of a scheduler")
     try:
-        return Client(address)
+        # The default of a process stays what it is, even where none answers.
+        return Client(address, set_as_default=False)
     except (OSError, ValueError) as error:
         example = "an address is such as tcp://head:8786"
         raise Error(f"client: no scheduler answers at {address}: {error}; {example}") from error
@@ -95,8 +103,11 @@ class _Kept:
 
     def __init__(self, path: Path, folder: Path) -> None:
         self.folder, self.packed = folder, folder / "campaign.json"
-        folder.mkdir(parents=True, exist_ok=True)
-        self.lock = open(folder / "lock", "w")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self.lock = open(folder / "lock", "w")
+        except OSError as error:
+            raise Error(f"output: cannot write the folder {folder}: {error.strerror}") from None
         try:
             self._open(path)
         except BaseException:
@@ -185,7 +196,9 @@ def _spread(client: _Client, kept: _Kept, batch: int | None) -> None:
     left = kept.runs - kept.done
     with _batches(client) as flying:
         while missing or flying:
-            threads = max(sum(client.nthreads().values()), 1) if client.status == "running" else 1
+            if client.status != "running":
+                raise CancelledError
+            threads = max(sum(client.nthreads().values()), 1)
             # Two for each thread, so that none waits for the next; smaller ones at the end, of a second or so.
             while missing and not lost and len(flying) < 2 * threads:
                 first, end = missing[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -32,7 +33,15 @@ def run(arguments: tuple[str | os.PathLike[str], ...], accepted: tuple[int, ...]
         return done.stdout
     # What it noted before is no part of the reason.
     _, _, reason = f"\n{done.stderr}".partition("\nerror: ")
-    raise Error((reason or done.stderr or done.stdout).strip() or f"exit code {done.returncode}")
+    raise Error((reason or done.stderr or done.stdout).strip() or _ending(done.returncode))
+
+
+def _ending(code: int) -> str:
+    """What an exit code says of a program that says nothing itself."""
+    try:
+        return f"the program was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"the program ended with exit code {code}"
 
 
 def main() -> NoReturn:

@@ -76,6 +76,8 @@ def _period(env: Any, filter: Filter | FilterBatch, dt: float | None) -> float:
         dt = getattr(env, "dt", getattr(env, "tau", None))
     if dt is None:
         raise Error("dt: is not given, and the environment has no dt or tau; must be the time between two steps in s, > 0")
+    if not (isinstance(dt, (int, float, np.number)) and 0.0 < dt < math.inf):
+        raise Error(f"dt: is {dt!r}, must be the time between two steps in s, > 0")
     if not math.isclose(dt, filter.step_size, rel_tol=1e-9):
         raise Error(f"experiment.step_size: is {filter.step_size:g} s, must be the time between two steps, dt, {dt:g} s")
     return float(dt)
@@ -93,7 +95,7 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     - `dt`: the time between two steps in s, > 0. Default: `dt` or `tau` of the environment.
 
     `reset` lets the filter forget everything: deadlines count from the first step of the episode, and so does the time of what
-    moves, from `experiment.start_time` on. `step` adds to `info`:
+    moves, from `experiment.start_time` on: step k is at `start_time + k * dt`. `step` adds to `info`:
 
     - `filter_changed`: whether the filter changed the action; if not, it is passed on as it is.
     - `filter_nominal`: the action wanted; `filter_action`: the one that was done.
@@ -120,6 +122,8 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
             self, filter=filter, state=state, to_input=to_input, to_action=to_action, dt=dt
         )
         gymnasium.Wrapper.__init__(self, env)
+        if isinstance(filter, FilterBatch):
+            raise Error("filter: is a FilterBatch, must be a configuration or a Filter; SafetyFilterVectorEnv takes a batch")
         self.filter = copy(filter) if isinstance(filter, Filter) else Filter(filter)
         self.dt = _period(env.unwrapped, self.filter, dt)
         self._state, self._to_input = _state(state), to_input or _same
@@ -177,6 +181,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         dt: float | None = None,
     ) -> None:
         super().__init__(env)
+        if isinstance(filter, Filter):
+            raise Error(f"filter: is a Filter, must be a configuration or a FilterBatch of {env.num_envs} rows")
         self.filter = copy(filter) if isinstance(filter, FilterBatch) else FilterBatch(filter, env.num_envs)
         if len(self.filter) != env.num_envs:
             raise Error(f"filter: has {len(self.filter)} rows, must have {env.num_envs}, one for each environment")

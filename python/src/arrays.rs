@@ -6,10 +6,13 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyFloat, PyList};
+use pyo3::types::{PyBool, PyFloat, PyInt, PyList};
 
 /// `numpy.asarray`, after its first use.
 static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+
+/// `numpy.ma.MaskedArray`, likewise.
+static MASKED: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
 
 /// Copies `argument`, called `name`, to `into`, row after row: real numbers of this shape, of which the last dimension
 /// is `meaning`.
@@ -20,11 +23,11 @@ pub(crate) fn numbers(
     meaning: &[String],
     into: &mut [f64],
 ) -> PyResult<()> {
-    if let Ok(array) = argument.cast::<PyArrayDyn<f64>>() {
+    if let Ok(array) = argument.cast_exact::<PyArrayDyn<f64>>() {
         return copy(array, name, shape, meaning, into);
     }
     // The actions of most policies, and a few numbers, in a fraction of NumPy's time.
-    if let Ok(array) = argument.cast::<PyArrayDyn<f32>>() {
+    if let Ok(array) = argument.cast_exact::<PyArrayDyn<f32>>() {
         return copy(array, name, shape, meaning, into);
     }
     if let (&[len], Ok(list)) = (shape, argument.cast_exact::<PyList>())
@@ -39,12 +42,65 @@ pub(crate) fn numbers(
         format!("real numbers (floats or integers) of shape {shape} ({})", meaning.join(", "))
     };
     let array = as_array(argument, name, &wanted)?;
-    // The letters of NumPy for floats, and for integers with and without a sign.
-    if !matches!(array.dtype().kind(), b'f' | b'i' | b'u') {
+    if !is_real(&array) {
         return Err(wrong_type(argument, name, &array, &wanted()));
     }
     let array = array.call_method1("astype", ("float64",))?;
     copy(array.cast::<PyArrayDyn<f64>>()?, name, shape, meaning, into)
+}
+
+/// Whether NumPy has letters of floats, or of integers with and without a sign, for it.
+fn is_real(array: &Bound<'_, PyUntypedArray>) -> bool {
+    matches!(array.dtype().kind(), b'f' | b'i' | b'u')
+}
+
+/// Copies the times `argument`, called t, to `into`: one for all, or one for each.
+pub(crate) fn times(argument: &Bound<'_, PyAny>, into: &mut [f64]) -> PyResult<()> {
+    let is_one =
+        plain(argument).is_some() || as_array(argument, "t", &|| TIME.to_owned())?.shape().is_empty();
+    if is_one {
+        into.fill(time(argument)?);
+        return Ok(());
+    }
+    numbers(argument, "t", &[into.len()], &["s".to_owned()], into)
+}
+
+/// The time `argument`, called t.
+pub(crate) fn time(argument: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if let Some(t) = plain(argument) {
+        return Ok(t);
+    }
+    let array = as_array(argument, "t", &|| TIME.to_owned())?;
+    if !array.shape().is_empty() {
+        let message = format!("t: has shape {}, must be {TIME}", shape_text(array.shape()));
+        return Err(PyValueError::new_err(message));
+    }
+    if !is_real(&array) {
+        return Err(PyTypeError::new_err(format!("t: is {}, must be {TIME}", type_name(argument))));
+    }
+    let mut t = [0.0];
+    numbers(&array, "t", &[], &["s".to_owned()], &mut t).map(|()| t[0])
+}
+
+/// What a time is.
+const TIME: &str = "a real number (s)";
+
+/// A number of Python's own, which is no truth value.
+fn plain(argument: &Bound<'_, PyAny>) -> Option<f64> {
+    let is_number = argument.is_instance_of::<PyFloat>() || argument.is_exact_instance_of::<PyInt>();
+    is_number.then(|| argument.extract().ok()).flatten()
+}
+
+/// The number `argument`, called `name`: a whole one from 1 on.
+pub(crate) fn count(argument: &Bound<'_, PyAny>, name: &str) -> PyResult<usize> {
+    let whole = (!argument.is_instance_of::<PyBool>()).then(|| argument.call_method0("__index__"));
+    let Some(Ok(whole)) = whole else {
+        let message = format!("{name}: is {}, must be a whole number >= 1", argument.repr()?);
+        return Err(PyTypeError::new_err(message));
+    };
+    whole.extract().ok().filter(|count| *count > 0).ok_or_else(|| {
+        PyValueError::new_err(format!("{name}: is {whole}, must be >= 1, and at most {}", isize::MAX))
+    })
 }
 
 /// The real numbers of `argument`, called `name`: any number of rows, whose components are `meaning`.
@@ -80,6 +136,11 @@ fn as_array<'py>(
     wanted: &dyn Fn() -> String,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
     let py = argument.py();
+    // NumPy gives what a mask hides as if it were there.
+    if argument.is_instance(MASKED.import(py, "numpy.ma", "MaskedArray")?)? {
+        let message = format!("{name}: is {}, must be {} without a mask", type_name(argument), wanted());
+        return Err(PyTypeError::new_err(message));
+    }
     let array = ASARRAY.import(py, "numpy", "asarray")?.call1((argument,)).map_err(|error| {
         // Rows of unequal length.
         if !error.is_instance_of::<PyValueError>(py) {

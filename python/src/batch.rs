@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use punctual_fmu::LoopState;
 use punctual_fmu::configuration::FilterConfiguration;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -49,10 +49,8 @@ pub(crate) struct FilterBatch {
 #[pymethods]
 impl FilterBatch {
     #[new]
-    fn new(configuration: &Bound<'_, PyAny>, n: usize) -> PyResult<Self> {
-        if n == 0 {
-            return Err(PyValueError::new_err("n: is 0, must be >= 1"));
-        }
+    fn new(configuration: &Bound<'_, PyAny>, n: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let n = arrays::count(n, "n")?;
         Self::of(self::configuration(configuration)?, n)
     }
 
@@ -127,10 +125,7 @@ impl FilterBatch {
     ) -> PyResult<Rows<'py>> {
         let n = self.memories.len();
         let Interface { states, inputs, barriers } = &self.interface;
-        match t.extract::<f64>() {
-            Ok(all) => self.t.fill(all),
-            Err(_) => arrays::numbers(t, "t", &[n], &["s".to_owned()], &mut self.t)?,
-        }
+        arrays::times(t, &mut self.t)?;
         arrays::numbers(x, "x", &[n, states.len()], &states.names, &mut self.x)?;
         match u_ref {
             Some(u_ref) => {
@@ -208,13 +203,13 @@ impl FilterBatch {
         let own = Loop::new(&configuration)?;
         let fresh = own.memory();
         Ok(Self {
-            memories: vec![fresh.clone(); n],
+            memories: filled(&fresh, [n, 1])?,
             fresh,
             loops: Mutex::new(vec![own]),
-            t: vec![0.0; n],
-            x: vec![0.0; n * interface.states.len()],
-            u_ref: vec![0.0; n * interface.inputs.len()],
-            guaranteed: vec![false; n * interface.barriers.len()],
+            t: filled(&0.0, [n, 1])?,
+            x: filled(&0.0, [n, interface.states.len()])?,
+            u_ref: filled(&0.0, [n, interface.inputs.len()])?,
+            guaranteed: filled(&false, [n, interface.barriers.len()])?,
             configuration,
             interface,
         })
@@ -237,6 +232,16 @@ impl FilterBatch {
         }
         Ok(chosen)
     }
+}
+
+/// `rows` times `each` copies of `value`.
+fn filled<T: Clone>(value: &T, [rows, each]: [usize; 2]) -> PyResult<Vec<T>> {
+    let mut all = Vec::new();
+    let count = rows.saturating_mul(each);
+    all.try_reserve_exact(count)
+        .map_err(|_| PyMemoryError::new_err(format!("n: is {rows}, more rows than there is memory for")))?;
+    all.resize(count, value.clone());
+    Ok(all)
 }
 
 /// Rows that one loop computes, one after the other.

@@ -103,10 +103,11 @@ impl Filter {
     fn step(
         &mut self,
         py: Python<'_>,
-        t: f64,
+        t: &Bound<'_, PyAny>,
         x: &Bound<'_, PyAny>,
         u_ref: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
+        let t = arrays::time(t)?;
         let Interface { states, inputs, .. } = &self.interface;
         arrays::numbers(x, "x", &[states.len()], &states.names, &mut self.x)?;
         match u_ref {

@@ -8,10 +8,10 @@
 //! The pilot's plan and each repeat are kept beside the output, in the folder `<output>.rare.parts`, until the estimate is
 //! made. So an interrupted one goes on from there, with the same numbers.
 
-use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
@@ -185,29 +185,44 @@ impl Store {
         Ok(Self { parts, file })
     }
 
+    /// What is there: a line with the fingerprint of the campaign and a checksum of the rest, then that.
     fn read(&self) -> Result<Option<Made>, Error> {
         let text = match fs::read_to_string(&self.file) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
             text => text.map_err(|e| Error::io("read", &self.file, e))?,
         };
-        let wrong = |e: serde_json::Error| {
-            Error::io("use", &self.file, std::io::Error::other(format!("{e}; remove it")))
+        let damaged = || {
+            let message = "it was changed since it was written; remove it, and the estimate begins anew";
+            Error::io("use", &self.file, io::Error::other(message))
         };
-        serde_json::from_str(&text).map(Some).map_err(wrong)
+        let (head, made) = text.split_once('\n').ok_or_else(damaged)?;
+        let (identity, checksum) = head.split_once(' ').ok_or_else(damaged)?;
+        if checksum != self::checksum(identity, made) {
+            return Err(damaged());
+        }
+        if identity != self.parts.identity() {
+            return Err(runner::other_campaign(&self.file, identity, self.parts.identity()));
+        }
+        serde_json::from_str(made).map(Some).map_err(|_| damaged())
     }
 
     /// Writes all or nothing.
     fn write(&self, made: &Made) -> Result<(), Error> {
         // Numbers alone are always written.
-        whole::write(&self.file, serde_json::to_string(made).unwrap_or_default())
+        let (identity, made) = (self.parts.identity(), serde_json::to_string(made).unwrap_or_default());
+        whole::write(&self.file, format!("{identity} {}\n{made}", checksum(identity, &made)))
     }
 
     fn remove(self) -> Result<(), Error> {
         match fs::remove_file(&self.file) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io("remove", &self.file, e)),
+            Err(e) if e.kind() != io::ErrorKind::NotFound => Err(Error::io("remove", &self.file, e)),
             _ => self.parts.remove(),
         }
     }
+}
+
+fn checksum(identity: &str, made: &str) -> String {
+    format!("{:08x}", crc32fast::hash(format!("{identity}\n{made}").as_bytes()))
 }
 
 /// Refuses what the method does not fit.

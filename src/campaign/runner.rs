@@ -186,6 +186,11 @@ impl Parts {
         Ok(parts)
     }
 
+    /// The fingerprint of the campaign, for a part with its runs.
+    pub(super) fn identity(&self) -> &str {
+        &self.identity
+    }
+
     /// Path of a file that is not complete yet.
     pub(super) fn unfinished(&self) -> PathBuf {
         self.folder.join("unfinished")
@@ -276,7 +281,7 @@ pub(super) fn parts_folder(output: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-fn other_campaign(path: &Path, found: &str, wanted: &str) -> Error {
+pub(super) fn other_campaign(path: &Path, found: &str, wanted: &str) -> Error {
     let message = format!(
         "{} is of another campaign (fingerprint {found}, must be {wanted}): its file, its components or the version \
          of this program differ. Remove it, or give another output",

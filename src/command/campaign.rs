@@ -276,10 +276,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             summary.spreads.iter().any(|spread| spread.column == column && spread.count == 0)
         };
         for barrier in measures.barriers().filter(unseen) {
-            output::note(&format!(
-                "note: {barrier}: no run has an h after its deadline; {}",
-                early(&campaign)
-            ));
+            output::note(&format!("note: {barrier}: no run has an h that counts; {}", counts(&campaign)));
         }
     }
     if arguments.json {
@@ -386,8 +383,8 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
     };
     if found.worst.least_h.is_none() {
         output::note(&format!(
-            "note: the worst run has no h after a deadline: it failed before, or {}",
-            early(campaign)
+            "note: the worst run lacks an h that counts; {}, until a call fails",
+            counts(campaign)
         ));
     }
     let report = RareReport {
@@ -403,9 +400,12 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a run without h after a deadline may be due to.
-fn early(campaign: &Campaign) -> String {
-    format!("stop_time = {} s may be too early", campaign.system().experiment().stop_time)
+/// Where h counts, for runs without one that does.
+fn counts(campaign: &Campaign) -> String {
+    format!(
+        "it does from the deadline on (stop_time = {} s), or from the start where a run begins inside",
+        campaign.system().experiment().stop_time
+    )
 }
 
 fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {

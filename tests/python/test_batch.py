@@ -67,7 +67,7 @@ def test_every_row_may_have_a_time_of_its_own():
     # One time for all, in every way that a number may be held.
     kinds = [float, int, np.float32, np.int64, np.array, lambda t: np.full(n, t), lambda t: [t] * n]
     assert len({copy.copy(batch).step(kind(9), x[0])[0].tobytes() for kind in kinds}) == 1
-    for wrong, words in [(t[:-1], r"^t: has shape \(39,\), must have \(40,\) \(s\)$"), ("now", "^t: is str of")]:
+    for wrong, words in [(t[:-1], r"^t: has shape \(39,\), must have \(40,\) \(s\)$"), ("now", "^t: is str, must be a real number")]:
         with pytest.raises((TypeError, ValueError), match=words):
             batch.step(wrong, x[0])
 
@@ -194,6 +194,7 @@ def test_a_forked_process_has_threads_of_its_own():
         (([[0.0] * 4, [0.0]],), ValueError, r"x: is list of no shape, must be real numbers .* of shape \(5, 4\)"),
         ((np.zeros((5, 4), complex),), TypeError, r"x: is ndarray of complex128, must be real numbers .* of shape \(5, 4\)"),
         ((np.zeros((5, 4), bool),), TypeError, "x: is ndarray of bool, must be real numbers"),
+        ((np.ma.zeros((5, 4)),), TypeError, r"x: is MaskedArray, must be real numbers .* \(x_p, y_p, theta, v\) without a mask"),
         ((np.zeros((5, 4)), np.full((5, 2), "a")), TypeError, "u_ref: is ndarray of <U1, must be real numbers"),
         ((np.zeros((5, 4)), np.zeros((5, 2), object)), TypeError, "u_ref: is ndarray of object, must be real numbers"),
     ],
@@ -204,8 +205,17 @@ def test_other_arrays_are_refused(arguments, error, words):
 
 
 def test_other_arguments_are_refused():
-    with pytest.raises(ValueError, match="n: is 0, must be >= 1"):
-        punctual.FilterBatch(FILTER, 0)
+    for n in [0, -1, 1 << 70]:
+        with pytest.raises(ValueError, match=f"^n: is {n}, must be >= 1, and at most "):
+            punctual.FilterBatch(FILTER, n)
+    for n in [True, 1.5, "5", None]:
+        with pytest.raises(TypeError, match=f"^n: is {n!r}, must be a whole number >= 1$"):
+            punctual.FilterBatch(FILTER, n)
+    # 500 TB, more than a process has addresses; and more bytes than there are numbers for.
+    for n in [1 << 40, 1 << 62]:
+        with pytest.raises(MemoryError, match=f"^n: is {n}, more rows than there is memory for$"):
+            punctual.FilterBatch(FILTER, n)
+    assert len(punctual.FilterBatch(FILTER, np.int64(5))) == 5
     with pytest.raises(punctual.Error, match=r"^barrier\[0\]\.deadline: "):
         punctual.FilterBatch(FILTER | {"barrier": [goal(deadline=0.0)]}, 2)
     batch = punctual.FilterBatch(FILTER, 5)
@@ -213,4 +223,9 @@ def test_other_arguments_are_refused():
         batch.rearm(np.zeros(4, bool))
     with pytest.raises(TypeError, match=r"rows: is ndarray of int64, must be bool of shape \(5,\)"):
         batch.reset(np.zeros(5, int))
+    for t, words in [(True, "t: is bool, "), ("0", "t: is str, "), (np.ma.zeros(5), "t: is MaskedArray, ")]:
+        with pytest.raises(TypeError, match=f"^{words}"):
+            batch.step(t, np.zeros((5, 4)))
+    with pytest.raises(TypeError, match=r"^rows: is MaskedArray, must be bool of shape \(5,\) without a mask$"):
+        batch.reset(np.ma.zeros(5, bool))
     batch.reset([True, False, True, False, True])

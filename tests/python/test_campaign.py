@@ -10,10 +10,11 @@ import sys
 import threading
 import time
 
+import distributed
 import punctual
 import pytest
 from conftest import ROOT
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, default_client, wait
 
 RUNS, BATCH = 40, 2
 VARY = {
@@ -128,7 +129,7 @@ def test_a_lost_scheduler_loses_nothing_that_was_done(whole, client, tmp_path):
             time.sleep(0.05)
         once(lambda: len(parts(output)) >= 4, scheduler.kill)
         at = json.loads(address.read_text())["address"]
-        with pytest.raises(punctual.Error, match=r"^client: the scheduler was lost: .* of 40 runs are kept in "):
+        with pytest.raises(punctual.Error, match=r"^client: the scheduler was lost, or the client closed: .* of 40 runs are kept in "):
             punctual.campaign(path, output, client=at, batch=BATCH)
     finally:
         worker.kill()
@@ -148,6 +149,49 @@ def test_a_lost_scheduler_loses_nothing_that_was_done(whole, client, tmp_path):
     thread.join()
     assert kept.items() <= seen.items()
     assert output.read_bytes() == expected
+
+
+def test_another_client_is_left_alone(whole, client, tmp_path, monkeypatch):
+    path, expected = whole
+    output, waiting = tmp_path / "far.parquet", []
+
+    def see(*arguments, **options):
+        waiting.append(default_client())
+        return wait(*arguments, **options)
+
+    monkeypatch.setattr(distributed, "wait", see)
+    # It is the default of the process from now on, and might be one that never got to its scheduler.
+    with Client(client.cluster) as other:
+        assert default_client() is other
+        punctual.campaign(path, output, client=client, batch=BATCH)
+        assert default_client() is other
+    assert waiting and all(waits is client for waits in waiting)
+    assert output.read_bytes() == expected
+
+
+def test_a_closed_client_loses_nothing_that_was_done(whole, tmp_path):
+    path, expected = whole
+    output = tmp_path / "far.parquet"
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        # The only one of this process.
+        client = Client(cluster)
+        thread = once(lambda: len(parts(output)) >= 4, client.close)
+        with pytest.raises(punctual.Error, match="^client: the scheduler was lost, or the client closed: .* of 40 runs are kept in "):
+            punctual.campaign(path, output, client=client, batch=BATCH)
+        thread.join()
+        assert 4 <= len(parts(output)) < RUNS // BATCH
+        with Client(cluster) as client:
+            punctual.campaign(path, output, client=client, batch=BATCH)
+    assert output.read_bytes() == expected
+
+
+def test_an_engine_that_is_ended_says_how(tmp_path, monkeypatch):
+    program = tmp_path / "punctual"
+    program.write_text("#!/bin/sh\nkill -9 $$\n")
+    program.chmod(0o700)
+    monkeypatch.setattr("punctual._command._PROGRAM", program)
+    with pytest.raises(punctual.Error, match="^the program was ended by SIGKILL$"):
+        punctual.run_cli("--version")
 
 
 def test_a_full_disk_loses_nothing_that_was_done(whole, client, tmp_path, monkeypatch):
@@ -180,12 +224,18 @@ def test_the_example_makes_it_too(whole, tmp_path):
 def test_what_cannot_be_made_is_refused(whole, client, tmp_path, monkeypatch):
     path, expected = whole
     output, folder = tmp_path / "far.parquet", tmp_path / "far.parquet.shards"
-    for batch in (0, 1 << 20, "5", 2.5):
+    for batch in (0, 1 << 20, "5", 2.5, True):
         with pytest.raises(punctual.Error, match=f"^batch: is {batch!r}, must be a whole number from 1 to 16384$"):
             punctual.campaign(path, output, client=client, batch=batch)
     with pytest.raises(punctual.Error, match="^client: no scheduler answers at head: "):
         punctual.campaign(path, output, client="head")
+    with pytest.raises(punctual.Error, match=r"^client: is 7, must be a distributed.Client, or the address of a scheduler$"):
+        punctual.campaign(path, output, client=7)
     shutil.rmtree(folder)
+    folder.write_text("")
+    with pytest.raises(punctual.Error, match="^output: cannot write the folder .*far.parquet.shards: File exists$"):
+        punctual.campaign(path, output, client=client)
+    folder.unlink()
     folder.mkdir()
     (folder / "campaign.json").write_text("another")
     with pytest.raises(punctual.Error, match="^output: .* is of another campaign; remove it, or give another output$"):

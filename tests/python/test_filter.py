@@ -137,6 +137,27 @@ def test_another_state_is_refused(x, error, words):
         punctual.Filter(FILTER).step(0.0, x)
 
 
+@pytest.mark.parametrize(
+    ("t", "error", "words"),
+    [
+        (True, TypeError, "t: is bool, must be"),
+        (np.True_, TypeError, "t: is bool_?, must be"),
+        ("0", TypeError, "t: is str, must be"),
+        (None, TypeError, "t: is NoneType, must be"),
+        (np.zeros(1), ValueError, r"t: has shape \(1,\), must be"),
+    ],
+)
+def test_another_time_is_refused(t, error, words):
+    with pytest.raises(error, match=rf"^{words} a real number \(s\)$"):
+        punctual.Filter(FILTER).step(t, [0.0] * 4)
+
+
+def test_a_time_may_have_any_type_of_real_numbers():
+    for t in [1, np.float32(1.0), np.int64(1), np.array(1.0)]:
+        a, b = (punctual.Filter(FILTER).step(at, [1.0, 2.0, 0.3, 4.0]).u for at in (t, 1.0))
+        assert a.tobytes() == b.tobytes()
+
+
 def test_another_u_ref_is_refused():
     with pytest.raises(ValueError, match=r"u_ref: has shape \(4,\), must have \(2,\) \(a, omega\)"):
         punctual.Filter(FILTER).step(0.0, np.zeros(4), np.zeros(4))

@@ -252,6 +252,13 @@ def test_what_does_not_fit_is_refused():
     envs = SyncVectorEnv([Upright, Upright])
     with pytest.raises(punctual.Error, match="^filter: has 3 rows, must have 2, one for each environment$"):
         SafetyFilterVectorEnv(envs, punctual.FilterBatch(UPRIGHT, 3))
+    with pytest.raises(punctual.Error, match="^filter: is a Filter, must be a configuration or a FilterBatch of 2 rows$"):
+        SafetyFilterVectorEnv(envs, punctual.Filter(UPRIGHT))
+    with pytest.raises(punctual.Error, match="^filter: is a FilterBatch, must be a configuration or a Filter; "):
+        SafetyFilterEnv(Upright(), punctual.FilterBatch(UPRIGHT, 1))
+    for dt in [0.0, -DT, float("nan"), "0.1"]:
+        with pytest.raises(punctual.Error, match=f"^dt: is {dt!r}, must be the time between two steps in s, > 0$"):
+            SafetyFilterEnv(Upright(), UPRIGHT, dt=dt)
     for env, action in [(SafetyFilterEnv(Upright(), UPRIGHT), [0.0]), (SafetyFilterVectorEnv(envs, UPRIGHT), [[0.0]] * 2)]:
         with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
             env.step(action)
