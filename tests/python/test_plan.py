@@ -119,3 +119,51 @@ def test_without_pandas_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="^punctual.to_pandas needs pandas: pip install pandas$"):
         punctual.to_pandas(np.zeros(1, [("time", float)]))
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        (-0.25915256597710984, 0.24078819450558372),
+        (-0.2591789673277404, 0.2429588038739456),
+        (-0.2782083180334569, 0.305118204352295),
+        (-0.26466260113139867, 0.2762690747095979),
+        (-0.2663886423302895, 0.2813489658296773),
+        (-0.4977544298643182, 0.24524688046026677),
+    ],
+)
+def test_a_plan_from_rest_at_the_edge_of_a_set_stands_at_the_next_sample(start):
+    centres = [
+        (0.337388, 0.655443),
+        (0.158416, 0.551688),
+        (-0.0205568, 0.447933),
+        (-0.199529, 0.344178),
+        (-0.378502, 0.240422),
+        (-0.557474, 0.136667),
+        (-0.736446, 0.0329121),
+    ]
+    most, period = 0.685834419945005, 0.005
+    wall = [
+        {"name": f"disc_{i}", "expression": f"sqrt((x - {x!r})^2 + (y - {y!r})^2 + 1e-9) - 0.11935"}
+        for i, (x, y) in enumerate(centres)
+    ]
+    goal = {"name": "goal", "expression": "0.192828 - sqrt((x + 0.399058)^2 + (y - 0.688355)^2 + 1e-9)", "deadline": 2.5}
+    configuration = {
+        "kind": "filter",
+        "plan_horizon": 3.32,
+        "plant": {
+            "states": [{"name": name} for name in ("x", "y", "vx", "vy")],
+            "inputs": [{"name": name, "min": -most, "max": most} for name in ("ax", "ay")],
+            "derivatives": {"x": "vx", "y": "vy", "vx": "ax", "vy": "ay"},
+        },
+        "barrier": [goal | {"margin": 0.004}, *wall],
+        "experiment": {"step_size": period},
+    }
+    filter = punctual.Filter(configuration)
+    x = [*start, 0.0, 0.0]
+    for k in range(8):
+        step = filter.step(k * period, x, [-most, 3.0 * most])
+        assert step.assurance is punctual.Assurance.ASSURED, (k, filter.refusal)
+        # A double integrator under a held input, exactly.
+        p, v, a = np.array(x[:2]), np.array(x[2:]), step.u
+        x = [*(p + period * v + 0.5 * period**2 * a), *(v + period * a)]

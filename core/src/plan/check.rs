@@ -411,11 +411,12 @@ impl<'a> Walk<'a> {
 
     /// Moves on to `end` under `u`.
     fn move_to(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
-        // Requirements begin and end at nodes.
+        // Requirements begin, become firm and end at nodes.
         while self.t < end {
             let now = self.t;
             let event = |node: f64, time: f64| if now < time && time < node { time } else { node };
-            let node = self.requirements.iter().fold(end, |node, r| event(event(node, r.from), r.until));
+            let events = self.requirements.iter().flat_map(|r| [r.from, r.firm, r.until]);
+            let node = events.fold(end, event);
             while self.t < node {
                 self.advance(u, node)?;
             }
