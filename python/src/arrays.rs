@@ -56,39 +56,37 @@ fn is_real(array: &Bound<'_, PyUntypedArray>) -> bool {
 
 /// Copies the times `argument`, called t, to `into`: one for all, or one for each.
 pub(crate) fn times(argument: &Bound<'_, PyAny>, into: &mut [f64]) -> PyResult<()> {
-    let is_one =
-        plain(argument).is_some() || as_array(argument, "t", &|| TIME.to_owned())?.shape().is_empty();
-    if is_one {
-        into.fill(time(argument)?);
-        return Ok(());
+    match one_time(argument)? {
+        Ok(t) => into.fill(t),
+        Err(_) => numbers(argument, "t", &[into.len()], &["s".to_owned()], into)?,
     }
-    numbers(argument, "t", &[into.len()], &["s".to_owned()], into)
+    Ok(())
 }
 
 /// The time `argument`, called t.
 pub(crate) fn time(argument: &Bound<'_, PyAny>) -> PyResult<f64> {
-    if let Some(t) = plain(argument) {
-        return Ok(t);
-    }
-    let array = as_array(argument, "t", &|| TIME.to_owned())?;
-    if !array.shape().is_empty() {
-        let message = format!("t: has shape {}, must be {TIME}", shape_text(array.shape()));
-        return Err(PyValueError::new_err(message));
-    }
-    if !is_real(&array) {
-        return Err(PyTypeError::new_err(format!("t: is {}, must be {TIME}", type_name(argument))));
-    }
-    let mut t = [0.0];
-    numbers(&array, "t", &[], &["s".to_owned()], &mut t).map(|()| t[0])
+    one_time(argument)?.map_err(|array| {
+        PyValueError::new_err(format!("t: has shape {}, must be {TIME}", shape_text(array.shape())))
+    })
 }
 
 /// What a time is.
 const TIME: &str = "a real number (s)";
 
-/// A number of Python's own, which is no truth value.
-fn plain(argument: &Bound<'_, PyAny>) -> Option<f64> {
-    let is_number = argument.is_instance_of::<PyFloat>() || argument.is_exact_instance_of::<PyInt>();
-    is_number.then(|| argument.extract().ok()).flatten()
+/// The time `argument`, called t; as an array where it is many.
+fn one_time<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Result<f64, Bound<'py, PyUntypedArray>>> {
+    // A truth value is no int but by descent.
+    if argument.is_instance_of::<PyFloat>() || argument.is_exact_instance_of::<PyInt>() {
+        return argument.extract().map(Ok);
+    }
+    let array = as_array(argument, "t", &|| TIME.to_owned())?;
+    if !array.shape().is_empty() {
+        return Ok(Err(array));
+    }
+    if !is_real(&array) {
+        return Err(PyTypeError::new_err(format!("t: is {}, must be {TIME}", type_name(argument))));
+    }
+    array.call_method0("item")?.extract().map(Ok)
 }
 
 /// The number `argument`, called `name`: a whole one from 1 on.

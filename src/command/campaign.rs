@@ -268,9 +268,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             progress.again
         ));
     }
-    if let Some(summary) = &report.summary
-        && summary.worst.iter().any(|case| case.failure.is_none())
-    {
+    if let Some(summary) = &report.summary {
         let unseen = |name: &&str| {
             let column = format!("{name}.least_h");
             summary.spreads.iter().any(|spread| spread.column == column && spread.count == 0)
@@ -382,10 +380,7 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
         }
     };
     if found.worst.least_h.is_none() {
-        output::note(&format!(
-            "note: the worst run lacks an h that counts; {}, until a call fails",
-            counts(campaign)
-        ));
+        output::note(&format!("note: the worst run lacks an h that counts; {}", counts(campaign)));
     }
     let report = RareReport {
         campaign: arguments.campaign.display().to_string(),
@@ -403,7 +398,7 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
 /// Where h counts, for runs without one that does.
 fn counts(campaign: &Campaign) -> String {
     format!(
-        "it does from the deadline on (stop_time = {} s), or from the start where a run begins inside",
+        "it does from the deadline on (stop_time = {} s), or from the start where a run begins inside, until a call fails",
         campaign.system().experiment().stop_time
     )
 }

@@ -961,11 +961,10 @@ fn runs_that_end_before_a_deadline_say_so() {
     };
     deadline(3.0);
     let noted = |arguments: &[&str]| workshop.punctual(arguments.iter().copied()).stderr;
-    let counts =
-        "it does from the deadline on (stop_time = 2 s), or from the start where a run begins inside";
+    let counts = "it does from the deadline on (stop_time = 2 s), or from the start where a run begins inside, until a call fails";
     let note = format!("note: filter.wall: no run has an h that counts; {counts}\n");
     assert_eq!(noted(&["campaign", "c.toml"]), note);
-    let note = format!("note: the worst run lacks an h that counts; {counts}, until a call fails\n");
+    let note = format!("note: the worst run lacks an h that counts; {counts}\n");
     assert_eq!(noted(&["campaign", "c.toml", "--rare=5"]), note);
     // With a deadline in time there is nothing to say.
     deadline(1.5);
