@@ -5,7 +5,7 @@
 mod scenario;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use nalgebra::{SMatrix, SVector};
 use punctual_core::barrier::Barrier;
@@ -404,6 +404,187 @@ fn tiny_and_huge_steps_are_answered() {
             assert!(first != 0.02 || t > 0.02 || assurance.is_assured(), "{assurance:?}");
             x = vehicle.move_by(x, u, hold.min(0.02));
             t += hold;
+        }
+    }
+}
+
+/// What a run is judged by: the length of each step in s, that the filter is told, and what the plant does beside the model.
+struct Course<'a> {
+    step: &'a mut dyn FnMut(&mut Random) -> f64,
+    /// Whether the filter is told that length; else it takes the usual one.
+    is_told: bool,
+    wind: [f64; 2],
+}
+
+/// What became of a run: the samples with and without the promise, and what it was withdrawn for first.
+#[derive(Debug, Default)]
+struct Outcome {
+    assured: usize,
+    lost: Vec<(f64, Standing, Option<Failure>)>,
+}
+
+/// Runs to 10 s, or 2000 steps. At no instant is a set left that the sample before said was kept until the next.
+fn judged(seed: u64, random: &mut Random, course: &mut Course<'_>) -> Outcome {
+    let vehicle = if seed.is_multiple_of(2) { Vehicle::PointMass } else { Vehicle::Unicycle };
+    let (deadline, bounds) = (7.0, [6.0, 2.5]);
+    let mut filter = vehicle.assured(deadline, bounds);
+    let (mut t, mut outcome) = (0.0, Outcome::default());
+    let mut x = [random.between(-3.0, 3.0), random.between(-3.0, 3.0), 0.5, random.between(0.0, 2.0)];
+    for _ in 0..2000 {
+        if t > deadline + 3.0 {
+            break;
+        }
+        let step = (course.step)(random);
+        let told = if course.is_told { step } else { filter.usual_hold(t) };
+        filter.expect_hold(Some(told)).expect("a time");
+        let (u_ref, mut u) = (wanted(vehicle, seed % 5, x, bounds, random), [0.0; 2]);
+        let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+        match assurance.is_assured() {
+            true => outcome.assured += 1,
+            false => outcome.lost.push((t, assurance.standing, assurance.failure)),
+        }
+        let flags: Vec<bool> = filter.report().barriers.iter().map(|b| b.guaranteed).collect();
+        let parts = ((step / PERIOD * 20.0) as u32).max(1);
+        let begin = t;
+        for part in 1..=parts {
+            let dt = step / f64::from(parts);
+            x = vehicle.move_by(x, u, dt);
+            x[0] += course.wind[0] * dt;
+            x[1] += course.wind[1] * dt;
+            let t = begin + dt * f64::from(part);
+            let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+            assert!(!flags[1] || distance(OBSTACLE.0) >= OBSTACLE.1, "{seed} at {t}: collision");
+            assert!(!flags[0] || t < deadline || distance(GOAL.0) <= GOAL.1, "{seed} at {t}: not inside");
+        }
+        t = begin + step;
+    }
+    outcome
+}
+
+fn seeded(seed: u64) -> Random {
+    Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed))
+}
+
+/// Steps of 1e-17 s to three periods, of all lengths or between regular ones, keep the promise while a plan is found, and the flag
+/// tells the truth at all instants. A step that is far below the period never ends it.
+#[test]
+fn steps_of_any_length_go_on_with_the_plan() {
+    let (mut assured, mut lost) = (0, 0);
+    for seed in 1..=16_u64 {
+        let random = &mut seeded(seed);
+        let tiny = |random: &mut Random| 10.0_f64.powf(random.between(-17.0, -2.0));
+        let step = &mut |random: &mut Random| match seed % 4 {
+            0 => 10.0_f64.powf(random.between(-17.0, (3.0 * PERIOD).log10())),
+            1 if random.between(0.0, 1.0) < 0.2 => tiny(random),
+            1 => PERIOD,
+            2 => random.between(0.01, 1.0) * PERIOD,
+            _ if random.between(0.0, 1.0) < 0.5 => tiny(random),
+            _ => random.between(0.0, 3.0) * PERIOD,
+        };
+        let outcome = judged(seed, random, &mut Course { step, is_told: true, wind: [0.0; 2] });
+        assert!(seed % 4 > 1 || outcome.lost.is_empty(), "{seed}: {:?}", outcome.lost);
+        (assured, lost) = (assured + outcome.assured, lost + outcome.lost.len());
+    }
+    println!("steps of any length: {assured} samples assured, {lost} not");
+    assert!(100 * lost <= assured, "{lost} of {assured} samples without the promise");
+}
+
+/// A clock that is measured is no fault: jitter of up to four percent, and periods that are cut in half.
+#[test]
+fn a_measured_clock_keeps_the_promise() {
+    for seed in 1..=12_u64 {
+        let random = &mut seeded(seed);
+        let jitter = [0.0, 1e-4, 1e-2, 4e-2][(seed % 4) as usize];
+        let step = &mut |random: &mut Random| match random.between(0.0, 1.0) < 0.2 {
+            true if seed % 3 == 0 => 0.5 * PERIOD,
+            _ => PERIOD * (1.0 + random.between(-jitter, jitter)),
+        };
+        let outcome = judged(seed, random, &mut Course { step, is_told: false, wind: [0.0; 2] });
+        assert!(outcome.lost.is_empty() && outcome.assured > 400, "{seed}, {jitter}: {outcome:?}");
+    }
+}
+
+/// A clock that ticks more often than was said is taken as it is, once it has for a while.
+#[test]
+fn a_faster_clock_becomes_the_usual_one() {
+    let (mut filter, mut x, mut u) = (Vehicle::PointMass.assured(8.0, [8.0; 2]), [0.0; 4], [0.0; 2]);
+    for k in 0..40_u32 {
+        let t = f64::from(k) * 0.5 * PERIOD;
+        let hold = filter.usual_hold(t);
+        assert!(k > 7 || hold == PERIOD, "{k}: {hold}");
+        assert!(k < 10 || (hold - 0.5 * PERIOD).abs() < 1e-9, "{k}: {hold}");
+        filter.expect_hold(Some(hold)).expect("a time");
+        assert!(filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions").is_assured(), "{k}");
+        x = Vehicle::PointMass.move_by(x, u, 0.5 * PERIOD);
+    }
+}
+
+/// A plant that drifts beside the model: what was seen of it bounds what the next hold can bring, so the flag falls before a set
+/// is left and not after. Without wind it never falls for that.
+#[test]
+fn the_flag_falls_before_a_drift_leaves_a_set() {
+    let mut fallen = 0;
+    for seed in 1..=24_u64 {
+        let random = &mut seeded(seed);
+        let (speed, angle) = (random.between(0.2, 0.6), random.between(0.0, 6.28));
+        for wind in [[0.0; 2], [speed * angle.cos(), speed * angle.sin()]] {
+            let step = &mut |_: &mut Random| PERIOD;
+            let outcome = judged(seed, &mut seeded(seed + 77), &mut Course { step, is_told: true, wind });
+            let drifts = outcome.lost.iter().filter(|lost| matches!(lost.2, Some(Failure::Drift { .. })));
+            let drifts = drifts.count();
+            assert!(wind != [0.0; 2] || outcome.lost.is_empty(), "{seed}: {:?}", outcome.lost);
+            fallen += drifts;
+        }
+    }
+    println!("the flag fell for a drift at {fallen} samples");
+    assert!(fallen > 0, "no wind ever led to the edge of a set");
+}
+
+/// What a step costs does not grow as it gets shorter: the model is asked no more often.
+#[test]
+fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
+    static ASKED: AtomicU64 = AtomicU64::new(0);
+    #[derive(Clone, Copy, Debug)]
+    struct Counted;
+    impl ControlAffine<4, 2> for Counted {
+        fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+            ASKED.fetch_add(1, Ordering::Relaxed);
+            Unicycle.drift(x)
+        }
+
+        fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+            Unicycle.input_map(x)
+        }
+    }
+    let asked = |hold: f64, first: bool| {
+        let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", Counted, goal, BarrierSettings::within(8.0))
+            .and_then(|b| b.bounds(&[-6.0, -2.5], &[6.0, 2.5]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let (mut x, mut u, mut t, mut most) = ([0.0, 0.0, -0.4, 1.0], [0.0; 2], 0.0, 0);
+        for k in 0..30 {
+            let hold = if k < 10 && !first { PERIOD } else { hold };
+            filter.expect_hold(Some(hold)).expect("a time");
+            ASKED.store(0, Ordering::Relaxed);
+            let assurance = *filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions");
+            assert!(assurance.is_assured(), "{hold} s at {t}: {assurance:?}");
+            if k > 10 || first && k == 0 {
+                most = most.max(ASKED.load(Ordering::Relaxed));
+            }
+            x = Vehicle::Unicycle.move_by(x, u, hold);
+            t += hold;
+        }
+        most
+    };
+    for first in [false, true] {
+        let usual = asked(PERIOD, first);
+        for exponent in [3, 5, 7, 9, 12, 17] {
+            let short = asked(10.0_f64.powi(-exponent), first);
+            assert!(short <= 10 * usual, "1e-{exponent} s: {short} for {usual}, first {first}");
         }
     }
 }

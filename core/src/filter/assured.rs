@@ -5,6 +5,7 @@ use alloc::boxed::Box;
 use alloc::format;
 use alloc::vec::Vec;
 
+use super::deviation::Deviation;
 use super::integrator::insert;
 use super::slot::BarrierSlot;
 use super::{
@@ -42,6 +43,18 @@ const GIVEN_BACK: f64 = 1.0 / 32.0;
 const SOONER: f64 = 0.25;
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
+/// By how much a clock that is measured may be late, as a part of a hold; what is kept in hand for the next time where it was not
+/// exact; and how many intervals in a row that are so much shorter, alike to that part, are the new usual ones.
+const JITTER: f64 = 0.05;
+const HEADROOM: f64 = 0.02;
+const SHORTER: f64 = 0.9;
+const ALIKE: u32 = 8;
+/// What a plant may do beside the model in the next hold, in units of what it was seen to do in those before.
+const GUSTS: f64 = 1.5;
+/// The shortest hold that plans tell from none, as a part of the period: one that is shorter is planned as that, since a plan may
+/// go on where a sample comes sooner. Of an integral plans count every hold.
+const SHORTEST: f64 = 1e-3;
+const SHORTEST_INTEGRATED: f64 = 0.125;
 
 /// Who chose the input of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -161,6 +174,12 @@ pub struct Commitment {
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     sample: Option<[f64; 2]>,
+    /// The time in s between the last two samples, and how many intervals in a row have been like it; 0 before there is one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    interval: f64,
+    alike: u32,
+    /// What the plant was seen to do beside the model since the promise was given.
+    deviation: Deviation,
 }
 
 impl Commitment {
@@ -175,9 +194,21 @@ impl Commitment {
         }
     }
 
+    /// Notes a sample at `t`, whose input is to be held for `hold` s.
+    fn note(&mut self, t: f64, hold: f64) {
+        if let Some([last, _]) = self.sample
+            && t > last
+        {
+            let interval = t - last;
+            self.alike = if is_like(interval, self.interval) { self.alike.saturating_add(1) } else { 1 };
+            self.interval = interval;
+        }
+        self.sample = Some([t, hold]);
+    }
+
     /// Forgets what was promised. A plan that was followed for it is kept to go on with, and when the last sample was.
     fn rearm(&mut self) {
-        let Self { standing, promises, plan, sample, .. } = core::mem::take(self);
+        let Self { standing, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
         let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
         let is_followed = match standing {
             Standing::Assured => !sample.is_none_or(is_over),
@@ -185,6 +216,7 @@ impl Commitment {
         };
         if is_followed {
             (self.plan, self.sample) = (plan, sample);
+            (self.interval, self.alike) = (interval, alike);
         }
     }
 }
@@ -241,9 +273,10 @@ impl From<f64> for Pace {
 /// by its rows. Once promised, every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a
 /// compromise, or where nothing else keeps the promise the next input of the plan itself.
 ///
-/// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. A sample may be taken
-/// again at the same time. Where the time to the next sample changes and is [told](Self::expect_hold), a plan is sought for
-/// the new one; none found ends the promise. A sample that comes late ends it until the next one. Where x is not finite, the
+/// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
+/// differ, and by half as much again a set might be left before the next sample, the promise is withdrawn for that sample. A sample
+/// may be taken again at the same time, come sooner, or come late by a twentieth of a hold. Where the time to the next sample changes and is [told](Self::expect_hold), a plan is sought for
+/// the new one; none found ends the promise. A sample that comes later ends it until the next one. Where x is not finite, the
 /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
 /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
 /// is refused by [`Self::new`]. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
@@ -386,6 +419,14 @@ impl Rows {
             moves[own.of.input] *= own.moves(hold, u_ref[own.of.input]);
         }
         moves
+    }
+
+    /// What the plant is given the mean of, if it is.
+    fn integral(&self) -> Option<Integral> {
+        match self {
+            Self::Plain(_) => None,
+            Self::Integrated(own) => Some(Integral { state: own.of.state, input: own.of.input }),
+        }
     }
 
     /// Makes `u` of the filter inside one of the plant, for `hold` s; returns the integral after it.
@@ -573,17 +614,20 @@ impl AssuredFilter {
         &self.commitment
     }
 
-    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before; at first, and
-    /// after [`Self::rearm`] at another time than was said, for the period.
+    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before, and where the
+    /// clock is not exact for a little longer than ever. A sample in between changes nothing, until eight in a row came as soon.
+    /// At first, and after [`Self::rearm`] at another time than was said, for the period.
     pub fn usual_hold(&self, t: f64) -> f64 {
-        let Commitment { standing, sample, .. } = self.commitment;
+        let Commitment { standing, sample, alike, interval, .. } = self.commitment;
         let Some([last, held]) = sample else { return self.period };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+        let is_usual = passed < SHORTER * held && alike + 1 >= ALIKE && is_like(passed, interval);
         match standing {
             _ if is_same => held,
             Standing::Undecided => self.period,
-            _ if passed > 0.0 && passed.is_finite() => passed,
+            _ if is_like(passed, held) => held.max((1.0 + HEADROOM) * passed),
+            _ if passed > held && passed.is_finite() || passed > 0.0 && is_usual => passed,
             _ => held,
         }
     }
@@ -600,7 +644,8 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, lost, share, prolong_at, sample, .. } = commitment;
+        let Commitment { standing, promises, plan, lost, share, prolong_at, sample, interval, .. } =
+            commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -627,6 +672,12 @@ impl AssuredFilter {
             }
             if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
                 return refuse("sample", "has no time, must have one beside a plan");
+            }
+            if commitment.is_followed() && !commitment.deviation.fits(self.filter().state_dim) {
+                return refuse("deviation", "is none of a plant with as many states");
+            }
+            if !interval.is_finite() {
+                return refuse("interval", "is not finite");
             }
             if lost.iter().flatten().any(|t| !t.is_finite()) {
                 return refuse("lost", "is at a time that is not finite");
@@ -697,10 +748,11 @@ impl AssuredFilter {
             return Ok(&self.assurance);
         }
         self.looked = None;
+        let planned = self.planned_hold(hold);
         self.rows.filter_mut().is_backed =
-            self.commitment.is_followed() && self.commitment.lost.is_none() && self.in_time(t, hold);
+            self.commitment.is_followed() && self.commitment.lost.is_none() && self.in_time(t, planned);
         self.rows.peek(t, hold, x, u_ref, u)?;
-        self.sample(t, hold, x, u_ref, u);
+        self.sample(t, planned, x, u_ref, u);
         let mut inside = [0.0; MAX_INPUTS];
         inside[..inputs].copy_from_slice(u);
         self.next_value = self.rows.finish(hold, u);
@@ -708,6 +760,12 @@ impl AssuredFilter {
         looked.u[..inputs].copy_from_slice(u);
         self.looked = Some(looked);
         Ok(&self.assurance)
+    }
+
+    /// The hold that plans count with where an input is held for `hold` s.
+    fn planned_hold(&self, hold: f64) -> f64 {
+        let shortest = if self.integrated_input().is_some() { SHORTEST_INTEGRATED } else { SHORTEST };
+        hold.max(shortest * self.period)
     }
 
     /// As [`SafetyFilter::differentiate`], for the piece in force: u_ref, the rows' answer, a plan's own input or a
@@ -769,7 +827,8 @@ impl AssuredFilter {
         let x = &self.rows.state(x)[..];
         let is_valid = t.is_finite() && all_finite(x);
         if t.is_finite() && (is_valid || self.next.sample.is_some()) {
-            self.next.sample = Some([t, hold]);
+            self.see(t, is_valid.then_some(x));
+            self.next.note(t, hold);
         }
         let mut is_regular = self.is_regular(t, hold);
         if self.next.standing == Standing::Undecided && is_valid {
@@ -812,6 +871,12 @@ impl AssuredFilter {
                 self.next.plan = Plan::default();
             }
         }
+        if self.next.standing == Standing::Assured
+            && is_valid
+            && let Some(failure) = self.exposed(t, hold, x, u)
+        {
+            self.end(Standing::Withdrawn, Some(failure));
+        }
         let Commitment { standing, failure, plan, .. } = &self.next;
         let is_assured = *standing == Standing::Assured;
         (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
@@ -821,12 +886,55 @@ impl AssuredFilter {
         }
     }
 
+    /// Sees at `t` how far the plant is from where the model has led since the last sample; `x` where it is measured.
+    fn see(&mut self, t: f64, x: Option<&[f64]>) {
+        let Some([last, _]) =
+            self.commitment.sample.filter(|[last, _]| t > *last && self.commitment.is_followed())
+        else {
+            return;
+        };
+        let filter = self.rows.filter();
+        let (u, mut led) = (&filter.state.input[..filter.input_dim], self.next.deviation.state.clone());
+        let is_led = self.planned(&self.next.promises, (last, t - last), u, |planner| {
+            planner.run(&mut led, u);
+            Ok(())
+        });
+        // Of nothing that is promised nothing may be missed.
+        if is_led.is_ok() {
+            self.next.deviation.see(t, x, led, self.period);
+        }
+    }
+
+    /// What may be missed in the `hold` s from `t` and `x` on, under `u`, where the plant goes on to differ from the model as it was
+    /// seen to.
+    fn exposed(&self, t: f64, hold: f64, x: &[f64], u: &[f64]) -> Option<Failure> {
+        let mut promises = self.next.promises.clone();
+        let differs = self.next.deviation.after(hold, x)?;
+        let mut slope = x.to_vec();
+        for (promise, model) in promises.iter_mut().zip(self.models()) {
+            let Some(kept) = promise.as_mut().filter(|promise| promise.from < t + hold) else {
+                *promise = None;
+                continue;
+            };
+            slopes(model, t, x, &mut slope);
+            let falls: f64 = slope.iter().zip(&differs).map(|(slope, differs)| slope.abs() * differs).sum();
+            (kept.margin, kept.reserve, kept.firm) = (GUSTS * falls, 0.0, t);
+        }
+        match self.planned(&promises, (t, hold), u, |planner| planner.holds(t, x, u)) {
+            Err(Failure::Broken { barrier, time, slack }) => Some(Failure::Drift { barrier, time, slack }),
+            _ => None,
+        }
+    }
+
     /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
     /// left, or a promise that began meanwhile.
     fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
-        let Commitment { standing, sample, .. } = &self.commitment;
+        let commitment = &self.commitment;
+        let Commitment { standing, sample, .. } = commitment;
         let seen = sample.map_or(t, |[last, held]| match standing {
-            Standing::Assured => last + held * (1.0 + ON_TIME),
+            Standing::Assured => last + held * (1.0 + JITTER),
+            // There was a plan, but for a plant that differs.
+            Standing::Withdrawn if commitment.lost.is_none() => last + held * (1.0 + JITTER),
             _ => last,
         });
         // A promise is about all times: what is measured again is not what was promised.
@@ -851,11 +959,12 @@ impl AssuredFilter {
         (self.next.standing, self.next.failure) = (standing, failure);
     }
 
-    /// Whether a sample at `t` comes no later than the one before said, and times tell samples apart.
+    /// Whether a sample at `t` comes no later than the one before said, but for a clock that is measured, and times tell samples
+    /// apart.
     fn in_time(&self, t: f64, hold: f64) -> bool {
         let Some([last, held]) = self.commitment.sample else { return false };
         let round_off = 2.0 * f64::EPSILON * t.abs();
-        let late = ON_TIME * held + round_off;
+        let late = JITTER * held + round_off;
         // Not-a-number is out of time.
         last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
     }
@@ -1005,6 +1114,7 @@ impl AssuredFilter {
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
                 (self.next.promises, self.next.plan) = (promises, plan);
+                self.next.deviation = Deviation::from(t, x);
                 self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
                 self.end(Standing::Assured, None);
                 self.postpone(t, hold, factor);
@@ -1116,9 +1226,10 @@ impl AssuredFilter {
                 reserve: 0.0,
             }
         }));
-        let mut planner = Planner::new(plant, dims, &self.bounds, &requirements, period, size);
-        if let Rows::Integrated(own) = &self.rows {
-            planner = planner.integrated(Integral { state: own.of.state, input: own.of.input });
+        let mut planner =
+            Planner::new(plant, dims, &self.bounds, &requirements, period, size).usually(self.period);
+        if let Some(integral) = self.rows.integral() {
+            planner = planner.integrated(integral);
         }
         f(&planner.led(&self.policies).until(self.horizon))
     }
@@ -1293,7 +1404,7 @@ impl AssuredFilter {
                 // Ever more seldom, since a search is long.
                 if lost.is_none_or(|[_, next]| t >= next) {
                     let since = lost.map_or(t, |[since, _]| since);
-                    self.next.lost = Some([since, t + (t - since).max(hold)]);
+                    self.next.lost = Some([since, t + (t - since).max(hold).max(self.period)]);
                 }
                 self.come_near(t, hold, x, u)
             }
@@ -1413,6 +1524,11 @@ fn least_factor<T>(longest: f64, mut found: Option<T>, find: impl Fn(f64) -> Opt
         }
     }
     Some((high, found))
+}
+
+/// Whether two intervals of a clock that is measured are meant to be the same.
+fn is_like(interval: f64, other: f64) -> bool {
+    (interval - other).abs() <= JITTER * other
 }
 
 /// A number that no model treats apart, for state `i` of a trial.

@@ -7,6 +7,8 @@
 #[cfg(feature = "plan")]
 mod assured;
 mod builder;
+#[cfg(feature = "plan")]
+mod deviation;
 mod errors;
 mod hold;
 mod integrator;

@@ -165,6 +165,17 @@ pub enum Failure {
     Singular,
     /// There are too many samples, or steps of the model, to look at.
     TooLong,
+    /// The plant was seen to differ from the model, and by as much again a requirement may not be met before the next sample.
+    Drift {
+        /// The number of its barrier.
+        barrier: usize,
+        /// Time in s.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+        time: f64,
+        /// h there in the model, less what it may fall by beside it, < 0.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+        slack: f64,
+    },
     /// A requirement began while no plan was followed, so nobody saw whether it was met.
     Missed {
         /// The number of its barrier.
@@ -810,6 +821,17 @@ impl<'a> Walk<'a> {
             self.creep(x, &u, hold);
         });
         largest_eigenvalue(&moved)
+    }
+
+    /// Moves `x` on by `duration` s under `u`, of which an integral counts with its mean.
+    pub(super) fn run(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
+        let Some(Integral { state, input }) = self.model.integral else { return self.creep(x, u, duration) };
+        let mut held = u.to_vec();
+        let change = core::mem::take(&mut held[input]) * duration;
+        let end = x[state] + change;
+        x[state] += 0.5 * change;
+        self.creep(x, &held, duration);
+        x[state] = end;
     }
 
     /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states, past a kink that breaks them in a step of

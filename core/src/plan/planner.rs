@@ -45,6 +45,8 @@ const RESOLVED: [f64; 2] = [1e-5, 1e-8];
 /// The longest step of the model, in sampling periods; or as a part of a hold, where periods are shorter.
 const COARSE: f64 = 4.0;
 const FINE: f64 = 32.0;
+/// The number of samples in a usual period above which a plan has longer holds.
+const FREQUENT: f64 = 4.0;
 /// The most samples until a deadline.
 const MOST_SAMPLES: usize = 100_000_000;
 /// Growth of a deviation over a hold of the search, and how much finer its grid is made for that.
@@ -117,8 +119,9 @@ pub struct Planner<'a> {
     dims: [usize; 2],
     bounds: &'a Bounds,
     requirements: &'a [Requirement<'a>],
-    /// The sampling period in s.
+    /// The time in s until the next sample, and the usual one between samples.
     period: f64,
+    usual: f64,
     /// The size of an input that has no bounds.
     size: f64,
     /// Whether samples come as those before did.
@@ -147,6 +150,7 @@ impl<'a> Planner<'a> {
             bounds,
             requirements,
             period,
+            usual: period,
             size,
             regular: true,
             integral: None,
@@ -160,6 +164,13 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn irregular(self, irregular: bool) -> Self {
         Self { regular: !irregular, ..self }
+    }
+
+    /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of
+    /// about that, so that its cost does not grow with their number.
+    #[must_use]
+    pub fn usually(self, usual: f64) -> Self {
+        Self { usual, ..self }
     }
 
     /// The same planner for a plant that is given the mean of an integral over each period.
@@ -187,6 +198,16 @@ impl<'a> Planner<'a> {
         Self { before: Some(before), ..self }
     }
 
+    /// The time in s between the samples at which the inputs of a new plan change: a multiple of the period.
+    fn pace(&self) -> f64 {
+        let samples = self.usual / self.period;
+        // The mean of an integral is one over each period.
+        if self.integral.is_some() || samples <= FREQUENT {
+            return self.period;
+        }
+        (samples + 0.5) as u64 as f64 * self.period
+    }
+
     fn model(&self, step: f64) -> Model<'a> {
         let Self { plant, dims, bounds, integral, .. } = *self;
         Model { plant, dims, bounds, integral, step }
@@ -198,7 +219,8 @@ impl<'a> Planner<'a> {
     ///
     /// What the nearest trial fails at.
     pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
-        let to = |horizon| self.search_to(horizon, t, x);
+        let paced = Self { period: self.pace(), ..*self };
+        let to = |horizon| paced.search_to(horizon, t, x);
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
             (None, _) | (_, Some(false)) => to(None),
             (Some(_), None) => to(None).or_else(|_| to(self.horizon)),
@@ -477,7 +499,7 @@ impl<'a> Planner<'a> {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
             let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
-                self.model(self.period).clamp(&mut u[..nu]);
+                self.model(self.pace()).clamp(&mut u[..nu]);
                 walk.hold_until(&u[..nu], end)
             };
             if !grid.even {
@@ -514,6 +536,25 @@ impl<'a> Planner<'a> {
         })
     }
 
+    /// Whether every requirement is met from `x` at `t` until the next sample, under `u`.
+    ///
+    /// # Errors
+    ///
+    /// What it fails at.
+    pub fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
+        let grid = Grid { period: self.period, even: true };
+        let mut walk = Walk::new(self.model(self.pace()), self.requirements, 1.0, grid, (t, x))?;
+        walk.hold_until(u, t + self.period)
+    }
+
+    /// Runs the plant on from `x` until the next sample, under `u`, to round-off.
+    pub fn run(&self, x: &mut [f64], u: &[f64]) {
+        let grid = Grid { period: self.period, even: true };
+        if let Ok(mut walk) = Walk::new(self.model(self.pace()), &[], 0.0, grid, (0.0, x)) {
+            walk.run(x, u, self.period);
+        }
+    }
+
     /// The input of the law of `plan` at `t` and `x`, if from there it nearly keeps every requirement.
     ///
     /// # Errors
@@ -544,7 +585,7 @@ impl<'a> Planner<'a> {
         grid: Grid,
         start: (f64, &[f64]),
     ) -> Result<Walk<'a>, Failure> {
-        let walk = Walk::new(self.model(self.period), self.requirements, strictness, grid, start)?;
+        let walk = Walk::new(self.model(self.pace()), self.requirements, strictness, grid, start)?;
         Ok(walk.after(&plan.witness))
     }
 

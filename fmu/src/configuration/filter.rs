@@ -656,6 +656,16 @@ impl FilterConfiguration {
                 };
                 format!("{name} is not met at {time:.6} s, by {:.6} {unit}", -slack)
             }
+            Failure::Drift { barrier, time, slack } => {
+                let section = self.barrier.get(barrier);
+                let name = section.map_or("a barrier", |section| &section.name);
+                let unit = section.map(|section| section.unit(&self.plant)).unwrap_or_default();
+                format!(
+                    "the plant is not where the model led; as far off again, {name} would not be met at {time:.6} s, by {:.6} \
+                     {unit}",
+                    -slack
+                )
+            }
             Failure::Missed { barrier } => {
                 let name = self.barrier.get(barrier).map_or("a barrier", |section| &section.name);
                 format!("{name} came due while no plan was followed")
