@@ -5,7 +5,7 @@ mod support;
 use punctual_core::Error;
 use punctual_core::barriers::StateBound;
 use punctual_core::filter::{
-    BarrierSettings, FilterBuilder, Method, NoDerivative, SafetyFilter, SampleDerivative, Sampling,
+    BarrierSettings, FilterBuilder, Method, SafetyFilter, SampleDerivative, Sampling,
 };
 use punctual_core::lie;
 use punctual_reference::plants::{PointMass, Unicycle};
@@ -80,14 +80,54 @@ fn errors_of_zero_are_none() {
     }
 }
 
+/// The derivative with errors, at an anchor and later, against the differences of a step ten times as long.
 #[test]
-fn there_is_no_derivative_with_errors() {
-    let mut filter = unicycle(&[0.1, 0.1, 0.01, 0.0]);
-    let mut out = SampleDerivative::default();
-    let direction = lie::Direction { x: &[1.0; 4], u: &[0.0; 2] };
-    let unknown = filter.differentiate(0.0, &[1.0, 2.0, 0.3, 4.0], &[0.0; 2], direction, &mut out);
-    assert_eq!(unknown.expect("valid directions"), Some(NoDerivative::MeasurementErrors));
-    assert_eq!(NoDerivative::MeasurementErrors.to_string(), "not with measurement errors");
+fn derivatives_with_errors_are_those_of_the_sample() {
+    const STEP: f64 = 1e-4;
+    const ALLOWED: f64 = 1e-3;
+    let mut filter = unicycle(&[0.1, 0.1, 0.01, 0.05]);
+    let (mut compared, mut kinks) = (0, 0);
+    for k in 0..60 {
+        let s = f64::from(k);
+        let x = [10.0 + 0.3 * s, 5.0 * (0.3 * s).sin(), 0.3 * (0.7 * s).cos(), 3.0 + (0.2 * s).sin()];
+        let (u_ref, t) = ([-2.0 + 0.1 * s, (0.9 * s).sin()], PERIOD * s);
+        let (dx, du_ref) = ([(1.1 * s).sin(), (1.3 * s).cos(), 0.2, (1.7 * s).sin()], [0.5, (0.5 * s).cos()]);
+        let mut derivative = SampleDerivative::default();
+        let direction = lie::Direction { x: &dx, u: &du_ref };
+        let unknown = filter.differentiate(t, &x, &u_ref, direction, &mut derivative).expect("right lengths");
+        assert_eq!(unknown, None);
+        let mut moved = |by: f64| {
+            let (x, u_ref): ([f64; 4], [f64; 2]) = (
+                std::array::from_fn(|i| x[i] + by * dx[i]),
+                std::array::from_fn(|i| u_ref[i] + by * du_ref[i]),
+            );
+            let mut u = [0.0; 2];
+            let report = filter.peek(t, &x, &u_ref, &mut u).expect("right lengths");
+            let b = &report.barriers[0];
+            [u[0], u[1], b.h, b.profile, b.margin, b.slack, b.sampling_loss]
+        };
+        let [less, here, more] = [-STEP, 0.0, STEP].map(&mut moved);
+        let b = &derivative.barriers[0];
+        let [a, o, ..] = derivative.u;
+        let found = [a, o, b.h, b.profile, b.margin, b.slack, b.sampling_loss];
+        let bends =
+            |i: usize| (more[i] - 2.0 * here[i] + less[i]).abs() > 0.02 * STEP * (1.0 + found[i].abs());
+        if (0..7).any(bends) {
+            kinks += 1;
+        } else {
+            compared += 1;
+            for i in 0..7 {
+                let wanted = (more[i] - less[i]) / (2.0 * STEP);
+                assert!(
+                    (found[i] - wanted).abs() <= ALLOWED * (1.0 + wanted.abs()),
+                    "{k} {i}: {} {wanted}",
+                    found[i]
+                );
+            }
+        }
+        filter.step(t, &x, &u_ref, &mut [0.0; 2]).expect("right lengths");
+    }
+    assert!(compared > 50, "{compared}, {kinks} kinks");
 }
 
 #[test]

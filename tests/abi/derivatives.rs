@@ -7,6 +7,7 @@ use punctual_modeldescription::{BaseType, Causality};
 
 use crate::api::{API, ERROR};
 use crate::fmu::{EXTERNAL, FILTER, Fmu, PLANT, STEERED};
+use crate::rollback::Random;
 use crate::slave::Slave;
 
 /// Step of the differences, in units of inputs of order 1 to 10.
@@ -173,6 +174,79 @@ fn of_a_filter_with_plans_behind_an_integrator() {
     }
     compare(&slave, &values, "of a plan that was there");
     assert_eq!(slave.integer("assurance"), 1, "assured");
+}
+
+/// Whatever is configured and whatever the state is, as a master asks that knows the model description alone: all outputs by
+/// all inputs, in initialization mode and before every step.
+#[test]
+fn are_given_at_every_step() {
+    let rock = "[[barrier]]\nname = \"rock\"\nshape = \"obstacle\"\ncentre = [1.5, 0.5]\nradius = 1.0\n";
+    let goal = "[[barrier]]\nname = \"goal\"\ncentre = [4.0, 3.0]\nradius = 1.0\ndeadline = 6.0\n";
+    let unicycle = "plant.model = \"unicycle\"\nbounds = { a = [-4.0, 4.0], omega = [-1.5, 1.5] }\n";
+    let point = "plant.model = \"point_mass\"\nbounds = { u_x = [-4.0, 4.0], u_y = [-4.0, 4.0] }\n";
+    let bicycle =
+        "plant = { model = \"bicycle\", l_r = 1.5 }\nbounds = { a = [-4.0, 4.0], beta = [-0.5, 0.5] }\n";
+    let free = "plant.model = \"unicycle\"\n";
+    let off = "assurance = \"off\"\n";
+    let errors = "[measurement_errors]\nx_p = 0.05\ny_p = 0.05\nv = 0.02\n";
+    let soonest = goal.replace("6.0", "0.7\nwhen_infeasible = \"soonest\"");
+    let rated = rock.replace("radius", "stay_rate = 3.0\nmargin = 0.1\nradius");
+    let (mut all, mut near, mut random) = (0_u32, 0_u32, Random(50));
+    for (plans, text) in [
+        (false, format!("{off}{unicycle}{goal}{rock}")),
+        (false, format!("{off}{point}{goal}{rock}")),
+        (false, format!("{off}{bicycle}{goal}{rock}")),
+        (false, format!("{free}{goal}{rock}")),
+        (false, format!("{unicycle}{errors}{goal}{rock}")),
+        (false, format!("{off}{point}{soonest}{rated}")),
+        (false, format!("{off}{unicycle}sampling = \"pointwise\"\n{goal}{rock}")),
+        (true, format!("{unicycle}{goal}{rock}")),
+        (true, format!("{point}{goal}{rated}")),
+        (true, format!("{bicycle}{goal}{rock}")),
+    ] {
+        let fmu = Fmu::new(&format!("kind = \"filter\"\n{text}"));
+        let (inputs, outputs) = (reals(&fmu, Causality::Input), reals(&fmu, Causality::Output));
+        let runs = if plans { 3 } else { 12 };
+        for _ in 0..runs {
+            let slave = Slave::new(&fmu);
+            slave.ok((API.enter_initialization_mode)(slave.component));
+            let mut values: Vec<f64> = inputs.iter().map(|_| 0.6 * random.number()).collect();
+            for k in 0..4 {
+                // The origin at first, as start values say.
+                if k > 0 {
+                    set(&slave, &inputs, &values);
+                }
+                if k == 2 {
+                    slave.ok((API.exit_initialization_mode)(slave.component));
+                }
+                let seeds: Vec<f64> = inputs.iter().map(|_| 0.2 * random.number()).collect();
+                let found = derivative(&slave, &outputs, &inputs, &seeds);
+                assert!(found.iter().all(|d| d.is_finite()), "{found:?} {text}");
+                if k > 0 && !plans {
+                    let at = |by: f64| {
+                        let moved: Vec<f64> = values.iter().zip(&seeds).map(|(v, s)| v + by * s).collect();
+                        set(&slave, &inputs, &moved);
+                        get(&slave, &outputs)
+                    };
+                    let (plus, minus) = (at(0.1 * STEP), at(-0.1 * STEP));
+                    set(&slave, &inputs, &values);
+                    let is_near = |i: usize| {
+                        let wanted = (plus[i] - minus[i]) / (0.2 * STEP);
+                        (found[i] - wanted).abs() <= 10.0 * TOLERANCE * (1.0 + wanted.abs())
+                    };
+                    all += 1;
+                    near += u32::from((0..outputs.len()).all(is_near));
+                }
+                if k > 1 {
+                    slave.step(0.1 * f64::from(k - 2), 0.1);
+                }
+                values.iter_mut().for_each(|v| *v += 0.02 * random.number());
+            }
+        }
+    }
+    // What is left are kinks, and deadlines given up.
+    println!("{near} of {all} agree with differences");
+    assert!(100 * near >= 95 * all, "{near} of {all}");
 }
 
 #[test]

@@ -80,7 +80,7 @@ impl Random {
     }
 
     /// From −5 to 5.
-    fn number(&mut self) -> f64 {
+    pub(crate) fn number(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64 * 10.0 - 5.0
     }
 

@@ -293,7 +293,7 @@ impl FixedTime {
 
     /// Whether the stay constraint is in force.
     #[inline(always)]
-    fn keeps(&self, state: &FixedTimeState) -> bool {
+    pub(super) fn keeps(&self, state: &FixedTimeState) -> bool {
         state.phase.keeps() && self.hands_over()
     }
 
@@ -327,7 +327,7 @@ impl FixedTime {
     }
 
     /// Whether the rate and the margin with which the set is kept in `state` are constants that do not depend on the sample.
-    pub(crate) fn keeps_evenly(&self, state: &FixedTimeState) -> bool {
+    pub(super) fn keeps_evenly(&self, state: &FixedTimeState) -> bool {
         Stay(&self.settings).is_even(state)
     }
 

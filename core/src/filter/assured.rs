@@ -330,18 +330,17 @@ struct First {
     is_old: bool,
 }
 
-/// How an input moves with its sample, as long as the piece of the filter is the same.
+/// How an input moves with its sample, as long as the piece of the filter is the same: with `rows` times the answer of the rows
+/// and `wish` times u_ref. The rest, that of a plan, is held.
 #[derive(Clone, Copy)]
-enum Piece {
-    /// With `rows` times the answer of the rows and `wish` times u_ref. The rest stays: it is of a plan that was there
-    /// before the sample.
-    Mixed { rows: f64, wish: f64 },
-    /// In a way that is not known: a search found it.
-    Searched,
+struct Piece {
+    rows: f64,
+    wish: f64,
 }
 
 impl Piece {
-    const ROWS: Self = Self::Mixed { rows: 1.0, wish: 0.0 };
+    const ROWS: Self = Self { rows: 1.0, wish: 0.0 };
+    const PLAN: Self = Self { rows: 0.0, wish: 0.0 };
 }
 
 /// The filter inside, whose rows are asked first.
@@ -769,7 +768,8 @@ impl AssuredFilter {
     }
 
     /// As [`SafetyFilter::differentiate`], for the piece in force: u_ref, the rows' answer, a plan's own input or a
-    /// compromise of these. There is none where the plan is new at this sample.
+    /// compromise of these. The plan's own input is held: it was fixed at an earlier sample. Where the plan is new, or its
+    /// input comes of feedback, that is the derivative as if it had been there.
     ///
     /// # Errors
     ///
@@ -791,12 +791,8 @@ impl AssuredFilter {
             Rows::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
             Rows::Integrated(own) => own.differentiate_rate(t, hold, x, u_ref, direction, out),
         }?;
-        let Piece::Mixed { rows, wish } = self.piece else { return Ok(Some(NoDerivative::Plan)) };
+        let Piece { rows, wish } = self.piece;
         if unknown.is_none() && rows != 1.0 {
-            let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
-            if constant.contains(&self.report().status) {
-                return Ok(Some(NoDerivative::Dependent));
-            }
             let wished = self.rows.moves(hold, u_ref, direction.u);
             let du = core::array::from_fn(|i| rows * out.u[i] + wish * wished[i]);
             let x = &self.rows.state(x)[..];
@@ -1153,7 +1149,7 @@ impl AssuredFilter {
         let tail = |planner: &Planner<'_>| planner.irregular(is_irregular).tail(old, at.0, x);
         match self.planned(&promises, at, u, tail) {
             // One that ends sooner reaches nothing.
-            Ok((witness, _)) if promises.iter().flatten().all(|promise| promise.from < witness.until) => {
+            Ok(witness) if promises.iter().flatten().all(|promise| promise.from < witness.until) => {
                 let mut plan = old.clone();
                 plan.witness = witness;
                 Ok(First { promises, plan, is_old: true })
@@ -1255,22 +1251,20 @@ impl AssuredFilter {
         }
     }
 
-    /// Looks for a plan that ends later than the one at hand, where it is time to. Whether there is one.
-    fn prolong(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) -> bool {
+    /// Looks for a plan that ends later than the one at hand, where it is time to.
+    fn prolong(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) {
         if t < self.next.prolong_at {
-            return false;
+            return;
         }
         let until = self.next.plan.witness.until;
         let longer = self.planned(&self.next.promises, (t, hold), u, |planner| {
             planner.beyond(&self.next.plan.witness).search(t, x)
         });
         let longer = longer.ok().filter(|longer| longer.witness.until > until);
-        let is_longer = longer.is_some();
         if let Some(plan) = longer {
             self.next.plan = plan;
         }
         self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
-        is_longer
     }
 
     /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
@@ -1287,9 +1281,8 @@ impl AssuredFilter {
         let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
         let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
         let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
-        let is_new = self.prolong(t, hold, x, u);
+        self.prolong(t, hold, x, u);
         let (plan, share) = (&self.next.plan, self.commitment.share);
-        let was_committed = self.commitment.standing == Standing::Assured && !is_new;
         // Gentle, and with the margin that the rows aim at.
         let comfortable = |witness: &Witness| {
             let margin = |at: &Tightest| {
@@ -1306,11 +1299,7 @@ impl AssuredFilter {
             });
             planner.behind(plan, t, x, &input[..u.len()]).ok()
         };
-        // The first plan, or one by feedback, moves with the state.
-        let mixed = |is_replayed: bool, share: f64| match was_committed && is_replayed {
-            true => (Piece::Mixed { rows: 1.0 - share, wish: 0.0 }, share),
-            false => (Piece::Searched, share),
-        };
+        let mixed = |share: f64| (Piece { rows: 1.0 - share, wish: 0.0 }, share);
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
             let planner = &planner.irregular(!is_regular);
             let passes = reached && wanted == wish;
@@ -1318,16 +1307,16 @@ impl AssuredFilter {
                 && let Ok(witness) = planner.behind(plan, t, x, wanted)
                 && comfortable(&witness)
             {
-                return Ok((Driver::Reference, (Piece::Mixed { rows: 0.0, wish: 1.0 }, 0.0), witness));
+                return Ok((Driver::Reference, (Piece { rows: 0.0, wish: 1.0 }, 0.0), witness));
             }
             // From the plan's own input a little further back to the rows, if a plan is behind that.
             let mut tail = None;
             if share > GIVEN_BACK {
-                let (kept, is_replayed) = planner.tail(plan, t, x)?;
+                let kept = planner.tail(plan, t, x)?;
                 if let Some(witness) = behind(planner, &kept, u, share - GIVEN_BACK) {
-                    return Ok((Driver::Between, mixed(is_replayed, share - GIVEN_BACK), witness));
+                    return Ok((Driver::Between, mixed(share - GIVEN_BACK), witness));
                 }
-                tail = Some((kept, is_replayed));
+                tail = Some(kept);
             }
             wanted.copy_from_slice(u);
             if let Ok(witness) = planner.behind(plan, t, x, wanted) {
@@ -1338,10 +1327,10 @@ impl AssuredFilter {
                 let (wish, witness) =
                     towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
                 let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
-                return Ok((driver, (Piece::Mixed { rows: 1.0 - wish, wish }, 0.0), witness));
+                return Ok((driver, (Piece { rows: 1.0 - wish, wish }, 0.0), witness));
             }
             // Towards the answer of the rows: as near as can be at first, then as near as last, or a little less.
-            let (kept, is_replayed) = match tail {
+            let kept = match tail {
                 Some(tail) => tail,
                 None => planner.tail(plan, t, x)?,
             };
@@ -1359,7 +1348,7 @@ impl AssuredFilter {
                 }
             };
             let driver = if share < 1.0 { Driver::Between } else { Driver::Plan };
-            Ok((driver, mixed(is_replayed, share), witness))
+            Ok((driver, mixed(share), witness))
         });
         let failure = match found {
             Ok((driver, (piece, share), witness)) => {
@@ -1387,7 +1376,7 @@ impl AssuredFilter {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.prolong_at = self.next_prolonging(t, plan.witness.until);
                 (self.next.plan, self.next.share, self.next.lost) = (plan, 1.0, None);
-                self.piece = Piece::Searched;
+                self.piece = Piece::PLAN;
                 Driver::Plan
             }
             Err(longer) => {
@@ -1418,7 +1407,7 @@ impl AssuredFilter {
         match self.planned(&self.next.promises, (t, hold), u, nearly) {
             Ok(input) => {
                 u.copy_from_slice(&input[..u.len()]);
-                self.piece = Piece::Searched;
+                self.piece = Piece::PLAN;
                 Driver::Plan
             }
             Err(_) => Driver::Rows,

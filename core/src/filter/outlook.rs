@@ -172,13 +172,31 @@ impl Outlook<'_> {
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
         weights[0] = 1.0;
         // Errors of the measurement are in every row over a time.
-        let short = self.shortfall.map_or(0.0, |shortfall| shortfall.of_disturbance(self.n, ahead));
-        let floor = short
-            + match promise.phase {
-                Phase::Stay => 0.5 * promise.margin.min(self.drift[0] - short).max(0.0),
-                _ => promise.margin,
-            };
+        let floor = self.disturbed(ahead) + self.aim(promise, ahead);
         let bound = PeriodBound { weights, floor, ..PeriodBound::ZERO };
         Some(Requirement::new(barrier, bound, ahead, self.n))
+    }
+
+    /// The h that is aimed at that instant.
+    fn aim(&self, promise: &FixedTimeState, ahead: f64) -> f64 {
+        match promise.phase {
+            Phase::Stay => 0.5 * promise.margin.min(self.drift[0] - self.disturbed(ahead)).max(0.0),
+            _ => promise.margin,
+        }
+    }
+
+    /// The derivative of the floor of [`Self::requirement`] where h moves by `dh` and the margin by `margin`.
+    pub(super) fn aim_change(&self, promise: &FixedTimeState, ahead: f64, margin: f64, dh: f64) -> f64 {
+        match promise.phase {
+            Phase::Stay if self.aim(promise, ahead) <= 0.0 => 0.0,
+            Phase::Stay if self.drift[0] - self.disturbed(ahead) < promise.margin => 0.5 * dh,
+            Phase::Stay => 0.5 * margin,
+            _ => margin,
+        }
+    }
+
+    /// What the disturbance takes off h until then.
+    fn disturbed(&self, ahead: f64) -> f64 {
+        self.shortfall.map_or(0.0, |shortfall| shortfall.of_disturbance(self.n, ahead))
     }
 }

@@ -77,7 +77,7 @@ pub(super) struct Requirement {
     pub(super) ahead: f64,
     /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
     /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 it is δ.
-    divisor: f64,
+    pub(super) divisor: f64,
 }
 
 impl Requirement {
@@ -86,6 +86,17 @@ impl Requirement {
         let order = bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
         let divisor = (1..=n - order).fold(1.0, |product, i| product * (ahead / i as f64));
         Self { barrier, bound, ahead, divisor }
+    }
+
+    /// Whether it is on h alone at an instant, not (S), whose floor contains what h is now.
+    pub(super) fn is_instant(&self) -> bool {
+        self.bound.decay == 0.0
+    }
+
+    /// The derivative of its row where the derivatives at that instant move by `change` and the bound stays.
+    pub(super) fn change(&self, change: &Ahead, n: usize, inputs: usize) -> Weighted {
+        let homogeneous = PeriodBound { floor: 0.0, ..self.bound };
+        homogeneous.weighted(&change.value[..n], &change.gradient, inputs, self.divisor)
     }
 }
 

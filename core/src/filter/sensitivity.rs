@@ -22,9 +22,11 @@
 use alloc::vec::Vec;
 use core::fmt;
 
+use super::search::Requirement;
 use super::{FixedTimeState, Phase, SafetyFilter, Status};
 use crate::convergence::BoundDerivative;
 use crate::convergence::sampled::{PeriodBound, Weighted};
+use crate::convergence::stay::Means;
 use crate::elementary::{self, dot};
 use crate::error::{Error, finite, length};
 use crate::lie::{Ahead, Derivatives, Direction};
@@ -44,6 +46,25 @@ pub struct SampleDerivative {
     /// State, direction and zeros.
     #[cfg_attr(feature = "serde", serde(skip))]
     scratch: [Vec<f64>; 3],
+    /// Answers to the sample moved back and on.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    moved: [Vec<f64>; 2],
+    /// A direction of state and reference, and what the derivatives along some add up to.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    axis: Vec<f64>,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    sum: Vec<f64>,
+}
+
+impl SampleDerivative {
+    /// All numbers.
+    fn values_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        let barriers = self.barriers.iter_mut().flat_map(|b| {
+            let BarrierDerivative { h, profile, margin, slack, sampling_loss } = b;
+            [h, profile, margin, slack, sampling_loss]
+        });
+        self.u.iter_mut().chain(barriers)
+    }
 }
 
 /// The derivative of those numbers of a [`BarrierReport`](super::BarrierReport) that vary continuously with the state.
@@ -78,23 +99,6 @@ pub enum NoDerivative {
     Profile(usize),
     /// Its constraint is one of one's own ([`Condition`](crate::convergence::condition::Condition)).
     Condition(usize),
-    /// Its deadline is given up at this sample for a later one, which a search found.
-    Postponed(usize),
-    /// The set of the barrier is kept with a rate or margin that is chosen at this sample
-    /// ([`stay::keep`](crate::convergence::stay::keep)).
-    Kept(usize),
-    /// The answer keeps a promise at an instant between the samples, or for steps of several lengths.
-    Instants,
-    /// The search over the period ended more than 1e-3 of its size (1e-6 where the rows are not met) away from
-    /// the input that is nearest to u_ref on the rows linearised there.
-    NotConverged,
-    /// The active rows do not determine the change of the input.
-    Dependent,
-    /// The state has [measurement errors](super::FilterBuilder::measurement_errors), whose rows contain derivatives by
-    /// the state already.
-    MeasurementErrors,
-    /// A plan chose the input (`AssuredFilter`).
-    Plan,
 }
 
 impl fmt::Display for NoDerivative {
@@ -103,13 +107,6 @@ impl fmt::Display for NoDerivative {
             Self::Source(i) => write!(f, "the source of barrier {i} gives no derivatives along a direction"),
             Self::Profile(i) => write!(f, "the profile of barrier {i} gives no derivative by its anchor"),
             Self::Condition(i) => write!(f, "the condition of barrier {i} gives no derivative"),
-            Self::Postponed(i) => write!(f, "the deadline of barrier {i} is given up at this sample"),
-            Self::Kept(i) => write!(f, "the rate with which barrier {i} is kept is chosen at this sample"),
-            Self::Instants => f.write_str("the answer keeps a promise between the samples"),
-            Self::NotConverged => f.write_str("the search for an input over the period did not converge"),
-            Self::Dependent => f.write_str("the active rows do not determine the change of the input"),
-            Self::MeasurementErrors => f.write_str("not with measurement errors"),
-            Self::Plan => f.write_str("a plan chose the input"),
         }
     }
 }
@@ -157,7 +154,15 @@ impl SafetyFilter {
     ///
     /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
     /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
-    /// sample was computed. By status:
+    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Soonest`](super::Infeasible::Soonest))
+    /// is held. Where more rows are active than inputs can follow, the first ones count.
+    ///
+    /// The change of the rate and margin chosen for a set that is kept ([`stay::keep`](crate::convergence::stay::keep)) is a
+    /// quotient of differences, to some 1e-8. So are, to some 1e-4, all but h where the input comes of more than the rows: with [measurement errors](super::FilterBuilder::measurement_errors), where an instant between two samples
+    /// counts, and where the search over the period ended beside the nearest input. Next to a kink they are those of the rows
+    /// linearised at the answer, with errors and instants held.
+    ///
+    /// By status:
     ///
     /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
     ///   in components that a bound holds.
@@ -223,10 +228,100 @@ impl SafetyFilter {
         if self.report().status == Status::NotArmed {
             return Ok(self.directional_unarmed(t, x, u_ref, u, direction, out).err());
         }
-        if !self.errors.is_exact() {
-            return Ok(Some(NoDerivative::MeasurementErrors));
+        match self.directional(t, x, u_ref, u, direction, out) {
+            Ok(true) if self.errors.is_exact() => Ok(None),
+            Ok(_) => self.by_axes(t, x, u_ref, u, direction, out),
+            Err(unknown) => Ok(Some(unknown)),
         }
-        Ok(self.directional(t, x, u_ref, u, direction, out).err())
+    }
+
+    /// The derivative as the sum of those along each axis, with quotients of differences where the answer is smooth: linear in the
+    /// direction all the same.
+    fn by_axes(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<Option<NoDerivative>, Error> {
+        let (mut sum, mut axis) = (core::mem::take(&mut out.sum), core::mem::take(&mut out.axis));
+        sum.clear();
+        sum.resize(MAX_INPUTS + 5 * out.barriers.len(), 0.0);
+        let mut unknown = None;
+        for (k, part) in direction.x.iter().chain(direction.u).enumerate() {
+            if *part == 0.0 {
+                continue;
+            }
+            axis.clear();
+            axis.resize(x.len() + u.len(), 0.0);
+            axis[k] = 1.0;
+            let along = Direction { x: &axis[..x.len()], u: &axis[x.len()..] };
+            match self.directional(t, x, u_ref, u, along, out) {
+                Ok(_) => self.quotient(t, x, u_ref, u, along, out)?,
+                Err(reason) => unknown = Some(reason),
+            }
+            let values = out.values_mut();
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += part * *value);
+        }
+        out.values_mut().zip(&sum).for_each(|(value, sum)| *value = *sum);
+        (out.sum, out.axis) = (sum, axis);
+        Ok(unknown)
+    }
+
+    /// Puts quotients of differences in the place of the derivatives of the input and of all but h in the reports, where the answer `u` to
+    /// the sample is smooth along an axis. For answers that are not the nearest input, and with errors of the measurement, whose part in a
+    /// row contains derivatives by the state already.
+    fn quotient(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<(), Error> {
+        /// Of a state or an input, and of 1 of its unit where it is less.
+        const PART: f64 = 1e-5;
+        /// The part by which the quotients to both sides may differ.
+        const KINK: f64 = 0.02;
+        let along = direction.x.iter().chain(direction.u);
+        let by = x.iter().chain(u_ref).zip(along).find(|(_, d)| **d != 0.0);
+        let by = PART * by.map_or(1.0, |(v, _)| v.abs().max(1.0));
+        let SampleDerivative { u: du, barriers, scratch: [at, ..], moved: [less, more], .. } = out;
+        let status = self.report().status;
+        let mut is_smooth = true;
+        for (by, values) in [(-by, &mut *less), (by, &mut *more)] {
+            let (mut moved, mut answer) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
+            at.clear();
+            at.extend(x.iter().zip(direction.x).map(|(v, d)| v + by * d));
+            for (i, v) in moved[..u.len()].iter_mut().enumerate() {
+                *v = u_ref[i] + by * direction.u[i];
+            }
+            let answer = &mut answer[..u.len()];
+            let report = self.peek(t, at, &moved[..u.len()], answer)?;
+            is_smooth &= report.status == status;
+            values.clear();
+            values.extend_from_slice(answer);
+            values
+                .extend(report.barriers.iter().flat_map(|b| [b.profile, b.margin, b.slack, b.sampling_loss]));
+        }
+        self.peek(t, x, u_ref, &mut [0.0; MAX_INPUTS][..u.len()])?;
+        for (u, (less, more)) in u.iter().zip(less.iter().zip(&*more)) {
+            let [left, right] = [(u - less) / by, (more - u) / by];
+            is_smooth &= (right - left).abs() <= KINK * (1.0 + right.abs().max(left.abs()));
+        }
+        if is_smooth {
+            let mut slopes = less.iter().zip(&*more).map(|(less, more)| (more - less) / (2.0 * by));
+            let mut next = |value: &mut f64| *value = slopes.next().unwrap_or(*value);
+            du[..u.len()].iter_mut().for_each(&mut next);
+            for b in barriers {
+                let BarrierDerivative { h: _, profile, margin, slack, sampling_loss } = b;
+                [profile, margin, slack, sampling_loss].into_iter().for_each(&mut next);
+            }
+        }
+        Ok(())
     }
 
     /// Makes the derivative `out` of the answer of the rows, just computed, that of the input `u` in its place, which moves
@@ -239,7 +334,7 @@ impl SafetyFilter {
         (u, du): (&[f64], [f64; MAX_INPUTS]),
         out: &mut SampleDerivative,
     ) -> Result<(), NoDerivative> {
-        let SampleDerivative { u: moved, barriers, scratch } = out;
+        let SampleDerivative { u: moved, barriers, scratch, .. } = out;
         let workspace = &self.workspace;
         let answer = &workspace.next.input[..u.len()];
         for (i, b) in barriers.iter_mut().enumerate() {
@@ -281,6 +376,8 @@ impl SafetyFilter {
         Ok(())
     }
 
+    /// Returns whether the input is the one that is nearest to u_ref on the rows linearised there, which do not stand at instants
+    /// that a search found.
     fn directional(
         &self,
         t: f64,
@@ -289,24 +386,25 @@ impl SafetyFilter {
         u: &[f64],
         direction: Direction,
         out: &mut SampleDerivative,
-    ) -> Result<(), NoDerivative> {
-        let SampleDerivative { u: du, barriers, scratch } = out;
+    ) -> Result<bool, NoDerivative> {
+        let SampleDerivative { u: du, barriers, scratch, .. } = out;
         let du = &mut du[..u.len()];
         scratch[2].clear();
         scratch[2].resize(self.state_dim, 0.0);
-        if self.workspace.requirements.len() > self.slots.len() {
-            return Err(NoDerivative::Instants);
-        }
         // The derivative of every row at a fixed u.
         let mut row_derivatives = [RowDerivative::NONE; MAX_ROWS];
         for (i, row_derivative) in row_derivatives[..self.slots.len()].iter_mut().enumerate() {
             (*row_derivative, barriers[i]) = self.row_derivative(i, t, x, direction.x, u, scratch)?;
         }
+        let workspace = &self.workspace;
+        let report = &workspace.report;
+        let count = if report.predicted { workspace.requirements.len() } else { self.slots.len() };
+        for k in self.slots.len()..count {
+            row_derivatives[k] = self.further(&workspace.requirements[k], t, x, direction.x, u, scratch)?;
+        }
 
         // The active rows of the sample, whichever method found it.
-        let (workspace, count) = (&self.workspace, self.slots.len());
         let (rows, enforcement) = (&workspace.rows[..count], &workspace.enforcement[..count]);
-        let report = &workspace.report;
         let limit = self.correction_limit;
         let problem = Problem { enforcement, ..Problem::new(rows, &self.bounds, u_ref, limit) };
         let mut qp = qp::Workspace::default();
@@ -321,46 +419,46 @@ impl SafetyFilter {
         let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
         let is_rough = self.is_backed || !report.status.is_satisfied();
         let same = if is_rough { SAME_INPUT_UNMET } else { SAME_INPUT };
-        if u.iter().zip(&*again).any(|(a, b)| (a - b).abs() > same * size) {
-            return Err(NoDerivative::NotConverged);
-        }
+        let is_nearest = u.iter().zip(&*again).all(|(a, b)| (a - b).abs() <= same * size);
+        // An instant at which a row is held moves with the sample, which no row tells.
+        let is_instant = |k: usize| k >= self.slots.len() && workspace.requirements[k].is_instant();
+        let stands = qp.active().iter().all(|a| !matches!(a.constraint, Constraint::Row(k) if is_instant(k)));
         // The derivative of u: (8) with the active rows, else the direction of u_ref but at bounds.
         let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
-            let mut equations = Equations::new(direction.u);
-            for active in active {
-                let mut normal = [0.0; MAX_INPUTS];
-                let held = match active.constraint {
-                    Constraint::Lower(i) | Constraint::Upper(i) => {
-                        normal[i] = 1.0;
-                        equations.hold(&normal, 0.0)
-                    }
-                    Constraint::Row(k) => {
-                        let row_derivative = &row_derivatives[k];
-                        let curvature = self.curvature(k, t, x, u, scratch)?;
-                        let row = &rows[k].normal;
-                        match enforcement[k] {
-                            Enforcement::Soft { penalty }
-                                if is_saturated(row, active.multiplier, penalty) =>
-                            {
-                                pull_saturated(&mut equations, row, penalty, row_derivative, &curvature);
-                                true
-                            }
-                            _ => {
-                                let by = active.multiplier;
-                                let curvature = curvature.map(|row| row.map(|c| by * c));
-                                equations.pull(&row_derivative.normal.map(|a| by * a), &curvature);
-                                equations.hold(row, -row_derivative.slack)
-                            }
+            // Where rows bend so much that (8) has no solution, as if they did not.
+            for bends in [true, false] {
+                let mut equations = Equations::new(direction.u);
+                for active in active {
+                    let k = match active.constraint {
+                        Constraint::Lower(i) | Constraint::Upper(i) => {
+                            let mut normal = [0.0; MAX_INPUTS];
+                            normal[i] = 1.0;
+                            equations.hold(&normal, 0.0);
+                            continue;
+                        }
+                        Constraint::Row(k) => k,
+                    };
+                    let (row, row_derivative) = (&rows[k].normal, &row_derivatives[k]);
+                    let curvature = match bends {
+                        true => self.curvature(k, t, x, u, scratch)?,
+                        false => [[0.0; MAX_INPUTS]; MAX_INPUTS],
+                    };
+                    match enforcement[k] {
+                        Enforcement::Soft { penalty } if is_saturated(row, active.multiplier, penalty) => {
+                            pull_saturated(&mut equations, row, penalty, row_derivative, &curvature);
+                        }
+                        _ => {
+                            let by = active.multiplier;
+                            let curvature = curvature.map(|row| row.map(|c| by * c));
+                            equations.pull(&row_derivative.normal.map(|a| by * a), &curvature);
+                            equations.hold(row, -row_derivative.slack);
                         }
                     }
-                };
-                if !held {
-                    return Err(NoDerivative::Dependent);
                 }
-            }
-            if !equations.solve(du) {
-                return Err(NoDerivative::Dependent);
+                if equations.solve(du) {
+                    break;
+                }
             }
         } else {
             for i in 0..du.len() {
@@ -379,7 +477,7 @@ impl SafetyFilter {
                     - loss * row_derivative.attenuation / bound.attenuation;
             }
         }
-        Ok(())
+        Ok(is_nearest && stands)
     }
 
     /// Writes the state from which barrier `i` is held, and its direction, to `scratch`.
@@ -415,20 +513,13 @@ impl SafetyFilter {
         let (slot, workspace) = (&self.slots[i], &self.workspace);
         let held = &[0.0; MAX_INPUTS][..u.len()];
         let mut change = Ahead::ZERO;
-        let unknown = NoDerivative::Source(i);
-        let source = slot.source.directional().ok_or(unknown)?;
+        let source = slot.source.directional().ok_or(NoDerivative::Source(i))?;
         source.evaluate_directional(t, x, u, Direction { x: dx, u: held }, &mut change);
         // h, and whether the promise has a derivative at this sample.
         let mut derivative = BarrierDerivative { h: change.value[0], ..BarrierDerivative::default() };
-        let (before, promise) = (&self.state.barriers[i], &workspace.next.barriers[i]);
+        let promise = &workspace.next.barriers[i];
         if matches!(promise.phase, Phase::Waiting | Phase::Released) {
             return Ok((RowDerivative::NONE, derivative));
-        }
-        if promise.phase == Phase::Stay && !slot.promise.keeps_evenly(promise) {
-            return Err(NoDerivative::Kept(i));
-        }
-        if promise.postponed != before.postponed {
-            return Err(NoDerivative::Postponed(i));
         }
         // h and its derivatives where the input begins to act.
         let begin = t + self.delay;
@@ -443,16 +534,8 @@ impl SafetyFilter {
         slot.source.evaluate(begin, from, &mut now);
         // The floors of the promise, and the pointwise row.
         let period = workspace.report.predicted.then_some(workspace.report.period);
-        let anchors = is_anchored(before, promise, begin);
-        let stack = [&now.drift[..n], &change.value[..n]];
-        let BoundDerivative { floor, profile, margin, sampled } = slot
-            .promise
-            .differentiate(promise, anchors, begin, stack, period)
-            .ok_or(if slot.promise.has_condition() {
-                NoDerivative::Condition(i)
-            } else {
-                NoDerivative::Profile(i)
-            })?;
+        let bound = self.bound_change(i, (t, x, u), (&now, &change), period)?;
+        let BoundDerivative { floor, profile, margin, sampled } = bound;
         (derivative.profile, derivative.margin) = (profile, margin);
         let pointwise = change.value[n] - floor;
         let mut row_derivative = RowDerivative {
@@ -463,18 +546,118 @@ impl SafetyFilter {
             attenuation: sampled.attenuation,
         };
         // The row over the period.
-        if let Some(period) = period {
-            let mut ahead = Ahead::ZERO;
-            slot.source.predict().ok_or(unknown)?.ahead(begin, from, u, period, &mut ahead);
-            let source = slot.source.predict_directional().ok_or(unknown)?;
-            source.ahead_directional(begin, from, u, direction, period, &mut change);
-            let bound = &self.slots[i].now.period_bound;
-            let moved = weighted(bound, &change, n, u.len(), period);
-            let by_weights = sampled.weighted(&ahead.value[..n], &ahead.gradient, u.len(), period);
-            row_derivative.slack = moved.value + by_weights.value;
-            row_derivative.normal = core::array::from_fn(|i| moved.normal[i] + by_weights.normal[i]);
+        if period.is_some() {
+            let row = self.ahead_derivative(&workspace.requirements[i], &sampled, begin, from, moving, u)?;
+            (row_derivative.slack, row_derivative.normal) = (row.value, row.normal);
         }
         Ok((row_derivative, derivative))
+    }
+
+    /// The derivative of the bounds of barrier `i`, from its derivatives where the input begins to act and their `change` at the
+    /// fixed input `u`.
+    fn bound_change(
+        &self,
+        i: usize,
+        (t, x, u): (f64, &[f64], &[f64]),
+        (now, change): (&Derivatives, &Ahead),
+        period: Option<f64>,
+    ) -> Result<BoundDerivative, NoDerivative> {
+        let (slot, begin) = (&self.slots[i], t + self.delay);
+        let (before, promise) = (&self.state.barriers[i], &self.workspace.next.barriers[i]);
+        let anchors = is_anchored(before, promise, begin);
+        let n = slot.degree();
+        // What the input can do, and how that moves.
+        let gain = if anchors { 0.0 } else { before.gain };
+        let turn = &change.gradient[n];
+        let square = dot(&now.row, &now.row);
+        let size = elementary::sqrt(square);
+        let (mut reach, mut reach_change) = (0.0, 0.0);
+        for k in 0..u.len() {
+            let a = now.row[k];
+            if a != 0.0 {
+                let bound = if a > 0.0 { self.bounds.max[k] } else { self.bounds.min[k] };
+                reach += a * bound;
+                reach_change += turn[k] * bound;
+            }
+        }
+        let is_less = size < gain;
+        let hold = self.moment(t, x, &[]).hold;
+        let means =
+            Means { drift: now.drift[n], reach, weight: if is_less { size / gain } else { 1.0 }, hold };
+        let moves = Means {
+            drift: change.value[n] - dot(turn, u),
+            reach: if reach.is_finite() { reach_change } else { 0.0 },
+            weight: if is_less && size > 0.0 { dot(&now.row, turn) / size / gain } else { 0.0 },
+            hold: 0.0,
+        };
+        let errors = core::array::from_fn(|k| slot.now.slopes.iter().fold(0.0, |sum, s| sum + s[k].abs()));
+        let stack = [&now.drift[..n], &change.value[..n]];
+        slot.promise.differentiate(promise, anchors, begin, stack, (&errors, [&means, &moves]), period).ok_or(
+            match slot.promise.has_condition() {
+                true => NoDerivative::Condition(i),
+                false => NoDerivative::Profile(i),
+            },
+        )
+    }
+
+    /// The derivative at the fixed input `u` of a row after those of the barriers: that of the longest step, or of an instant
+    /// between two samples, which is held.
+    fn further(
+        &self,
+        requirement: &Requirement,
+        t: f64,
+        x: &[f64],
+        dx: &[f64],
+        u: &[f64],
+        scratch: &mut [Vec<f64>; 3],
+    ) -> Result<RowDerivative, NoDerivative> {
+        let i = requirement.barrier;
+        let (slot, begin, held) = (&self.slots[i], t + self.delay, &[0.0; MAX_INPUTS][..u.len()]);
+        self.begin(i, x, dx, scratch)?;
+        let [from, moving, _] = &*scratch;
+        let (mut now, mut change) = (Derivatives::ZERO, Ahead::ZERO);
+        let source = slot.source.directional().ok_or(NoDerivative::Source(i))?;
+        source.evaluate_directional(begin, from, u, Direction { x: moving, u: held }, &mut change);
+        slot.source.evaluate(begin, from, &mut now);
+        let bound = self.bound_change(i, (t, x, u), (&now, &change), Some(requirement.ahead))?;
+        let sampled = match requirement.is_instant() {
+            true => {
+                let promise = &self.workspace.next.barriers[i];
+                let dh = change.value[0];
+                let floor = slot.outlook().aim_change(promise, requirement.ahead, bound.margin, dh);
+                PeriodBound { floor, attenuation: 0.0, ..PeriodBound::ZERO }
+            }
+            false => bound.sampled,
+        };
+        let row = self.ahead_derivative(requirement, &sampled, begin, from, moving, u)?;
+        Ok(RowDerivative { slack: row.value, normal: row.normal, ..RowDerivative::NONE })
+    }
+
+    /// The derivative of the row of a requirement at the fixed input `u`, where its bound moves by `moved`.
+    fn ahead_derivative(
+        &self,
+        requirement: &Requirement,
+        moved: &PeriodBound,
+        begin: f64,
+        from: &[f64],
+        moving: &[f64],
+        u: &[f64],
+    ) -> Result<Weighted, NoDerivative> {
+        let (i, ahead) = (requirement.barrier, requirement.ahead);
+        let (source, unknown) = (&self.slots[i].source, NoDerivative::Source(i));
+        let (mut at, mut change) = (Ahead::ZERO, Ahead::ZERO);
+        let direction = Direction { x: moving, u: &[0.0; MAX_INPUTS][..u.len()] };
+        source.predict().ok_or(unknown)?.ahead(begin, from, u, ahead, &mut at);
+        let directional = source.predict_directional().ok_or(unknown)?;
+        directional.ahead_directional(begin, from, u, direction, ahead, &mut change);
+        let (n, divisor) = (source.relative_degree(), requirement.divisor);
+        let of_state = requirement.change(&change, n, u.len());
+        let of_bound = moved.weighted(&at.value[..n], &at.gradient, u.len(), divisor);
+        Ok(Weighted {
+            value: of_state.value + of_bound.value,
+            normal: core::array::from_fn(|i| of_state.normal[i] + of_bound.normal[i]),
+            ..of_state
+        })
     }
 
     /// The derivative of row `k`'s normal by u: `[i][j]` is that of its component i by u_j.
@@ -487,11 +670,11 @@ impl SafetyFilter {
         scratch: &mut [Vec<f64>; 3],
     ) -> Result<[[f64; MAX_INPUTS]; MAX_INPUTS], NoDerivative> {
         let mut curvature = [[0.0; MAX_INPUTS]; MAX_INPUTS];
-        let report = &self.workspace.report;
-        if !report.predicted {
+        if !self.workspace.report.predicted {
             return Ok(curvature);
         }
-        let (source, bound) = (&self.slots[k].source, &self.slots[k].now.period_bound);
+        let requirement = &self.workspace.requirements[k];
+        let source = &self.slots[requirement.barrier].source;
         let [from, _, zeros] = scratch;
         from.clear();
         from.extend_from_slice(x);
@@ -500,14 +683,16 @@ impl SafetyFilter {
         {
             source.flow(from, &self.acting()[..u.len()], self.delay);
         }
-        let directional = source.predict_directional().ok_or(NoDerivative::Source(k))?;
+        let unknown = NoDerivative::Source(requirement.barrier);
+        let directional = source.predict_directional().ok_or(unknown)?;
         let mut change = Ahead::ZERO;
         for j in 0..u.len() {
             let mut axis = [0.0; MAX_INPUTS];
             axis[j] = 1.0;
             let direction = Direction { x: zeros, u: &axis[..u.len()] };
-            directional.ahead_directional(t + self.delay, from, u, direction, report.period, &mut change);
-            let moved = weighted(bound, &change, source.relative_degree(), u.len(), report.period);
+            let (begin, ahead) = (t + self.delay, requirement.ahead);
+            directional.ahead_directional(begin, from, u, direction, ahead, &mut change);
+            let moved = requirement.change(&change, source.relative_degree(), u.len());
             for i in 0..u.len() {
                 curvature[i][j] = moved.normal[i];
             }
@@ -550,10 +735,4 @@ fn pull_saturated(
     }
     let change: [f64; MAX_INPUTS] = turned(&row_derivative.normal);
     equations.pull(&change, &pull);
-}
-
-/// The derivative of the row of `bound` where the derivatives at the end of the period move by `change`.
-fn weighted(bound: &PeriodBound, change: &Ahead, n: usize, inputs: usize, period: f64) -> Weighted {
-    let homogeneous = PeriodBound { floor: 0.0, ..*bound };
-    homogeneous.weighted(&change.value[..n], &change.gradient, inputs, period)
 }

@@ -80,7 +80,7 @@ impl SafetyFilter {
         Ok(())
     }
 
-    fn moment<'a>(&self, t: f64, x: &'a [f64], u_ref: &'a [f64]) -> Moment<'a> {
+    pub(super) fn moment<'a>(&self, t: f64, x: &'a [f64], u_ref: &'a [f64]) -> Moment<'a> {
         let period = self.sampling.period(&self.state, t, self.first_period, self.expected);
         let since = self.state.time.map_or(0.0, |last| (t - last).max(0.0));
         let hold = period.unwrap_or(since).max(self.period_max);

@@ -487,12 +487,12 @@ impl<'a> Planner<'a> {
     }
 
     /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
-    /// the model, or forgets no round-off, the feedback that they came from. And whether the first one is as it was.
+    /// the model, or forgets no round-off, the feedback that they came from.
     ///
     /// # Errors
     ///
     /// What it fails at.
-    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(Witness, bool), Failure> {
+    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let nu = self.dims[1];
         // As many of its holds as `held`, then the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
@@ -520,7 +520,7 @@ impl<'a> Planner<'a> {
             if let Some(reference) = plan.reference.as_ref().filter(|_| follows) {
                 walk.follow(reference)?;
             }
-            Ok((self.conclude(walk, plan)?, at > t))
+            self.conclude(walk, plan)
         };
         self.on_a_grid(|grid| {
             let kept = match plan.stays() {
@@ -530,8 +530,7 @@ impl<'a> Planner<'a> {
             };
             kept.or_else(|failure| {
                 let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
-                let followed = follow(true).or_else(|_| follow(false)).map_err(|_| failure)?;
-                Ok((followed, false))
+                follow(true).or_else(|_| follow(false)).map_err(|_| failure)
             })
         })
     }

@@ -15,12 +15,17 @@ use nalgebra::{SMatrix, SVector};
 use crate::MAX_INPUTS;
 use crate::elementary::{self, dot};
 
+/// The least sine of the angle between a normal and those before it.
+const INDEPENDENT: f64 = 1e-7;
+
 const SIZE: usize = 2 * MAX_INPUTS;
 
 /// The equations (7), for one direction.
 pub(crate) struct Equations {
     inputs: usize,
     rows: usize,
+    /// The normals of these, made orthogonal one after the other, of length 1.
+    held: [[f64; MAX_INPUTS]; MAX_INPUTS],
     matrix: SMatrix<f64, SIZE, SIZE>,
     right: SVector<f64, SIZE>,
 }
@@ -31,7 +36,8 @@ impl Equations {
         let mut right = SVector::<f64, SIZE>::zeros();
         right.as_mut_slice()[..direction.len()].copy_from_slice(direction);
         // Unused rows and columns stay those of the identity.
-        Self { inputs: direction.len(), rows: 0, matrix: SMatrix::identity(), right }
+        let held = [[0.0; MAX_INPUTS]; MAX_INPUTS];
+        Self { inputs: direction.len(), rows: 0, held, matrix: SMatrix::identity(), right }
     }
 
     /// Adds a part −ϑ a(u) of the gradient: `change` is the derivative of ϑ a at a fixed u, `curvature[i][j]` that
@@ -45,14 +51,22 @@ impl Equations {
         }
     }
 
-    /// Adds an active constraint: u' along `normal` is `change`. Returns false where there are more than inputs.
-    #[must_use]
-    pub(crate) fn hold(&mut self, normal: &[f64; MAX_INPUTS], change: f64) -> bool {
-        if self.rows == self.inputs {
-            return false;
-        }
-        let row = MAX_INPUTS + self.rows;
+    /// Adds an active constraint: u' along `normal` is `change`. One whose normal those before it make up is left out, and so
+    /// is one of which there are more than inputs.
+    pub(crate) fn hold(&mut self, normal: &[f64; MAX_INPUTS], change: f64) {
         let norm = elementary::sqrt(dot(normal, normal));
+        let mut rest = normal.map(|component| component / norm);
+        for held in &self.held[..self.rows] {
+            let along = dot(held, &rest);
+            rest.iter_mut().zip(held).for_each(|(rest, held)| *rest -= along * held);
+        }
+        let left = elementary::sqrt(dot(&rest, &rest));
+        // Not-a-number makes up nothing.
+        if self.rows == self.inputs || left.is_nan() || left < INDEPENDENT {
+            return;
+        }
+        self.held[self.rows] = rest.map(|component| component / left);
+        let row = MAX_INPUTS + self.rows;
         for j in 0..self.inputs {
             let component = normal[j] / norm;
             self.matrix[(row, j)] = component;
@@ -61,7 +75,6 @@ impl Equations {
         self.matrix[(row, row)] = 0.0;
         self.right[row] = change / norm;
         self.rows += 1;
-        true
     }
 
     /// Writes u'; false where the equations do not determine it.
@@ -89,7 +102,7 @@ mod tests {
         // On (cos φ, sin φ)ᵀu = 1 from r = 0: u = (cos φ, sin φ), λ = 1; φ moves by 1 at φ = 0.
         let mut turning = Equations::new(&[0.0, 0.0]);
         turning.pull(&[0.0, 1.0], &[[0.0; MAX_INPUTS]; MAX_INPUTS]);
-        assert!(turning.hold(&normal(&[1.0, 0.0]), 0.0));
+        turning.hold(&normal(&[1.0, 0.0]), 0.0);
         let mut u = [0.0; 2];
         assert!(turning.solve(&mut u));
         assert_eq!(u, [0.0, 1.0]);
@@ -98,16 +111,26 @@ mod tests {
         let mut curvature = [[0.0; MAX_INPUTS]; MAX_INPUTS];
         (curvature[0][0], curvature[1][1]) = (-2.0, -2.0);
         circle.pull(&[0.0, 0.0], &curvature);
-        assert!(circle.hold(&normal(&[1.0, 0.0]), 0.0));
+        circle.hold(&normal(&[1.0, 0.0]), 0.0);
         assert!(circle.solve(&mut u));
         assert!((u[0]).abs() < 1e-15 && (u[1] - 1.0 / 3.0).abs() < 1e-15, "{u:?}");
     }
 
     #[test]
-    fn dependent_constraints_are_refused() {
+    fn dependent_constraints_are_left_out() {
         let mut equations = Equations::new(&[0.0, 1.0]);
-        assert!(equations.hold(&normal(&[1.0, 1.0]), 0.0) && equations.hold(&normal(&[2.0, 2.0]), 1.0));
-        assert!(!equations.hold(&normal(&[1.0, 0.0]), 0.0), "more than inputs");
-        assert!(!equations.solve(&mut [0.0; 2]));
+        equations.hold(&normal(&[3.0, 3.0]), 6.0);
+        equations.hold(&normal(&[2.0, 2.0]), 1.0);
+        equations.hold(&normal(&[0.0; 2]), 1.0);
+        let mut u = [0.0; 2];
+        assert!(equations.solve(&mut u));
+        // The point of u_1 + u_2 = 2 that is nearest to (0, 1).
+        assert!((u[0] - 0.5).abs() < 1e-15 && (u[1] - 1.5).abs() < 1e-15, "{u:?}");
+        let mut more = Equations::new(&[0.0]);
+        more.hold(&normal(&[1.0]), 2.0);
+        more.hold(&normal(&[1.0]), 3.0);
+        let mut u = [0.0];
+        assert!(more.solve(&mut u));
+        assert_eq!(u, [2.0], "the first one");
     }
 }

@@ -109,10 +109,7 @@ impl FilterBlock {
     /// The reason why there is no derivative, with the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
-            NoDerivative::Source(i)
-            | NoDerivative::Profile(i)
-            | NoDerivative::Postponed(i)
-            | NoDerivative::Kept(i) => self.filter.filter().barrier_names().nth(i),
+            NoDerivative::Source(i) | NoDerivative::Profile(i) => self.filter.filter().barrier_names().nth(i),
             _ => None,
         };
         match barrier {
