@@ -98,6 +98,11 @@ fn the_lock_file_has_this_version() {
 fn what_is_cited_has_this_version() {
     let cited = text("CITATION.cff").lines().filter_map(|line| line.strip_prefix("version: "));
     assert_eq!(cited.collect::<Vec<_>>(), [VERSION], "CITATION.cff");
+    // With the date of its release, once it has one.
+    let dated = text("CITATION.cff").lines().find_map(|line| line.strip_prefix("date-released: "));
+    let newest = text("CHANGELOG.md").lines().find_map(|line| line.strip_prefix("## ")).expect("a version");
+    let date = newest.split_once("] - ").map(|(_, date)| date).filter(|date| is_date(date));
+    assert_eq!(dated.map(|date| date.trim_matches(['"', '\''])), date, "CITATION.cff: date-released");
 }
 
 /// `## [VERSION] - DATE`, or `unreleased` in place of the date.
