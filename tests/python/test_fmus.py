@@ -107,6 +107,8 @@ def test_the_command_line_is_there(tmp_path):
     script = Path(sys.executable).with_name("punctual")
     done = subprocess.run([script, "--version"], check=True, capture_output=True, text=True)
     assert done.stdout == f"punctual {punctual.__version__}\n" == punctual.run_cli("--version")
+    module = [sys.executable, "-m", "punctual", "--version"]
+    assert subprocess.run(module, check=True, capture_output=True, text=True).stdout == done.stdout
     done = subprocess.run([script, "build", "none.toml", "-o", "none.fmu"], capture_output=True, text=True)
     assert done.returncode == 2 and "none.toml" in done.stderr
     with pytest.raises(punctual.Error, match="^unexpected argument '--none'"):

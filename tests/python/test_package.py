@@ -21,6 +21,8 @@ def test_it_is_the_installed_one_with_the_version_of_the_workspace():
     version = manifest["workspace"]["package"]["version"]
     assert punctual.__version__ == version == metadata.version("punctual-filter")
     assert metadata.metadata("punctual-filter")["License-Expression"] == "MIT OR Apache-2.0"
+    summary = metadata.metadata("punctual-filter")["Summary"]
+    assert "FMI 2.0 and 3.0" in summary
     licences = {Path(file).name for file in metadata.files("punctual-filter") if "licenses" in str(file)}
     assert licences == {"LICENSE-MIT", "LICENSE-APACHE"}
 
