@@ -68,6 +68,7 @@ fn a_new_file_for_an_fmu_runs_with_one() {
     workshop.write("cart-plant.toml", plant);
     workshop.punctual(["build", "cart-plant.toml", "-o", "cart-plant.fmu"]).success();
     let text = workshop.text("cart.toml");
+    assert!(text.contains("feedthrough = false"), "the plant's outputs follow in steps");
     let text = text.replace("plant.position", "plant.x.position").replace("plant.speed", "plant.x.speed");
     workshop.write("cart.toml", text.replace("plant.force", "plant.u.force"));
     workshop.punctual(["run", "cart.toml", "--out", "out", "--require", "kept"]).success();
