@@ -1,10 +1,11 @@
 //! Gives the shared library its name on macOS, and elsewhere links it against the oldest glibc that Rust's standard library
-//! supports, whichever the machine has. Calls of functions of newer versions go to those that `src/abi/glibc.rs` defines.
+//! supports, whichever the machine has, and with an unwinder of its own. Calls of functions of newer versions go to those that `src/abi/glibc.rs` defines.
 
-use std::env;
+use std::process::Command;
+use std::{env, fs};
 
 /// Functions with versions newer than 2.17, which the linker redirects to `__wrap_<name>`.
-const NEWER: [&str; 17] = [
+const NEWER: [&str; 20] = [
     "hypot",
     "exp",
     "log",
@@ -14,6 +15,9 @@ const NEWER: [&str; 17] = [
     "pthread_key_create",
     "pthread_key_delete",
     "pthread_setspecific",
+    "__pthread_key_create",
+    "pthread_once",
+    "_dl_find_object",
     "dlopen",
     "dlsym",
     "dlclose",
@@ -49,4 +53,19 @@ fn main() {
     println!(
         "cargo::rustc-cdylib-link-arg=-Wl,--push-state,--no-as-needed,-l:libpthread.so.0,-l:libdl.so.2,--pop-state"
     );
+    link_unwinder();
+}
+
+/// Links the compiler's unwinder into the library, so that it needs no `libgcc_s.so.1`: the standard library asks for that by
+/// name, and finds a script with this name first. Where the linker has no static one, such as Clang without GCC, it stays.
+fn link_unwinder() {
+    const STATIC: &str = "libgcc_eh.a";
+    let linker = env::var("RUSTC_LINKER").unwrap_or_else(|_| "cc".to_owned());
+    let told = Command::new(linker).arg(format!("-print-file-name={STATIC}")).output();
+    // Where there is none, it says the name alone.
+    let has_one = told.is_ok_and(|told| told.stdout.starts_with(b"/"));
+    let folder = env::var("OUT_DIR").unwrap_or_default();
+    if has_one && fs::write(format!("{folder}/libgcc_s.so"), "GROUP ( -lgcc_eh -lgcc )\n").is_ok() {
+        println!("cargo::rustc-cdylib-link-arg=-L{folder}");
+    }
 }

@@ -65,6 +65,18 @@ fn a_glibc_of_2014_is_enough() {
     assert!(newer.is_empty(), "add what needs {newer:?} to fmu/build.rs and fmu/src/abi/glibc.rs:\n{text}");
 }
 
+/// Nothing but parts of glibc: the unwinder is inside, and a panic is caught all the same (`panics` in `fmu/src/abi/guard`).
+#[cfg(all(target_os = "linux", target_env = "gnu", target_arch = "x86_64"))]
+#[test]
+fn glibc_is_all_that_is_needed() {
+    const PARTS: [&str; 5] =
+        ["libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "ld-linux-x86-64.so.2"];
+    let text = told("readelf", &["--wide", "--dynamic"]);
+    let needed = text.lines().filter(|line| line.contains("(NEEDED)"));
+    let others: Vec<_> = needed.filter(|line| !PARTS.iter().any(|part| line.contains(part))).collect();
+    assert!(others.is_empty(), "{others:?}");
+}
+
 #[test]
 fn version_and_platform() {
     // SAFETY: static strings of the library.

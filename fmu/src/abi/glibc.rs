@@ -4,9 +4,12 @@
 //!
 //! Functions that got a new version are named with the old one. `stat64` and `fstat64` were macros around another
 //! function until 2.33. The last four came later than 2.17: they are left undefined, weak, and the standard
-//! library asks at run time whether they are there and does without.
+//! library asks at run time whether they are there and does without. `_dl_find_object` is what the unwinder of the compiler, which is
+//! linked into the library, asks for an object's table; it is found here as it was before 2.35.
 
 use std::arch::global_asm;
+use std::ffi::{c_char, c_int, c_void};
+use std::ptr::null;
 
 /// Links `__wrap_<name>` to `<name>` of `version`.
 macro_rules! version {
@@ -53,6 +56,8 @@ version! {
     "pthread_key_create" "GLIBC_2.2.5"
     "pthread_key_delete" "GLIBC_2.2.5"
     "pthread_setspecific" "GLIBC_2.2.5"
+    "__pthread_key_create" "GLIBC_2.2.5"
+    "pthread_once" "GLIBC_2.2.5"
     "dlopen" "GLIBC_2.2.5"
     "dlsym" "GLIBC_2.2.5"
     "dlclose" "GLIBC_2.2.5"
@@ -68,3 +73,102 @@ absent! {
     "getrandom"
     "__cxa_thread_atexit_impl"
 }
+
+/// `struct dl_phdr_info`, as far as it is read.
+#[repr(C)]
+struct Loaded {
+    address: usize,
+    name: *const c_char,
+    headers: *const Header,
+    count: u16,
+}
+
+/// `Elf64_Phdr`.
+#[repr(C)]
+struct Header {
+    kind: u32,
+    flags: u32,
+    offset: usize,
+    address: usize,
+    physical: usize,
+    file_size: usize,
+    size: usize,
+    align: usize,
+}
+
+/// `struct dl_find_object`.
+#[repr(C)]
+struct Found {
+    flags: u64,
+    begin: *const c_void,
+    end: *const c_void,
+    link_map: *const c_void,
+    eh_frame: *const c_void,
+    reserved: [u64; 7],
+}
+
+/// An address, and the object that it is in.
+struct Wanted {
+    address: usize,
+    found: Option<Found>,
+}
+
+unsafe extern "C" {
+    fn dl_iterate_phdr(
+        callback: unsafe extern "C" fn(*const Loaded, usize, *mut c_void) -> c_int,
+        data: *mut c_void,
+    ) -> c_int;
+}
+
+/// Notes the object in `data`, a [`Wanted`], if the address is in it; ends the iteration then.
+unsafe extern "C" fn look(loaded: *const Loaded, _size: usize, data: *mut c_void) -> c_int {
+    const LOAD: u32 = 1;
+    const EH_FRAME: u32 = 0x6474_e550;
+    // SAFETY: `dl_iterate_phdr` passes an object, and what it was given.
+    let (loaded, wanted) = unsafe { (&*loaded, &mut *data.cast::<Wanted>()) };
+    // SAFETY: so many headers it has.
+    let headers = unsafe { std::slice::from_raw_parts(loaded.headers, usize::from(loaded.count)) };
+    let place = |header: &Header| loaded.address.wrapping_add(header.address);
+    let Some(part) = headers
+        .iter()
+        .find(|header| header.kind == LOAD && wanted.address.wrapping_sub(place(header)) < header.size)
+    else {
+        return 0;
+    };
+    let Some(table) = headers.iter().find(|header| header.kind == EH_FRAME) else { return 1 };
+    let pointer = |address: usize| address as *const c_void;
+    wanted.found = Some(Found {
+        flags: 0,
+        begin: pointer(place(part)),
+        end: pointer(place(part).wrapping_add(part.size)),
+        link_map: null(),
+        eh_frame: pointer(place(table)),
+        reserved: [0; 7],
+    });
+    1
+}
+
+/// `_dl_find_object`: writes the object that holds `address`, as far as an unwinder reads it; 0 if there is one.
+///
+/// # Safety
+///
+/// `result` is writable.
+unsafe extern "C" fn find_object(address: *const c_void, result: *mut Found) -> c_int {
+    let mut wanted = Wanted { address: address as usize, found: None };
+    // SAFETY: `look` takes this data.
+    unsafe { dl_iterate_phdr(look, (&raw mut wanted).cast()) };
+    let Some(found) = wanted.found else { return -1 };
+    // SAFETY: the caller's contract.
+    unsafe { result.write(found) };
+    0
+}
+
+global_asm!(
+    ".hidden __wrap__dl_find_object",
+    ".globl __wrap__dl_find_object",
+    ".type __wrap__dl_find_object,@function",
+    "__wrap__dl_find_object:",
+    "jmp {found}@PLT",
+    ".size __wrap__dl_find_object, . - __wrap__dl_find_object",
+    found = sym find_object,
+);
