@@ -23,6 +23,20 @@ use crate::references::References;
 use crate::whole;
 use library::Library;
 
+/// The licences of what an FMU is made of. The texts are those of the repository; the place is that of FMI 3.0, for both versions.
+const LICENCE: (&str, &str) = (
+    "documentation/licenses/license.txt",
+    concat!(
+        "The shared libraries in binaries/ are part of Punctual, which is licensed under the MIT licence or the Apache\n\
+         License 2.0, at your option; both follow. They are linked with crates of others, under these and like licences,\n\
+         whose texts are in LICENSES-THIRD-PARTY.txt of a release of Punctual. What the configuration in resources/ says\n\
+         is its author's.\n\n",
+        include_str!("../../LICENSE-MIT"),
+        "\n\n",
+        include_str!("../../LICENSE-APACHE"),
+    ),
+);
+
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
 
@@ -102,6 +116,8 @@ pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Er
         archive.add(TERMINALS, terminals).map_err(broken)?;
     }
     archive.add("documentation/index.html", page).map_err(broken)?;
+    let (place, text) = LICENCE;
+    archive.add(place, text).map_err(broken)?;
     archive.add(&format!("resources/{RESOURCE}"), canonical).map_err(broken)?;
     for library in libraries {
         for entry in library.entries(product.configuration.name(), fmi) {

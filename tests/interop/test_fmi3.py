@@ -52,6 +52,7 @@ def test_archives_hold_what_the_standard_names(tmp_path):
         "terminalsAndIcons/terminalsAndIcons.xml",
         "terminalsAndIcons/icon.png",
         "documentation/index.html",
+        "documentation/licenses/license.txt",
         "resources/configuration.toml",
         f"binaries/x86_64-linux/{identifier}.so",
     ]:

@@ -35,6 +35,7 @@ def test_archives_hold_what_importers_look_for(fmus):
             "modelDescription.xml",
             "model.png",
             "documentation/index.html",
+            "documentation/licenses/license.txt",
             "resources/configuration.toml",
             f"binaries/linux64/{identifier}.so",
         ]:
