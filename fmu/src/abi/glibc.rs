@@ -124,8 +124,10 @@ unsafe extern "C" {
 unsafe extern "C" fn look(loaded: *const Loaded, _size: usize, data: *mut c_void) -> c_int {
     const LOAD: u32 = 1;
     const EH_FRAME: u32 = 0x6474_e550;
-    // SAFETY: `dl_iterate_phdr` passes an object, and what it was given.
-    let (loaded, wanted) = unsafe { (&*loaded, &mut *data.cast::<Wanted>()) };
+    // SAFETY: `dl_iterate_phdr` passes an object.
+    let loaded = unsafe { &*loaded };
+    // SAFETY: it passes on what it was given.
+    let wanted = unsafe { &mut *data.cast::<Wanted>() };
     // SAFETY: so many headers it has.
     let headers = unsafe { std::slice::from_raw_parts(loaded.headers, usize::from(loaded.count)) };
     let place = |header: &Header| loaded.address.wrapping_add(header.address);
