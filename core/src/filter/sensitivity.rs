@@ -221,6 +221,16 @@ impl SafetyFilter {
         out.u = [0.0; MAX_INPUTS];
         out.barriers.clear();
         out.barriers.resize(self.slots.len(), BarrierDerivative::default());
+        // Whether they are needed or not, so that no later sample allocates.
+        let numbers = MAX_INPUTS + 5 * self.slots.len();
+        let lengths = [numbers, numbers, numbers, self.state_dim + self.input_dim, self.state_dim];
+        let [less, more] = &mut out.moved;
+        for (vec, len) in
+            [less, more, &mut out.sum, &mut out.axis, &mut out.scratch[0]].into_iter().zip(lengths)
+        {
+            vec.clear();
+            vec.reserve(len);
+        }
         let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
         if constant.contains(&self.report().status) {
             return Ok(None);
