@@ -65,6 +65,9 @@ pub struct Judgement {
     /// Time in s at which h ≥ 0 held first.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival: Option<f64>,
+    /// Time in s since which h ≥ 0 has held, where it does.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub since: Option<f64>,
     /// Time in s at which it was known that the deadline is missed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub late: Option<f64>,
@@ -228,6 +231,12 @@ impl Judge {
         if inside && self.seen.began.is_some() && self.seen.arrival.is_none() {
             let at = if was_inside == Some(false) { self.crossing(t, h) } else { t };
             self.seen.arrival = Some(at.max(self.seen.began.unwrap_or(at)));
+        }
+        if !inside {
+            self.seen.since = None;
+        } else if self.seen.since.is_none() {
+            self.seen.since =
+                self.seen.arrival.map(|_| if was_inside == Some(false) { self.crossing(t, h) } else { t });
         }
         if !inside && was_inside == Some(true) && self.seen.arrival.is_some() {
             let at = self.crossing(t, h);

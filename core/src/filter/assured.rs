@@ -39,6 +39,12 @@ const BISECTIONS: u32 = 3;
 /// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
 /// it again at the next, and the input jump between the two.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
+/// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too.
+const SHORTER: [f64; 3] = [0.9, 0.8, 0.6];
+/// The most points of a plan's way at which it is looked for its arrival, about.
+const MOST_POINTS: f64 = 4000.0;
+/// How much later than a plan arrives the deadline is that it keeps.
+const ARRIVED: [f64; 2] = [1.001, 1.02];
 /// The part of the time until the end of a plan after which it is tried again to be prolonged, where it was not.
 const SOONER: f64 = 0.25;
 /// The largest round-off of a time, as a part of the period.
@@ -309,6 +315,8 @@ pub struct AssuredFilter {
     period: f64,
     horizon: Option<f64>,
     policies: Vec<Policy>,
+    /// Pairs of barriers whose sets have no state in common.
+    apart: Vec<[usize; 2]>,
     /// The time in s for which the next input will be held, if somebody said so.
     expected: Option<f64>,
     commitment: Commitment,
@@ -517,6 +525,7 @@ impl AssuredFilter {
             period,
             horizon,
             policies: Vec::new(),
+            apart: Vec::new(),
             expected: None,
             commitment: Commitment::default(),
             looked: None,
@@ -532,6 +541,14 @@ impl AssuredFilter {
     #[must_use]
     pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
         self.policies.push(Box::new(policy));
+        self
+    }
+
+    /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
+    /// once is then refused without a search ([`Failure::Apart`]). Nothing else rests on it.
+    #[must_use]
+    pub fn apart(mut self, pairs: Vec<[usize; 2]>) -> Self {
+        self.apart = pairs;
         self
     }
 
@@ -583,7 +600,18 @@ impl AssuredFilter {
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
-        let (mut at, mut x, mut way) = (t, self.rows.state(x), Vec::new());
+        self.along(witness, t, &self.rows.state(x), step)
+    }
+
+    /// That from the state `x` of the filter inside.
+    fn along(
+        &self,
+        witness: &Witness,
+        t: f64,
+        x: &[f64],
+        step: f64,
+    ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
+        let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
         let Some(plant) = self.models().next() else { return way };
         for (end, u) in &witness.inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
@@ -1085,25 +1113,93 @@ impl AssuredFilter {
     pub fn foresee(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
         let x = &self.rows.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
-        self.first(promises, (t, self.period), x, &[]).map(|first| first.plan.witness)
+        self.first(promises, (t, self.period), x, &[], &SHORTER).map(|first| first.plan.witness)
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
-    /// twentieth, and that plan. None is looked for beyond `longest` times the deadlines.
+    /// twentieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
+    /// deadlines, nor where one would come after the end of its barrier.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        least_factor(longest, self.foresee(t, x, 1.0).ok(), |factor| self.foresee(t, x, factor).ok())
+        let x = &self.rows.state(x)[..];
+        let find = |factor: f64, shorter: &[f64]| {
+            let promises = self.promises(t, x, |_| factor);
+            let First { promises, plan, .. } =
+                self.first(promises, (t, self.period), x, &[], shorter).ok()?;
+            Some((factor * self.arrival(&promises, &plan, t, x), plan.witness))
+        };
+        least_factor(self.longest(longest, |_| true), find(1.0, &SHORTER), |factor| find(factor, &[]))
+    }
+
+    /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
+    fn longest(&self, longest: f64, scales: impl Fn(&BarrierSlot) -> bool) -> f64 {
+        let ends = self.filter().slots.iter().filter(|slot| scales(slot)).filter_map(|slot| {
+            match (slot.end, slot.promise.settings().deadline) {
+                (End::At(end), Some(deadline)) => Some(end / deadline),
+                _ => None,
+            }
+        });
+        ends.fold(longest, f64::min)
+    }
+
+    /// `promises`, whose deadlines are `part` of the time from `t` that they were; what begins by itself stays.
+    fn sooner(&self, promises: &[Option<Promise>], t: f64, part: f64) -> Vec<Option<Promise>> {
+        let sooner = |(promise, slot): (&Option<Promise>, &BarrierSlot)| {
+            let mut promise = (*promise)?;
+            if promise.from > t && slot.begin == Begin::AtOnce {
+                promise.from = t + part * (promise.from - t);
+                if slot.end == End::OnArrival {
+                    promise.until = promise.from + self.period;
+                }
+            }
+            Some(promise)
+        };
+        promises.iter().zip(&self.filter().slots).map(sooner).collect()
+    }
+
+    /// The part of the time until their deadlines that `plan`, which keeps `promises` from `x` at `t`, needs for them all, at most 1.
+    fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
+        let end = plan.witness.inputs.last().map_or(t, |(end, _)| *end);
+        let way = self.along(&plan.witness, t, x, self.period.max((end - t) / MOST_POINTS));
+        let mut part = 0.0_f64;
+        for ((promise, slot), model) in promises.iter().zip(&self.filter().slots).zip(self.models()) {
+            let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {
+                continue;
+            };
+            let least = promise.margin.max(promise.reserve);
+            let before = way.iter().take_while(|(at, ..)| *at < promise.from);
+            let outside = before.enumerate().filter(|(_, (at, x, _))| {
+                let h = model.value(*at, x);
+                h.is_nan() || h < least
+            });
+            let arrival = outside.last().and_then(|(k, _)| way.get(k + 1)).map_or(t, |(at, ..)| *at);
+            part = part.max((arrival - t) / (promise.from - t));
+        }
+        let keeps = |part: f64| {
+            let sooner = self.sooner(promises, t, part);
+            let keeps = |planner: &Planner<'_>| match planner.keeps(plan, t, x) {
+                true => Ok(()),
+                false => Err(Failure::Nothing),
+            };
+            self.planned(&sooner, (t, self.period), &[], keeps).is_ok()
+        };
+        ARRIVED
+            .into_iter()
+            .map(|late| late * part)
+            .find(|part| *part > 0.0 && *part < 1.0 && keeps(*part))
+            .unwrap_or(1.0)
     }
 
     /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
     /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one. Whether the plan was made here.
     fn decide(&mut self, t: f64, hold: f64, x: &[f64], u: &[f64]) -> bool {
-        let search = |promises| self.first(promises, (t, hold), x, u);
+        let search = |promises, shorter: &[f64]| self.first(promises, (t, hold), x, u, shorter);
         let promises = self.promises(t, x, |_| 1.0);
-        let mut found = search(promises.clone()).map(|first| (1.0, first));
+        let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter().slots.iter().any(yields) {
-            let later = least_factor(Self::LONGEST, None, |factor| {
-                search(self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 })).ok()
+            let later = least_factor(self.longest(Self::LONGEST, yields), None, |factor| {
+                let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+                search(promises, &[]).ok().map(|first| (factor, first))
             });
             found = later.map_or(found, Ok);
         }
@@ -1124,20 +1220,33 @@ impl AssuredFilter {
         }
     }
 
-    /// The first plan for `promises`, with their reserve, else without, else the one at hand.
+    /// The first plan for `promises`, with their reserve, else without, else for deadlines that are one of the parts `shorter`
+    /// of theirs, else the one at hand.
     fn first(
         &self,
         mut promises: Vec<Option<Promise>>,
         at: (f64, f64),
         x: &[f64],
         u: &[f64],
+        shorter: &[f64],
     ) -> Result<First, Failure> {
+        if let Some(failure) = self.contradiction(&promises, at.0) {
+            return Err(failure);
+        }
         let search =
             |promises: &[Option<Promise>]| self.planned(promises, at, u, |planner| planner.search(at.0, x));
         let mut found = search(&promises);
         if found.is_err() && promises.iter().flatten().any(|promise| promise.reserve > promise.margin) {
             promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
             found = search(&promises);
+        }
+        if let Err(Failure::Broken { .. } | Failure::Unsteady) = found
+            && !self.is_ruled_out(&promises, at.0, x)
+        {
+            // What keeps an earlier deadline keeps a later one, though another search may find it.
+            let mut earlier =
+                shorter.iter().filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok());
+            found = earlier.find(|plan| !plan.is_finite()).map_or(found, Ok);
         }
         let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
         let old = &self.commitment.plan;
@@ -1156,6 +1265,39 @@ impl AssuredFilter {
             }
             _ => Err(failure),
         }
+    }
+
+    /// Two promises that no state keeps at a time at which both are in force.
+    fn contradiction(&self, promises: &[Option<Promise>], t: f64) -> Option<Failure> {
+        let slots = &self.filter().slots;
+        self.apart.iter().find_map(|&[a, b]| {
+            let (p, q) = (promises.get(a).copied().flatten()?, promises.get(b).copied().flatten()?);
+            // What is let go on arrival has to be reached at some time until its deadline, and nobody says when.
+            let [of_p, of_q] = [(a, p), (b, q)].map(|(i, promise)| match slots[i].end {
+                End::OnArrival => (t, promise.from + self.period),
+                _ => (promise.from, promise.until),
+            });
+            let is_apart = match [a, b].map(|i| slots[i].end == End::OnArrival) {
+                [true, true] => false,
+                [true, false] => q.from <= t && q.until >= of_p.1,
+                [false, true] => p.from <= t && p.until >= of_q.1,
+                [false, false] => of_p.0.max(of_q.0) < of_p.1.min(of_q.1),
+            };
+            let contains = |i: usize, promise: Promise| {
+                promise.from <= t && slots[i].promise.settings().deadline.is_some()
+            };
+            let [first, second] = if contains(b, q) && !contains(a, p) { [b, a] } else { [a, b] };
+            let contained = contains(first, if first == a { p } else { q });
+            is_apart.then_some(Failure::Apart { barriers: [first, second], contained })
+        })
+    }
+
+    /// Whether it is certain that no input keeps one of the deadlines of `promises` from `x` at `t`.
+    fn is_ruled_out(&self, promises: &[Option<Promise>], t: f64, x: &[f64]) -> bool {
+        promises.iter().enumerate().any(|(i, promise)| {
+            let after = promise.filter(|p| p.from > t && p.from.is_finite()).map(|p| p.from - t);
+            after.is_some_and(|after| self.filter().is_ruled_out(i, t, x, after).unwrap_or(false))
+        })
     }
 
     /// Starts the rows anew at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
@@ -1486,17 +1628,25 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
 }
 
 /// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
-/// finds with 1. What is found with a factor is taken to be found with every larger one.
-fn least_factor<T>(longest: f64, mut found: Option<T>, find: impl Fn(f64) -> Option<T>) -> Option<(f64, T)> {
+/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one.
+fn least_factor<T>(
+    longest: f64,
+    mut found: Option<(f64, T)>,
+    find: impl Fn(f64) -> Option<(f64, T)>,
+) -> Option<(f64, T)> {
     const FINE: f64 = 1.05;
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
     // Twice as long until there is one, or half as long until there is none.
     let longest = longest.min(MOST);
     let (mut low, mut high) = (1.0, 1.0);
-    if found.is_some() {
-        while let Some(sooner) = find(0.5 * high).filter(|_| high > LEAST) {
-            (found, high) = (Some(sooner), 0.5 * high);
+    if let Some((factor, _)) = &found {
+        high = factor.min(1.0);
+        while high > LEAST
+            && let Some(sooner) = find(0.5 * high)
+        {
+            high = sooner.0.min(0.5 * high);
+            found = Some(sooner);
         }
         low = 0.5 * high;
     }
@@ -1504,11 +1654,11 @@ fn least_factor<T>(longest: f64, mut found: Option<T>, find: impl Fn(f64) -> Opt
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let mut found = found?;
+    let (mut high, mut found) = found?;
     while high > FINE * low {
         let middle = elementary::sqrt(low * high);
         match find(middle) {
-            Some(sooner) => (found, high) = (sooner, middle),
+            Some(sooner) => (high, found) = sooner,
             None => low = middle,
         }
     }

@@ -176,6 +176,13 @@ pub enum Failure {
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
+    /// Two requirements are in force at the same time, and no state meets both: no plan can be there.
+    Apart {
+        /// The numbers of their barriers.
+        barriers: [usize; 2],
+        /// Whether the first one has a deadline that is still to come, but contained the state, so that it is kept from there on.
+        contained: bool,
+    },
     /// A requirement began while no plan was followed, so nobody saw whether it was met.
     Missed {
         /// The number of its barrier.
@@ -635,7 +642,8 @@ impl<'a> Walk<'a> {
         let is_sharp =
             slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
         if least < needed {
-            return bound.min(least);
+            // By what is missing, and not by what a long piece leaves open.
+            return least;
         }
         if bound >= needed && is_sharp || halvings == 0 {
             // Whatever bends h between these instants: by what it takes on the piece, or by Taylor's theorem.

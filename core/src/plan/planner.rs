@@ -15,8 +15,10 @@ use crate::{MAX_INPUTS, elementary};
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
-/// deadlines that leave much time, where long holds are too coarse.
+/// deadlines that leave much time, where long holds are too coarse. Last, where there is a deadline, for one that takes many
+/// times as long as that to come to rest.
 const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
+const SLOW: (f64, [usize; 2]) = (1.0, [4, 40]);
 /// The periods of a hold where there is no deadline; and then, since how long a plant takes to stop has nothing to do with the
 /// period, those of longer ones on the first grid.
 const UNDATED: usize = 5;
@@ -231,11 +233,13 @@ impl<'a> Planner<'a> {
 
     /// Searches for a plan that ends at rest, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
-        // What a trial fails at says more than that another grid has no trials.
-        let mut failure: Option<Failure> = None;
+        // What the nearest trial fails at says more than another's, or than that another grid has no trials.
+        let (mut failure, mut nearest) = (None, f64::INFINITY);
         let is_dated = self.last(t) > t || horizon.is_some();
         let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
-        for ((part, holds), undated) in GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(longer) {
+        let slow = Some((SLOW, UNDATED)).filter(|_| is_dated && horizon.is_none());
+        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer);
+        for ((part, holds), undated) in grids {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
                     true => ROOM * r.model.value(t, x).abs(),
@@ -317,26 +321,24 @@ impl<'a> Planner<'a> {
             });
             match found {
                 Ok(plan) => return Ok(plan),
-                // Holds that are too long say little: what came nearer is told.
-                Err(Some(Failure::Broken { slack, .. }))
-                    if self.last(t) <= t
-                        && matches!(failure, Some(Failure::Broken { slack: nearer, .. }) if nearer > slack) =>
-                    {}
-                Err(found) => failure = found.or(failure),
+                Err(Some((missing, found))) if missing < nearest || failure.is_none() => {
+                    (failure, nearest) = (Some(found), missing);
+                }
+                Err(_) => {}
             }
         }
         Err(failure.unwrap_or(Failure::NoRest))
     }
 
-    /// The plan that one of `descents` leads to; or what the nearest fails at, where one was worth the check.
+    /// The plan that one of `descents` leads to; or what the nearest misses, as [`Trajectory::violation`], and what it fails at.
     fn descend(
         &self,
         search: &Search<'_>,
         mut descents: Vec<Descent>,
         rounds: &[(usize, u32)],
         ending: &Ending<'_>,
-    ) -> Result<Plan, Option<Failure>> {
-        let (mut failure, mut search) = (None, search.clone());
+    ) -> Result<Plan, Option<(f64, Failure)>> {
+        let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, search.clone());
         // A few steps show which guesses lead somewhere.
         for &(most, iterations) in rounds {
             // What the user thinks of is never dropped.
@@ -360,8 +362,9 @@ impl<'a> Planner<'a> {
                         Ok(plan) => return Ok(plan),
                         Err(found) => found,
                     };
-                    if violation < nearest {
-                        (nearest, failure) = (violation, Some(found));
+                    nearest = nearest.min(violation);
+                    if checked.is_none_or(|(least, _)| violation < least) {
+                        checked = Some((violation, found));
                     }
                     match found {
                         Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
@@ -376,7 +379,31 @@ impl<'a> Planner<'a> {
                 }
             }
         }
-        Err(failure)
+        let missed = descents.iter().map(|descent| &descent.best).filter(|best| best.violation > WORTH);
+        let missed = missed.filter_map(|best| Some((best.violation, self.missed(search.times, best)?)));
+        // A trial that is far off was checked too, up to the first thing that it breaks: what it misses most says more.
+        Err(missed.chain(checked).min_by(|a, b| a.0.total_cmp(&b.0)))
+    }
+
+    /// What `found` misses most at its nodes, in parts of its size.
+    fn missed(&self, times: &[f64], found: &Trajectory) -> Option<Failure> {
+        let mut most = 0.0;
+        let mut failure = None;
+        for requirement in self.requirements {
+            let h: Vec<f64> =
+                times.iter().zip(&found.states).map(|(t, x)| requirement.model.value(*t, x)).collect();
+            let size = h.iter().fold(f64::MIN_POSITIVE, |size: f64, h| size.max(h.abs()));
+            for (k, h) in h.iter().enumerate().skip(1) {
+                let next = times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - times[k]));
+                let slack = h - requirement.margin;
+                if requirement.from < next && times[k] < requirement.until && -slack / size > most {
+                    let (barrier, time) = (requirement.barrier, requirement.from.max(times[k]));
+                    most = -slack / size;
+                    failure = Some(Failure::Broken { barrier, time, slack });
+                }
+            }
+        }
+        failure
     }
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
@@ -453,6 +480,11 @@ impl<'a> Planner<'a> {
             }
         }
         Err(failure)
+    }
+
+    /// Whether `plan`, found from `x` at `t` for other requirements, keeps these as strictly as a new one has to.
+    pub fn keeps(&self, plan: &Plan, t: f64, x: &[f64]) -> bool {
+        self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true).is_ok()
     }
 
     /// A witness that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
