@@ -7,6 +7,7 @@ use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
 use punctual_reference::plants::{PointMass, Signal, Unicycle};
 
+use super::filter::UNBOUNDED;
 use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection};
 
 /// A barrier of a configuration, and the filter that it goes into.
@@ -60,13 +61,24 @@ impl Adding<'_> {
             (Uneven::Taken | Uneven::Told(_), Some(n)) => n,
             _ => found.clone().require(None)?,
         };
-        if let Uneven::Told(list) = &mut self.uneven {
-            let later = match found {
-                // The row is right, but other inputs may come in later.
-                RelativeDegree::Uniform(_) => driven().filter(|d| matches!(d, RelativeDegree::Mixed(_))),
-                _ => Some(found),
-            };
-            list.extend(later.filter(|later| later.least() == Some(n)).map(|later| (self.index, later)));
+        // The row is right, but other inputs may come in later.
+        let later = || match found {
+            RelativeDegree::Uniform(_) => driven().filter(|d| matches!(d, RelativeDegree::Mixed(_))),
+            _ => Some(found),
+        };
+        match &mut self.uneven {
+            Uneven::Told(list) => {
+                list.extend(
+                    later().filter(|later| later.least() == Some(n)).map(|later| (self.index, later)),
+                );
+            }
+            // What no row limits has to be limited by bounds.
+            Uneven::Refused if self.configuration.has_free_input() => {
+                if let Some(later) = later().filter(|later| self.configuration.frees_later(later, n)) {
+                    later.require(None)?;
+                }
+            }
+            Uneven::Refused | Uneven::Taken => {}
         }
         Ok(n)
     }
@@ -203,6 +215,27 @@ impl Adding<'_> {
 }
 
 impl FilterConfiguration {
+    /// Whether input `i` lacks a bound.
+    fn is_free(&self, i: usize) -> bool {
+        let name = self.plant.inputs().into_iter().nth(i).map(|input| input.name);
+        let bounds = name.and_then(|name| self.bounds.get(&name).copied());
+        bounds.is_none_or(|[min, max]| min <= -UNBOUNDED || max >= UNBOUNDED)
+    }
+
+    fn has_free_input(&self) -> bool {
+        (0..self.plant.inputs().len()).any(|i| self.is_free(i))
+    }
+
+    /// Whether an input without bounds enters h later than the row's derivative `n`, by the finding `degree`.
+    fn frees_later(&self, degree: &RelativeDegree, n: usize) -> bool {
+        let RelativeDegree::Mixed(orders) = degree else { return false };
+        degree.least() == Some(n)
+            && orders
+                .iter()
+                .enumerate()
+                .any(|(i, order)| order.is_some_and(|order| order > n) && self.is_free(i))
+    }
+
     /// The core's refusal of barrier `index`, in the terms of the configuration.
     pub(super) fn refused(&self, index: usize, error: &Error) -> ConfigurationError {
         if let Some(found) = error.relative_degree() {
