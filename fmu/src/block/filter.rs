@@ -225,6 +225,7 @@ impl Block for FilterBlock {
         }
         (!stands(standing)).then(|| {
             let why = match failure {
+                Some(failure) if standing == Standing::Refused => Some(self.configuration.refusal(failure)),
                 Some(failure) => Some(self.configuration.failure(failure)),
                 None => self.configuration.unaccounted(),
             };

@@ -678,6 +678,16 @@ impl FilterConfiguration {
             Failure::Unsteady => "the plant is so unstable on the way that a deviation too small to measure grows until the plan \
                                   is lost; wider bounds or a start farther from where they end would hold it"
                 .to_owned(),
+            Failure::Apart { barriers, contained } => {
+                let apart = self.apart_in_words(barriers).unwrap_or_default();
+                let name = self.barrier.get(barriers[0]).map_or("", |section| &section.name);
+                match contained {
+                    true => format!(
+                        "{apart}; and {name} contains the start, so that it is to be kept from there on: did you mean `begin`?"
+                    ),
+                    false => format!("{apart}, and both are to be kept at the same time"),
+                }
+            }
             Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
             Failure::TooLong => {
                 "there are too many samples until the deadline, or too long a step".to_owned()

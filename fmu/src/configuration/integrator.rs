@@ -232,6 +232,7 @@ impl FilterConfiguration {
             Some(barrier) => format!("{barrier} {} (`plan_horizon`)", e.message()),
             None => e.to_string(),
         })?;
+        let assured = assured.apart(self.apart());
         let Some(policy) = &self.policy else { return Ok(assured) };
         let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
         let functions = RefCell::new(functions);

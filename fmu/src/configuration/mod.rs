@@ -6,6 +6,7 @@
 
 mod adding;
 mod alone;
+mod apart;
 mod barrier;
 mod controller;
 mod external;

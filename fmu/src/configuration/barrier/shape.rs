@@ -353,6 +353,11 @@ impl Shape {
 }
 
 impl Point {
+    /// Whether it stays where it is.
+    pub(in super::super) fn is_still(&self) -> bool {
+        self.velocity == [0.0; 2] && !self.centre_input
+    }
+
     /// A disc around the point, on a plant with the states `on`; a centre that is an input is a state behind
     /// these.
     fn disc(&self, radius: f64, smoothing: Automatic, on: &[Signal]) -> Result<DistanceDisc, Error> {
