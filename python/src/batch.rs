@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::loading::{self, Interface, Signals, configuration, refused};
-use crate::sample::Loop;
+use crate::sample::{Loop, forwards};
 use crate::saved::{self, Reduced, Saved};
 use crate::{arrays, pool};
 
@@ -114,7 +114,8 @@ impl FilterBatch {
     /// - `u_ref`: the inputs wanted, of shape (n, inputs), likewise. Default: zeros.
     ///
     /// Returns `u` of shape (n, inputs), the numbers of the statuses (`punctual.Status`) of shape (n,) and `h` of shape
-    /// (n, barriers). Raises `TypeError` or `ValueError` for an array of another type or shape.
+    /// (n, barriers). Raises `TypeError` or `ValueError` for an array of another type or shape, and for a row's time before that of
+    /// its last step, before any row is computed.
     #[pyo3(signature = (t, x, u_ref=None))]
     fn step<'py>(
         &mut self,
@@ -132,6 +133,9 @@ impl FilterBatch {
                 arrays::numbers(u_ref, "u_ref", &[n, inputs.len()], &inputs.names, &mut self.u_ref)?;
             }
             None => self.u_ref.fill(0.0),
+        }
+        for (row, (memory, t)) in self.memories.iter().zip(&self.t).enumerate() {
+            forwards(memory.filter.time, *t, Some(row))?;
         }
         let threads = pool::threads(py)?;
         let most = PARTS_PER_THREAD * threads.current_num_threads();

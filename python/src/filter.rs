@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use punctual_core::filter::Standing;
 use punctual_fmu::LoopState;
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
@@ -11,7 +12,7 @@ use crate::arrays;
 use crate::loading::{self, Interface, configuration, refused};
 use crate::plan::Plan;
 use crate::report::Step;
-use crate::sample::Loop;
+use crate::sample::{Loop, forwards};
 use crate::saved::{self, Reduced, Saved};
 
 /// A safety filter in this process. It computes the samples of the filter FMU of the same configuration, with the
@@ -97,8 +98,8 @@ impl Filter {
     /// - `x`: the state in the order of `states`, an array or a sequence of real numbers. Those of float64 are the fastest.
     /// - `u_ref`: the input wanted, in the order of `inputs`, likewise. Default: zeros.
     ///
-    /// Raises `TypeError` or `ValueError` for an array of another type or shape. Numerical outcomes (infeasible,
-    /// not a number) are statuses.
+    /// Raises `TypeError` or `ValueError` for an array of another type or shape, and for a time before that of the last step; the
+    /// same time repeats the sample. Numerical outcomes (infeasible, not a number) are statuses.
     #[pyo3(signature = (t, x, u_ref=None))]
     fn step(
         &mut self,
@@ -117,6 +118,7 @@ impl Filter {
             None => self.u_ref.fill(0.0),
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
+        forwards(own.filter().filter().state().time, t, None)?;
         own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
         if t.is_finite() && self.x.iter().all(|x| x.is_finite()) {
             self.seen.0 = t;
@@ -136,8 +138,11 @@ impl Filter {
     #[getter]
     fn refusal(&mut self) -> Option<String> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let (_, failure) = own.filter().standing()?;
-        failure.map(|failure| self.configuration.failure(failure))
+        let (standing, failure) = own.filter().standing()?;
+        failure.map(|failure| match standing {
+            Standing::Refused => self.configuration.refusal(failure),
+            _ => self.configuration.failure(failure),
+        })
     }
 
     /// Starts every deadline anew at the next step with a valid state, which decides anew on the promise. Where it finds no

@@ -3,9 +3,28 @@
 use punctual_core::filter::Report;
 use punctual_fmu::configuration::FilterConfiguration;
 use punctual_fmu::{FilterLoop, LoopState};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::loading::refused;
+
+/// Refuses a time `t` before that of the `last` sample; `row` is that of a batch.
+///
+/// # Errors
+///
+/// `ValueError`, with both times.
+pub(crate) fn forwards(last: Option<f64>, t: f64, row: Option<usize>) -> PyResult<()> {
+    match last {
+        Some(last) if t < last => {
+            let row = row.map(|row| format!(" in row {row}")).unwrap_or_default();
+            Err(PyValueError::new_err(format!(
+                "t: is {t} s{row}, must be at least {last} s, the time of the step before; to go back in time, call rearm() or \
+                 reset() first"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {

@@ -74,6 +74,27 @@ def test_deadlines_start_anew():
     assert own.step(0.0, x).u.tolist() == first.u.tolist()
 
 
+def test_time_does_not_run_backwards():
+    own, x = punctual.Filter(FILTER), np.array([0.0, 0.0, 0.3, 2.0])
+    first = own.step(1.25, x)
+    assert own.step(1.25, x).u.tolist() == first.u.tolist(), "a repeat of the sample"
+    wrong = r"t: is 0\.5 s, must be at least 1\.25 s, the time of the step before; .* call rearm\(\) or reset\(\)"
+    with pytest.raises(ValueError, match=wrong):
+        own.step(0.5, x)
+    # What was refused left nothing behind.
+    assert own.step(1.5, x).barriers["goal"].time_left == 4.75
+    own.rearm()
+    assert own.step(0.5, x).barriers["goal"].time_left == 5.0
+    own.reset()
+    assert own.step(0.0, x).barriers["goal"].time_left == 5.0
+    batch, rows = punctual.FilterBatch(FILTER, 3), np.tile(x, (3, 1))
+    batch.step([1.0, 2.0, 3.0], rows)
+    with pytest.raises(ValueError, match=r"t: is 1\.5 s in row 1, must be at least 2 s"):
+        batch.step([1.5, 1.5, 3.5], rows)
+    batch.rearm([False, True, False])
+    batch.step([1.0, 1.5, 3.5], rows)
+
+
 def test_a_filter_that_is_armed_later(fmus, tmp_path):
     late = FILTER | {"arm_after": 0.5}
     fmu = punctual.build(late, tmp_path / "late.fmu")
@@ -229,7 +250,7 @@ def test_what_is_not_promised_is_said():
     own = punctual.Filter(assured(2.0))
     step = own.step(0.0, [0.0, 0.0, 1.0, 0.0])
     assert step.assurance is punctual.Assurance.REFUSED and not step.barriers["goal"].guaranteed
-    assert own.plan is None and own.refusal.startswith("goal is not met at 2.0")
+    assert own.plan is None and own.refusal.startswith("by the nearest way tried, goal is not met at 2.0")
     assert punctual.Filter(FILTER).step(0.0, [0.0, 0.0, 1.0, 0.0]).assurance is None
     with pytest.raises(punctual.Error, match='assurance: is "on", must be "off": actuation_delay: is not 0'):
         punctual.Filter(assured(8.0) | {"actuation_delay": 0.01})
