@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use punctual_core::elementary;
-use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal};
+use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
 use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
@@ -108,11 +108,14 @@ struct BarrierReport {
     method: &'static str,
     /// In s; `null` for a barrier without one, that is to be kept.
     deadline: Option<f64>,
-    /// In 1/s; `null` for the repeated root without a start, where it is chosen.
+    /// In 1/s; `null` without a start where it is chosen there.
     rate: Option<f64>,
     rate_times_deadline: Option<f64>,
     /// In 1/s; `null` where it is chosen at the start.
     stay_rate: Option<f64>,
+    /// Whether the rate with which the set is kept is chosen anew at every sample; it is that of the first one then.
+    #[serde(skip)]
+    chosen: bool,
     margin: f64,
     start: Option<StartReport>,
 }
@@ -361,6 +364,8 @@ fn filter(
     // The first step from the start, then the closed loops.
     let status = start.as_deref().map(|x0| first_sample(&mut filter, c, x0)).transpose()?;
     let filter = filter.filter();
+    // Rates and methods are those of the rows, of which there are no more than of the closed loop below.
+    let rows = first_rows(c, start.as_deref())?;
     // A filter without a model is not simulated.
     let simulated = start.as_deref().filter(|_| c.external().is_none());
     let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
@@ -368,7 +373,7 @@ fn filter(
     let damped =
         simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
-    let witness = simulated.map(|x0| witness::find(c, x0, out)).transpose()?.flatten();
+    let witness = simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Vec::new();
     let runs_for = experiment.stop_time - experiment.start_time;
@@ -382,6 +387,12 @@ fn filter(
     if arm_after >= runs_for {
         warnings.push("the experiment stops before the filter is armed".to_owned());
     }
+    if closed_loop.is_some() {
+        warnings.extend(of_the_run(c));
+    }
+    if !c.is_assured() {
+        warnings.extend(in_vain(c));
+    }
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let (uneven, inputs) = (c.uneven(), c.plant.inputs());
     let mut barriers = Vec::new();
@@ -392,20 +403,21 @@ fn filter(
         let deadline = settings.deadline.unwrap_or(f64::INFINITY);
         let default_rate = settings.deadline.map(|deadline| BarrierSettings::default_rate(deadline, step));
         let begun = start.is_some();
-        let promise = begun.then(|| filter.state().barriers[i]);
-        let approaching = begun && filter.report().barriers[i].phase == Phase::Approach;
+        let promise = begun.then(|| rows.state().barriers[i]);
+        let approaching = begun && rows.report().barriers[i].phase == Phase::Approach;
         let (method, rate) = match settings.method {
             Method::ReferenceProfile if settings.rates.is_some() => ("reference profile, rates given", None),
             Method::ReferenceProfile if deadline.is_infinite() => {
                 ("kept inside", settings.rate.or(promise.map(|p| p.stay_rate)))
             }
             Method::ReferenceProfile => ("reference profile", settings.rate.or(default_rate)),
-            Method::RepeatedRoot => ("repeated root", approaching.then(|| filter.state().barriers[i].rate)),
+            Method::RepeatedRoot => ("repeated root", approaching.then(|| rows.state().barriers[i].rate)),
             Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(deadline))),
             _ => ("another method", None),
         };
-        let chosen = promise.filter(|_| deadline.is_infinite()).map(|p| p.stay_rate);
-        let stay_rate = settings.stay_rate.or(settings.rate).or(default_rate).or(chosen);
+        let given = settings.stay_rate.or(settings.rate);
+        let kept = promise.filter(|p| p.phase == Phase::Stay || deadline.is_infinite()).map(|p| p.stay_rate);
+        let stay_rate = given.or(kept).or(default_rate);
         let margin = if begun { filter.report().barriers[i].margin } else { settings.margin };
         let mut warn = |text: String| warnings.push(format!("{name}: {text}"));
         // Warnings on the settings.
@@ -429,34 +441,16 @@ fn filter(
             warn("the experiment stops before the deadline".to_owned());
         }
         let uneven = uneven.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
-        if uneven.is_some() && !c.is_assured() {
-            let reason = c.unassured();
-            warn(format!(
-                "inputs enter h at different orders, and without plans only the first is used: {reason}"
-            ));
-        }
-        if let Some(reason) = filter.refusal(i) {
-            warn(match reason {
-                Refusal::NoAdmissibleRate(_) => {
-                    format!("{reason}; the stay rate is used instead, without a promise")
-                }
-                Refusal::Profile(_) => format!("{reason}; the Hermite profile is used instead"),
-                _ => reason.to_string(),
-            });
-        }
-        if let Some(rate) = rate.filter(|rate| *rate < 0.0) {
-            warn(format!(
-                "the repeated root is negative: errors grow by a factor of {} until the deadline",
-                number(elementary::exp(-rate * deadline))
-            ));
-        }
+        of_the_method(c, &rows, i, uneven.is_some()).into_iter().for_each(&mut warn);
         // Findings from the start.
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
                 let plans = witness.as_ref().filter(|_| c.is_assured());
                 let plans = plans.map(|w| (w.keeps(name), w.soonest(name)));
-                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plans)?)
+                let run = closed_loop.as_ref().filter(|run| !run.by_rows && c.run.simulated.is_none());
+                let arrival = run.and_then(|run| run.arrival(i, experiment.start_time));
+                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plans, arrival)?)
             }
             _ => None,
         };
@@ -484,6 +478,13 @@ fn filter(
         } else if start.as_ref().is_some_and(|s| !s.promised) {
             warn("not to be relied on from this start".to_owned());
         }
+        let refused = start.as_ref().is_some_and(|s| s.inside && !s.promised && deadline.is_finite());
+        if refused && section.begin.is_none() && section.after.is_none() && c.barrier.len() > 1 {
+            warn(
+                "contains the start, so that it is to be kept from there on, and not from its deadline: did you mean `begin`?"
+                    .to_owned(),
+            );
+        }
         barriers.push(BarrierReport {
             name: name.clone(),
             shape: section.shape.name(),
@@ -495,6 +496,7 @@ fn filter(
             rate,
             rate_times_deadline: rate.zip(settings.deadline).map(|(rate, deadline)| rate * deadline),
             stay_rate,
+            chosen: given.is_none() && kept.is_some(),
             margin,
             start,
         });
@@ -516,6 +518,96 @@ fn filter(
         map: None,
         effort: None,
     })
+}
+
+/// The filter of the rows, after its first sample from the start if there is one.
+fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<SafetyFilter, Error> {
+    let mut rows = FilterLoop::Plain(c.build()?);
+    start.map(|x0| first_sample(&mut rows, c, x0)).transpose()?;
+    match rows {
+        FilterLoop::Plain(rows) => Ok(rows),
+        // It is made so above.
+        _ => Ok(c.build()?),
+    }
+}
+
+/// Warnings on the method of barrier `i` from the first sample of `rows`; `uneven`: its inputs enter at different orders.
+fn of_the_method(c: &FilterConfiguration, rows: &SafetyFilter, i: usize, uneven: bool) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if uneven && !c.is_assured() {
+        let reason = c.unassured();
+        warnings.push(format!(
+            "inputs enter h at different orders, and without plans only the first is used: {reason}"
+        ));
+    }
+    warnings.extend(rows.refusal(i).map(|reason| match reason {
+        Refusal::NoAdmissibleRate(_) => format!("{reason}; the stay rate is used instead, without a promise"),
+        Refusal::Profile(_) => format!("{reason}; the Hermite profile is used instead"),
+        _ => reason.to_string(),
+    }));
+    let (promise, section) = (rows.state().barriers[i], &c.barrier[i]);
+    let is_root = section.settings().is_ok_and(|settings| settings.method == Method::RepeatedRoot);
+    let is_used = is_root && rows.report().barriers[i].phase == Phase::Approach && rows.refusal(i).is_none();
+    if let Some(deadline) = section.deadline.filter(|_| is_used && promise.rate < 0.0) {
+        warnings.push(format!(
+            "the repeated root is negative: errors grow by a factor of {} until the deadline",
+            number(elementary::exp(-promise.rate * deadline))
+        ));
+    }
+    warnings
+}
+
+/// What a closed loop of `check` leaves out of the run that the file describes.
+fn of_the_run(c: &FilterConfiguration) -> Vec<String> {
+    let simulated = c.run.simulated.as_ref().map(|_| match closed_loop::simulated(c) {
+        Some(_) => "the closed loop has the plant in `simulated`; plans and deadlines are those of the filter's own model",
+        None => {
+            "the closed loop has the filter's own model, since `simulated` has other states or inputs, and not the file's u_ref; \
+             `punctual run` has both"
+        }
+    });
+    let disturbed =
+        c.run.disturbance.as_ref().map(|_| "the closed loop leaves `disturbance` out; `punctual run` has it");
+    simulated.into_iter().chain(disturbed).map(str::to_owned).collect()
+}
+
+/// Barriers that are both to be kept for ever, though no state is in both sets.
+fn in_vain(c: &FilterConfiguration) -> Vec<String> {
+    let is_kept = |i: &usize| {
+        let b = &c.barrier[*i];
+        b.penalty.is_none() && b.end.is_none() && !b.until_arrival
+    };
+    let pairs = c.apart().into_iter().filter(|pair| pair.iter().all(is_kept));
+    pairs
+        .filter_map(|pair| c.apart_in_words(pair))
+        .map(|words| format!("{words}, and neither is ever let go"))
+        .collect()
+}
+
+/// What a run of the file should know of its filter beforehand, with the barrier's name before it; `refused` tells that the
+/// promise was, and then by when there is one.
+pub(super) fn known(c: &FilterConfiguration, refused: bool) -> Result<Vec<String>, Error> {
+    let mut x0 = vec![0.0; c.plant.states().len()];
+    let (plant, _) = c.alone()?;
+    x0.iter_mut().zip(c.plant.states()).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
+    x0.extend(c.barrier_inputs().iter().map(|input| input.start));
+    let c = &c.clone().armed_at_once();
+    let (uneven, mut known) = (c.uneven(), if c.is_assured() { Vec::new() } else { in_vain(c) });
+    if c.external().is_none() {
+        let rows = first_rows(c, Some(&x0))?;
+        for (i, section) in c.barrier.iter().enumerate() {
+            let is_uneven = uneven.iter().any(|(barrier, _)| *barrier == i);
+            known.extend(
+                of_the_method(c, &rows, i, is_uneven)
+                    .into_iter()
+                    .map(|text| format!("{}: {text}", section.name)),
+            );
+        }
+    }
+    if refused {
+        known.extend(witness::in_time(c, &x0)?);
+    }
+    Ok(known)
 }
 
 /// Warnings on a closed loop beyond its promises.
@@ -622,6 +714,10 @@ fn filter_text(report: &FilterReport) -> String {
         };
         let stay_rate =
             b.stay_rate.map_or_else(|| "chosen at the start".to_owned(), |r| format!("{} 1/s", number(r)));
+        let anew = |rate: String, is: bool| {
+            if is { format!("{rate} at the start, chosen at every sample") } else { rate }
+        };
+        let (rate, stay_rate) = (anew(rate, b.chosen && b.deadline.is_none()), anew(stay_rate, b.chosen));
         let deadline =
             b.deadline.map_or_else(|| "none: to be kept".to_owned(), |d| format!("{} s", number(d)));
         let mut rows = vec![

@@ -3,10 +3,12 @@
 
 use std::cell::RefCell;
 
+use punctual_core::dynamics::DynPlant;
 use punctual_core::filter::{ProfileKind, SafetyFilter};
 use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::{
-    Automatic, FilterConfiguration, Functions, ModelName, ProfileName, UNBOUNDED,
+    Automatic, FilterConfiguration, Functions, ModelName, PlantSection, ProfileName, UNBOUNDED,
+    VariableSection,
 };
 use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
 use punctual_reference::nominal::damping;
@@ -51,7 +53,7 @@ impl Wanted {
     /// for the filter's own model.
     pub(super) fn parse(text: Option<&str>, c: &FilterConfiguration) -> Result<Self, Error> {
         let Some(text) = text else {
-            let own = c.integrator.is_none() && c.run.simulated.is_none();
+            let own = c.integrator.is_none() && (c.run.simulated.is_none() || simulated(c).is_some());
             let functions = match c.alone() {
                 Ok((_, Some(controller))) if own => controller.functions()?,
                 _ => None,
@@ -125,6 +127,20 @@ impl Wanted {
     }
 }
 
+/// The plant that the file has to simulate in place of the filter's model, where its states and inputs are those of the model.
+pub(super) fn simulated(c: &FilterConfiguration) -> Option<&PlantSection> {
+    let names = |signals: Vec<VariableSection>| signals.into_iter().map(|s| s.name).collect::<Vec<_>>();
+    let is_alike = |plant: &PlantSection| {
+        names(plant.states()) == names(c.plant.states()) && names(plant.inputs()) == names(c.plant.inputs())
+    };
+    c.run.simulated.as_ref().filter(|plant| c.integrator.is_none() && is_alike(plant))
+}
+
+/// The plant of the closed loops.
+fn plant(c: &FilterConfiguration) -> Result<Box<dyn DynPlant>, Error> {
+    Ok(simulated(c).unwrap_or(&c.plant).build()?)
+}
+
 /// Whether damping is known for the plant: the fourth state of every vehicle is a velocity.
 pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
     c.plant.model().is_some() && c.plant.states().len() > 3
@@ -156,6 +172,9 @@ pub(super) struct LoopBarrier {
     pub(super) name: String,
     pub(super) promise: Kept,
     arrival: Option<f64>,
+    /// Time in s since which it has been inside.
+    #[serde(skip)]
+    since: Option<f64>,
     late: Option<f64>,
     late_by: Option<f64>,
     left: Option<f64>,
@@ -211,6 +230,13 @@ impl LoopInput {
 }
 
 impl LoopReport {
+    /// The time in s from `start` since which barrier `index` has been inside, where every promise was kept: a deadline that this
+    /// very run meets.
+    pub(super) fn arrival(&self, index: usize, start: f64) -> Option<f64> {
+        let barrier = self.barriers.get(index).filter(|b| self.kept && b.promise == Kept::Kept)?;
+        Some(barrier.since? - start).filter(|after| *after > 0.0)
+    }
+
     /// A line that tells whether the promises were kept.
     pub(super) fn head(&self) -> String {
         let words = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
@@ -254,7 +280,7 @@ pub(super) fn filter(c: &FilterConfiguration) -> Result<FilterLoop, Error> {
 
 /// The closed loop of the configuration from `x0`, well past every deadline.
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
-    let (mut filter, plant) = (filter(c)?, c.plant.build()?);
+    let (mut filter, plant) = (filter(c)?, plant(c)?);
     let (length, deadlines) = (watched(c), deadlines(c));
     // The closed loop, finely enough.
     let step = c.experiment.step_size.max(length / MOST_SAMPLES);
@@ -275,6 +301,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         name: section.name.clone(),
         promise: seen.judgement.verdict().into(),
         arrival: seen.judgement.arrival,
+        since: seen.judgement.since,
         late: seen.judgement.late,
         late_by: seen.judgement.late_by(),
         left: seen.judgement.left,
@@ -328,6 +355,9 @@ pub(super) struct ReachReport {
     soonest_at_most: Option<f64>,
     /// Whether it is a plan that meets the deadline.
     by_plan: bool,
+    /// Whether it is the closed loop that meets the soonest one.
+    #[serde(skip)]
+    by_loop: bool,
 }
 
 impl ReachReport {
@@ -342,7 +372,8 @@ impl ReachReport {
             Some(time) => format!("at least {} s (no input within the bounds is faster)", number(time)),
             None => "no lower bound is known".to_owned(),
         };
-        let who = if self.by_plan { "a plan does it" } else { "this filter does it, simulated" };
+        let is_planned = self.by_plan && !self.by_loop;
+        let who = if is_planned { "a plan does it" } else { "this filter does it, simulated" };
         let most = match self.soonest_at_most {
             Some(time) => format!("at most {} s ({who})", number(time)),
             None => "no upper bound was found".to_owned(),
@@ -371,7 +402,7 @@ fn run(
     (x0, wanted): (&[f64], &Wanted),
     deadlines: &[f64],
 ) -> Result<effort::Run, Error> {
-    let plant = c.plant.build()?;
+    let plant = plant(c)?;
     let finite = deadlines.iter().copied().filter(|deadline| deadline.is_finite());
     let longest = finite.clone().fold(0.0, f64::max);
     let shortest = finite.fold(f64::INFINITY, f64::min);
@@ -393,13 +424,19 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
 }
 
 /// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plans`: where they are followed, whether there
-/// is one for this deadline, and the soonest for which there is.
+/// is one for this deadline, and the soonest for which there is. `arrival`: when the closed loop that keeps everything is there.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),
     (x0, wanted): (&[f64], &Wanted),
     plans: Option<(bool, Option<f64>)>,
+    arrival: Option<f64>,
 ) -> Result<ReachReport, Error> {
+    let sooner = |most: Option<f64>| match (most, arrival) {
+        (Some(most), Some(arrival)) if arrival < most => (Some(arrival), true),
+        (None, Some(_)) => (arrival, true),
+        _ => (most, false),
+    };
     let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
@@ -411,7 +448,14 @@ pub(super) fn reach(
             () if lost => Verdict::CannotBeMet,
             () => Verdict::NotKnown,
         };
-        return Ok(ReachReport { deadline, soonest_at_least: soonest, soonest_at_most, by_plan: true });
+        let (soonest_at_most, by_loop) = sooner(soonest_at_most);
+        return Ok(ReachReport {
+            deadline,
+            soonest_at_least: soonest,
+            soonest_at_most,
+            by_plan: true,
+            by_loop,
+        });
     }
     let keeps = |deadline: f64| {
         let mut tried = c.clone();
@@ -420,11 +464,16 @@ pub(super) fn reach(
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, (x0, wanted), &deadlines(&tried))?.kept)
     };
-    // The search grows from a deadline that is not ruled out, since the longest deadlines are the longest runs.
-    let mut low = soonest.unwrap_or(0.0).max(1e-3 * deadline);
+    // The search grows from a deadline that is not ruled out, since the longest deadlines are the longest runs. A deadline comes
+    // after the begin of its barrier, and no later than the end.
+    let section = &c.barrier[index];
+    let begin = section.begin.filter(|_| section.after.is_none()).unwrap_or(0.0);
+    let end = section.end.filter(|end| *end > 0.0 && section.after.is_none()).unwrap_or(f64::INFINITY);
+    let horizon = horizon.min(end);
+    let mut low = soonest.unwrap_or(0.0).max(begin + 1e-3 * (deadline - begin)).min(horizon);
     let mut most = None;
     while low < horizon {
-        let high = 2.0 * low;
+        let high = (2.0 * low).min(horizon);
         if let Some(found) = effort::smallest([low, high], TOLERANCE, keeps)? {
             most = Some(found);
             break;
@@ -436,7 +485,14 @@ pub(super) fn reach(
         () if keeps(deadline)? => Verdict::CanBeMet,
         () => Verdict::NotKnown,
     };
-    Ok(ReachReport { deadline: verdict, soonest_at_least: soonest, soonest_at_most: most, by_plan: false })
+    let (most, by_loop) = sooner(most);
+    Ok(ReachReport {
+        deadline: verdict,
+        soonest_at_least: soonest,
+        soonest_at_most: most,
+        by_plan: false,
+        by_loop,
+    })
 }
 
 fn named(profile: ProfileKind) -> ProfileName {

@@ -96,7 +96,10 @@ pub(super) fn starts(
             .zip(filter.promised(t, x))
             .position(|(b, promised)| !promised && b.penalty.is_none());
         match (lost, filter.foresee(t, x, 1.0)) {
-            (Some(barrier), _) | (None, Err(Failure::Broken { barrier, .. })) => barrier + 1,
+            (Some(barrier), _)
+            | (None, Err(Failure::Broken { barrier, .. } | Failure::Apart { barriers: [barrier, _], .. })) => {
+                barrier + 1
+            }
             (None, Ok(_)) => 0,
             (None, Err(Failure::Nothing)) => others + 1,
             (None, Err(_)) => others,

@@ -6,9 +6,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::FileKind;
+use punctual_core::filter::Standing;
+use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
 use serde::Serialize;
 
+use super::check;
 use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
@@ -181,6 +183,8 @@ struct Opened {
     simulation: Simulation,
     /// The folder for what is written.
     out: Option<PathBuf>,
+    /// The filter, where the file is that of one.
+    filter: Option<Box<FilterConfiguration>>,
 }
 
 /// Opens a system file, or the file of a filter.
@@ -192,21 +196,27 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
         let (simulation, models) =
             Simulation::new(&system, path.parent().unwrap_or(Path::new("")), package::read_configuration)?;
         models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
-        return Ok(Opened { system, models, simulation, out });
+        return Ok(Opened { system, models, simulation, out, filter: None });
     }
-    let (text, configurations) = coupling::alone(package::read_configuration(path)?)?;
+    let configuration = package::read_configuration(path)?;
+    let filter = match &configuration {
+        Configuration::Filter(filter) => Some(Box::new(filter.clone())),
+        _ => None,
+    };
+    let (text, configurations) = coupling::alone(configuration)?;
     let system = System::parse(&text)?;
     let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned()));
     let models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
     let simulation = Simulation::of(&system, &models)?;
     let out = Some(out.unwrap_or_else(|| stem(path).into()));
-    Ok(Opened { system, models, simulation, out })
+    Ok(Opened { system, models, simulation, out, filter })
 }
 
 /// Runs the system in this process; each row also goes to `rows` at once.
 fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error> {
     let path = &arguments.system;
-    let Opened { system, models, mut simulation, out } = open(arguments).map_err(|e| e.in_file(path))?;
+    let Opened { system, models, mut simulation, out, filter } =
+        open(arguments).map_err(|e| e.in_file(path))?;
     if arguments.report && out.is_none() {
         let message = "needs a folder for its page; add --out DIR";
         return Err(Error::configuration("--report", message));
@@ -237,6 +247,10 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     }
     let mut notes = outcome.notes.clone();
     notes.extend(nothing_promised(&outcome.promises));
+    if let Some(filter) = filter {
+        let is_refused = is_refused(&outcome.recording);
+        notes.extend(check::known(&filter, is_refused).map_err(|e| e.in_file(path))?);
+    }
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {
@@ -264,6 +278,13 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let broken =
         arguments.require.is_some_and(|required| !report.promises.iter().all(|p| required.is_met(p)));
     Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Whether the filter of a file that runs alone refused its promise at the first sample.
+fn is_refused(recording: &Recording) -> bool {
+    let place = recording.columns().iter().position(|column| column.name == "filter.assurance");
+    let first = place.and_then(|index| recording.column(index).next());
+    first == Some(f64::from(Standing::Refused as u8))
 }
 
 /// The name of a system file without its ending. All files written begin with it.

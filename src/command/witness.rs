@@ -7,6 +7,7 @@ use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
+use super::closed_loop::LoopReport;
 use super::map;
 use crate::error::Error;
 use crate::output::{self, number};
@@ -16,6 +17,9 @@ use crate::output::{self, number};
 pub(super) struct WitnessReport {
     /// Whether a plan was found and checked.
     pub(super) found: bool,
+    /// Whether there certainly is none.
+    #[serde(skip)]
+    vain: bool,
     /// What no plan accounts for yet, or what the nearest one fails at.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
@@ -52,11 +56,12 @@ struct PlanReport {
     tightest: Option<(String, f64, f64, String)>,
 }
 
-/// The finding for the start `x0`, whose plan is drawn into the folder `out` if there is one; `None` where an input has no
+/// The finding for the start `x0`, from which the closed loop `run` was, whose plan is drawn into the folder `out` if there is one; `None` where an input has no
 /// bounds, so that nothing is ruled out.
 pub(super) fn find(
     c: &FilterConfiguration,
     x0: &[f64],
+    run: Option<&LoopReport>,
     out: Option<&Path>,
 ) -> Result<Option<WitnessReport>, Error> {
     let (inputs, x0) = (c.plant.inputs(), &c.measured(x0)[..]);
@@ -66,6 +71,7 @@ pub(super) fn find(
     }
     let refused = |reason: String| WitnessReport {
         found: false,
+        vain: false,
         reason: Some(reason),
         in_motion: in_motion(c, x0),
         left_out: Vec::new(),
@@ -102,13 +108,14 @@ pub(super) fn find(
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let soonest = if has_deadline { filter.soonest(t, x0, AssuredFilter::LONGEST) } else { None };
-    let reason = configured.as_ref().err().map(|failure| match failure {
-        // Of one trial alone: the others miss by more.
-        Failure::Broken { .. } => format!("by the nearest way tried, {}", c.failure(*failure)),
-        _ => c.failure(*failure),
-    });
+    let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
+    // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
+    let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());
     let deadlines = |factor: f64| {
-        let given = c.barrier.iter().filter_map(|b| Some((b.name.clone(), factor * b.deadline?)));
+        let given = c.barrier.iter().enumerate().filter_map(|(i, b)| {
+            let arrival = run.and_then(|run| run.arrival(i, t)).unwrap_or(f64::INFINITY);
+            Some((b.name.clone(), (factor * b.deadline?).min(arrival)))
+        });
         given.collect::<Vec<_>>()
     };
     let shown = configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness));
@@ -118,6 +125,7 @@ pub(super) fn find(
     };
     Ok(Some(WitnessReport {
         found: configured.is_ok(),
+        vain: matches!(configured, Err(Failure::Apart { .. })),
         reason,
         in_motion: if configured.is_err() { in_motion(c, x0) } else { None },
         left_out,
@@ -127,6 +135,26 @@ pub(super) fn find(
         plan: shown.map(plan),
         files,
     }))
+}
+
+/// The soonest deadlines with a plan from `x0`, for a promise that was refused, in a line.
+pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
+    let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
+    let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
+    let Some(filter) = filter else { return Ok(None) };
+    let (t, x0) = (c.experiment.start_time, &c.measured(x0)[..]);
+    let line = match filter.soonest(t, x0, AssuredFilter::LONGEST) {
+        Some((factor, _)) => {
+            let soonest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
+            let named: Vec<_> = soonest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
+            format!("soonest deadline with a plan: {}", named.join(", "))
+        }
+        None if matches!(filter.foresee(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
+        None => {
+            format!("no plan was found for deadlines up to {} times as long either", AssuredFilter::LONGEST)
+        }
+    };
+    Ok(Some(line))
 }
 
 /// A `plan_horizon` for a file that has none, as long as its latest deadline, and until when there is a plan with it.
@@ -173,6 +201,7 @@ impl WitnessReport {
                 let keeps = "a plan within the bounds keeps every promise, whatever u_ref is";
                 format!("\nwitness: {keeps}{}", until.unwrap_or_default())
             }
+            (false, Some(reason)) if self.vain => format!("\nwitness: there can be NONE: {reason}"),
             (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
             (false, None) => "\nwitness: NONE was found".to_owned(),
         }];
@@ -190,7 +219,7 @@ impl WitnessReport {
             self.soonest.iter().map(|(name, deadline)| format!("{name} {} s", number(*deadline))).collect();
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
-        } else if self.has_deadline && !self.found && self.plan.is_none() {
+        } else if self.has_deadline && !self.found && !self.vain && self.plan.is_none() {
             lines.push(format!(
                 "none was found for deadlines up to {} times as long either",
                 AssuredFilter::LONGEST

@@ -316,3 +316,216 @@ expression = "p + 1"
     let done = written(-0.5);
     assert_eq!(done.code, 0, "{done:#?}");
 }
+
+/// A filter for a point mass with these barriers, and what stands before them.
+fn point_mass(before: &str, barriers: &str) -> String {
+    format!(
+        r#"kind = "filter"
+plant.model = "point_mass"
+experiment = {{ stop_time = 12.0, step_size = 0.05 }}
+{before}
+{barriers}"#
+    )
+}
+
+fn disc(name: &str, shape: &str, [x, y]: [f64; 2], radius: f64, more: &str) -> String {
+    format!(
+        "[[barrier]]\nname = \"{name}\"\nshape = \"{shape}\"\ncentre = [{x:?}, {y:?}]\nradius = {radius:?}\n{more}\n"
+    )
+}
+
+const BOUNDS: &str = "bounds = { u_x = [-2.0, 2.0], u_y = [-2.0, 2.0] }\nx0 = { v_x = 0.0 }";
+
+/// Deadlines that are tried lie within the time of their barrier: what `run` takes is judged, and no number is of our own making.
+#[test]
+fn a_barrier_that_begins_later_or_ends_is_judged() {
+    let workshop = Workshop::new();
+    for (k, (begin, deadline, end)) in [
+        (Some(19.0), 20.0, None),
+        (Some(4.0), 4.5, Some(5.0)),
+        (None, 5.0, Some(5.0)),
+        (None, 3.0, Some(4.0)),
+        (Some(0.5), 9.0, Some(9.0)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let key =
+            |name: &str, value: Option<f64>| value.map_or(String::new(), |v| format!("{name} = {v:?}\n"));
+        let window = format!("deadline = {deadline:?}\n{}{}", key("begin", begin), key("end", end));
+        let bounds = if k % 2 == 0 { BOUNDS } else { "bounds = { u_x = [-2.0, 2.0] }\nx0 = { v_x = 0.0 }" };
+        workshop.write("filter.toml", point_mass(bounds, &disc("A", "disc", [10.0, 6.0], 1.0, &window)));
+        let done = workshop.punctual(["check", "filter.toml", "--json"]);
+        assert!(done.code < 2, "{window}: {done:#?}");
+        let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+        let barrier = &report["barriers"][0];
+        assert_eq!(barrier["deadline"].as_f64(), Some(deadline));
+        let lists = [&barrier["start"]["reach"]["soonest_at_most"], &report["witness"]["soonest"][0][1]];
+        for soonest in lists.iter().filter_map(|value| value.as_f64()) {
+            let range = begin.unwrap_or(0.0)..=end.unwrap_or(f64::INFINITY);
+            assert!(range.contains(&soonest), "{window}: {soonest}");
+        }
+    }
+}
+
+/// A gap of 90 m of which the car feels nothing yet: the rate is the one that acts, and a soonest deadline is no later than
+/// the arrival beside it.
+#[test]
+fn what_check_says_is_what_acts() {
+    let workshop = Workshop::new();
+    let expressions = |x0: &str, step: f64, plant: &str, barriers: &str| {
+        format!(
+            "kind = \"filter\"\nx0 = {{ {x0} }}\nexperiment = {{ stop_time = 300.0, step_size = {step:?} }}\n[plant]\n{plant}\n{barriers}"
+        )
+    };
+    let car = r#"states = [{ name = "v", unit = "m/s" }, { name = "z", unit = "m" }]
+inputs = [{ name = "a", unit = "m/s2", min = -4.0, max = 4.0 }]
+derivatives = { v = "a", z = "15 - v" }"#;
+    let gap = "[[barrier]]\nname = \"gap\"\nexpression = \"z - 10\"\nunit = \"m\"";
+    workshop.write("gap.toml", expressions("v = 20.0, z = 100.0", 0.1, car, gap).replace("300.0", "20.0"));
+    let text = workshop.punctual(["check", "gap.toml"]).success();
+    // Half of the 4 m/s2, over 90 m.
+    let wanted = "  rate             0.149071 1/s at the start, chosen at every sample\n";
+    assert!(text.contains(wanted), "{text}");
+    let glucose = r#"states = [{ name = "G" }, { name = "X" }, { name = "I" }]
+inputs = [{ name = "u", min = 0.0, max = 10.0 }]
+derivatives = { G = "-0.0317*(G-81)-X*G", X = "-0.0123*X+0.00000492*(I-7)", I = "-0.2659*(I-7)+u" }"#;
+    let range = "[[barrier]]\nname = \"range\"\nexpression = \"180 - G\"\ndeadline = 90.0\n[[barrier]]\nname = \"hypo\"\nexpression = \"G - 70\"";
+    workshop.write("glucose.toml", expressions("G = 260.0, X = 0.0, I = 7.0", 1.0, glucose, range));
+    let report = workshop.punctual(["check", "glucose.toml", "--json"]).success();
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let arrival = report["closed_loop"]["barriers"][0]["arrival"].as_f64().expect("it arrives");
+    let soonest = report["barriers"][0]["start"]["reach"]["soonest_at_most"].as_f64().expect("a soonest");
+    assert!((18.0..19.0).contains(&arrival) && soonest <= arrival + 1e-9, "{soonest} s, {arrival} s");
+    assert!(report["witness"]["soonest"][0][1].as_f64().is_some_and(|at| at <= arrival + 1e-9));
+    assert_eq!(report["warnings"].as_array().map(Vec::len), Some(0), "{report}");
+}
+
+/// The plant to simulate and its u_ref are those of the file, or it is said that they are not.
+#[test]
+fn a_plant_to_simulate_is_simulated_or_it_is_said() {
+    let workshop = Workshop::new();
+    let goal = disc("goal", "disc", [6.0, 0.0], 1.0, "deadline = 6.0");
+    let before = format!("{BOUNDS}\nu_ref = {{ u_x = \"1\", u_y = \"0\" }}");
+    let simulated = |plant: &str| format!("{}\n[simulated]\n{plant}", point_mass(&before, &goal));
+    let alike = r#"states = [{ name = "x_p" }, { name = "y_p" }, { name = "v_x" }, { name = "v_y" }]
+inputs = [{ name = "u_x" }, { name = "u_y" }]
+derivatives = { x_p = "v_x", y_p = "v_y", v_x = "u_x - 0.5", v_y = "u_y" }"#;
+    workshop.write("alike.toml", simulated(alike));
+    let told = workshop.punctual(["check", "alike.toml"]).stdout;
+    assert!(told.contains("closed loop with the u_ref of the file"), "{told}");
+    assert!(told.contains("warning: the closed loop has the plant in `simulated`"), "{told}");
+    let lagged = alike
+        .replace("{ name = \"v_y\" }", "{ name = \"v_y\" }, { name = \"w\" }")
+        .replace("v_y = \"u_y\"", "v_y = \"w\", w = \"10*(u_y - w)\"");
+    workshop.write("lagged.toml", simulated(&lagged));
+    let told = workshop.punctual(["check", "lagged.toml"]).stdout;
+    assert!(
+        told.contains("since `simulated` has other states or inputs, and not the file's u_ref"),
+        "{told}"
+    );
+}
+
+/// What geometry rules out is refused without a search, by the names and numbers of the sets; what is possible is not.
+#[test]
+fn sets_that_are_apart_are_refused_by_name() {
+    let workshop = Workshop::new();
+    let reason = |before: &str, barriers: &[String]| {
+        workshop.write("filter.toml", point_mass(before, &barriers.concat()));
+        let report = workshop.punctual(["check", "filter.toml", "--json"]).stdout;
+        let report: Value = serde_json::from_str(&report).expect("JSON");
+        report["witness"]["reason"].as_str().unwrap_or_default().to_owned()
+    };
+    let goal = |more: &str| disc("goal", "disc", [8.0, 2.0], 1.0, more);
+    let rock = |radius: f64, more: &str| disc("rock", "obstacle", [8.5, 2.0], radius, more);
+    let within = "goal lies wholly inside rock, 0.5 m from its edge: no state is in goal and outside rock, and both are to be kept at the same time";
+    assert_eq!(reason(BOUNDS, &[goal("deadline = 8.0"), rock(2.0, "")]), within);
+    workshop.punctual(["check", "filter.toml"]);
+    let run = workshop.punctual(["run", "filter.toml"]);
+    assert!(format!("{}{}", run.stdout, run.stderr).contains(within), "{run:#?}");
+    // A part of the goal is free; the rock is gone by then; moves; or yields.
+    for barriers in [
+        [goal("deadline = 8.0"), rock(1.4, "")],
+        [goal("deadline = 8.0"), rock(2.0, "end = 7.0")],
+        [goal("deadline = 8.0"), rock(2.0, "penalty = 10.0")],
+        [goal("deadline = 8.0"), rock(2.0, "velocity = [1.0, 0.0]")],
+    ] {
+        let said = reason(BOUNDS, &barriers);
+        assert!(!said.contains("lies wholly inside"), "{barriers:?}: {said}");
+    }
+    // A home that contains the start is to be kept from there on.
+    let home = disc("home", "disc", [0.0, 0.0], 2.0, "deadline = 12.0");
+    let said = reason(
+        BOUNDS,
+        &[disc("pickup", "disc", [8.0, 0.0], 1.0, "deadline = 6.0\nuntil_arrival = true"), home],
+    );
+    let wanted = "home and pickup are 5 m apart: no state is in both; and home contains the start, so that it is to be kept from there on: did you mean `begin`?";
+    assert_eq!(said, wanted);
+    // Bounds of a point.
+    let fixed = "bounds = { u_x = [0.0, 0.0], u_y = [0.0, 0.0] }\nx0 = { v_x = 1.0 }";
+    let said = reason(fixed, &[goal("deadline = 8.0")]);
+    let wanted = "the bounds fix every input (u_x = 0, u_y = 0), so that nothing can steer the plant; by the nearest way tried, goal is not met at ";
+    assert!(said.starts_with(wanted), "{said}");
+}
+
+/// What `check` knows of a filter, a run of its file says too.
+#[test]
+fn a_run_says_what_check_knows() {
+    let workshop = Workshop::new();
+    let told = |barriers: &str| {
+        workshop.write("filter.toml", point_mass(BOUNDS, barriers));
+        let done = workshop.punctual(["run", "filter.toml"]);
+        format!("{}{}", done.stdout, done.stderr)
+    };
+    let soon = told(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
+    assert!(soon.contains("soonest deadline with a plan: goal "), "{soon}");
+    let root = told(&disc(
+        "goal",
+        "quadratic_disc",
+        [10.0, 0.0],
+        1.0,
+        "deadline = 10.0\nmethod = \"repeated_root\"",
+    ));
+    let check = workshop.punctual(["check", "filter.toml"]).stdout;
+    let warning = check.lines().find_map(|line| line.strip_prefix("warning: goal: ")).expect("a warning");
+    assert!(root.contains(&format!("note: goal: {warning}")), "{warning}: {root}");
+}
+
+/// A turn moves the place only where there is a speed. The row on the speed is right, but no row limits the turn: it needs bounds.
+#[test]
+fn an_input_that_enters_later_needs_bounds() {
+    let workshop = Workshop::new();
+    let checked = |bounds: &str| {
+        let text = format!(
+            r#"kind = "filter"
+x0 = {{ x = 0.0 }}
+u_ref = {{ v = "2", omega = "0" }}
+{bounds}
+experiment = {{ stop_time = 8.0, step_size = 0.05 }}
+[plant]
+states = [{{ name = "x" }}, {{ name = "y" }}, {{ name = "psi" }}]
+inputs = [{{ name = "v" }}, {{ name = "omega" }}]
+derivatives = {{ x = "v*cos(psi)", y = "v*sin(psi)", psi = "omega" }}
+[[barrier]]
+name = "post"
+expression = "(x - 10)^2 + (y - 0.1)^2 - 1"
+"#
+        );
+        workshop.write("turning.toml", text);
+        workshop.punctual(["check", "turning.toml"])
+    };
+    let message = |free: &str| {
+        format!(
+            "turning.toml: barrier[0]: its relative degree along expressions is mixed: v enters derivative 1, omega enters derivative 2 \
+             of h; one row cannot use them all. Plans can, but none are followed: {free} has no bounds. Mend that, or put 1 integrator \
+             before v: make it a state whose derivative is the new input"
+        )
+    };
+    checked("").fails(2, &message("v"));
+    checked("bounds = { v = [-3.0, 3.0] }").fails(2, &message("omega"));
+    let taken = checked("bounds = { omega = [-2.0, 2.0] }");
+    let warning = "warning: post: inputs enter h at different orders, and without plans only the first is used: v has no bounds";
+    assert!(taken.code == 0 && taken.stdout.contains(warning), "{taken:#?}");
+    let planned = checked("bounds = { v = [-3.0, 3.0], omega = [-2.0, 2.0] }");
+    assert!(planned.code == 0 && planned.stdout.contains("guaranteed"), "{planned:#?}");
+}
