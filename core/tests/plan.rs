@@ -1000,16 +1000,13 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     };
     let within = BarrierSettings::within(5.0);
     let delayed = refused(within, |b| b.actuation_delay(0.01).expect("a delay"));
-    assert_eq!(delayed, "actuation_delay: is not 0, which no plan accounts for yet");
+    assert_eq!(delayed, "actuation_delay: is 0.01, must be 0 for a plan");
     let erring = refused(within, |b| b.measurement_errors(&[0.1, 0.1, 0.0, 0.0]).expect("errors"));
-    assert_eq!(erring, "measurement_errors: are not 0, which no plan accounts for yet");
+    assert_eq!(erring, "measurement_errors: are not 0, must be 0 for a plan");
     let disturbed = refused(BarrierSettings { disturbance: 0.1, ..within }, |b| b);
-    assert_eq!(disturbed, "goal.disturbance: is not 0, which no plan accounts for yet");
+    assert_eq!(disturbed, "goal.disturbance: is 0.1, must be 0 for a plan");
     let later = refused(within, |b| b.window(Begin::At(1.0), End::Never).expect("a window"));
-    assert_eq!(
-        later,
-        "goal.begin: is later than the first sample, with a deadline, which no plan accounts for yet"
-    );
+    assert_eq!(later, "goal.begin: is 1, must be 0 for a plan where there is a deadline");
     assert_eq!(
         refused(BarrierSettings::keeping(), |b| b.window(Begin::At(1.0), End::Never).expect("a window")),
         ""

@@ -600,6 +600,11 @@ impl Instance {
         reason
     }
 
+    /// What the user has to know of the configuration, if there is anything.
+    pub fn warning(&self) -> Option<String> {
+        self.product.configuration.warning()
+    }
+
     /// What the user should know of the last step, if there is anything; said once.
     #[inline]
     pub fn notice(&mut self) -> Option<String> {

@@ -5,6 +5,7 @@
 //!
 //! | module | owns |
 //! |---|---|
+//! | [`text`] | numbers for people |
 //! | `filter_loop` | a filter with its plans or its integrator, if it has them, and its memory |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
@@ -29,6 +30,7 @@ mod filter_loop;
 pub mod instance;
 pub mod product;
 pub mod state;
+pub mod text;
 
 #[cfg(windows)]
 pub use abi::loadable;

@@ -84,6 +84,25 @@ fn an_ordinary_run_is_silent_unless_asked() {
     }
 }
 
+/// What switches plans off is a warning when the instance is made, which is made all the same.
+#[test]
+fn what_switches_plans_off_is_logged_once() {
+    let declared = FILTER.replace("assurance = \"off\"", "actuation_delay = 0.001");
+    let fmu = Fmu::new(&declared.replace("deadline", "disturbance = 0.5\ndeadline"));
+    let slave = Slave::new(&fmu);
+    let entries = slave.log.entries();
+    let [entry] = &entries[..] else { panic!("{entries:?}") };
+    assert_eq!((entry.status, entry.category.as_str()), (1, "logStatusWarning"), "{entry:?}");
+    for part in
+        ["the guarantee of goal", "actuation_delay is 0.001", "goal.disturbance is 0.5", "assurance = \"on\""]
+    {
+        assert!(entry.message.contains(part) && !entry.message.contains('%'), "{part}: {entry:?}");
+    }
+    slave.initialize();
+    slave.step(0.0, 0.001);
+    assert_eq!(slave.log.entries().len(), 1, "{:?}", slave.log.entries());
+}
+
 /// Every excluded function, with sensible arguments, names the flag that excludes it.
 #[test]
 fn excluded_functions_name_their_flag() {

@@ -3,6 +3,7 @@
 
 use alloc::boxed::Box;
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::deviation::Deviation;
@@ -478,46 +479,8 @@ impl AssuredFilter {
     fn around(rows: Rows, bounds: Bounds, Pace { period, horizon }: Pace) -> Result<Self, Error> {
         positive("period", period)?;
         horizon.map(|horizon| positive("horizon", horizon)).transpose()?;
-        let filter = rows.filter();
-        let refuse = |field: &str, message: &str| {
-            Err(Error::new(
-                ErrorKind::Unsupported,
-                field,
-                format!("{message}, which no plan accounts for yet"),
-            ))
-        };
-        if filter.delay > 0.0 {
-            return refuse("actuation_delay", "is not 0");
-        }
-        if !filter.errors.is_exact() {
-            return refuse("measurement_errors", "are not 0");
-        }
-        for slot in &filter.slots {
-            let named = |e: Error| e.within(&slot.name);
-            let settings = slot.promise.settings();
-            if settings.disturbance > 0.0 {
-                return refuse("disturbance", "is not 0").map_err(named);
-            }
-            match (slot.begin, settings.deadline) {
-                (Begin::AtOnce, _) | (Begin::At(_), None) => {}
-                (Begin::At(_), Some(_)) => {
-                    return refuse("begin", "is later than the first sample, with a deadline").map_err(named);
-                }
-                (Begin::AfterArrival(_), _) => {
-                    return refuse("begin", "is the arrival of another barrier").map_err(named);
-                }
-            }
-            if slot.source.predict().is_none() {
-                let message = "has no model to run ahead";
-                return Err(named(Error::new(ErrorKind::Unsupported, "source", message)));
-            }
-        }
-        one_plant(filter, period)?;
-        for slot in &filter.slots {
-            if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
-                let message = "moves with time, so that no plan ends; with a horizon one may end before";
-                return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
-            }
+        if let Some(obstacle) = Self::obstacles(rows.filter(), Pace { period, horizon }).into_iter().next() {
+            return Err(obstacle);
         }
         Ok(Self {
             rows,
@@ -534,6 +497,46 @@ impl AssuredFilter {
             piece: Piece::ROWS,
             assurance: Assurance::default(),
         })
+    }
+
+    /// Everything about `filter` that keeps plans from being put behind it; nothing where [`Self::new`] does so. `pace` is in
+    /// range.
+    pub fn obstacles(filter: &SafetyFilter, pace: impl Into<Pace>) -> Vec<Error> {
+        let Pace { period, horizon } = pace.into();
+        let mut found = Vec::new();
+        let refused = |field: &str, message: String| Error::new(ErrorKind::Unsupported, field, message);
+        if filter.delay > 0.0 {
+            found.push(refused("actuation_delay", format!("is {}, must be 0 for a plan", filter.delay)));
+        }
+        if !filter.errors.is_exact() {
+            found.push(refused("measurement_errors", "are not 0, must be 0 for a plan".into()));
+        }
+        for slot in &filter.slots {
+            let mut refuse =
+                |field: &str, message: String| found.push(refused(field, message).within(&slot.name));
+            let settings = slot.promise.settings();
+            if settings.disturbance > 0.0 {
+                refuse("disturbance", format!("is {}, must be 0 for a plan", settings.disturbance));
+            }
+            match (slot.begin, settings.deadline) {
+                (Begin::AtOnce, _) | (Begin::At(_), None) => {}
+                (Begin::At(begin), Some(_)) => {
+                    let message = format!("is {begin}, must be 0 for a plan where there is a deadline");
+                    refuse("begin", message);
+                }
+                (Begin::AfterArrival(_), _) => {
+                    refuse("begin", "is the arrival of another barrier, which no plan foresees".into());
+                }
+            }
+            if slot.source.predict().is_none() {
+                refuse("source", "has no model to run ahead".into());
+            } else if horizon.is_none() && slot.end == End::Never && leaves(slot, filter.state_dim) {
+                let message = "moves with time, so that no plan ends; with a horizon one may end before";
+                refuse("source", message.into());
+            }
+        }
+        found.extend(one_plant(filter, period).err());
+        found
     }
 
     /// Adds a policy with which a search for a plan begins: for promises that no search keeps by itself, such as a way
@@ -1701,15 +1704,17 @@ fn one_plant(filter: &SafetyFilter, period: f64) -> Result<(), Error> {
         }
         x
     };
-    for slot in &filter.slots[1..] {
+    let mut modelled = filter.slots.iter().filter(|slot| slot.source.predict().is_some());
+    let Some(first) = modelled.next() else { return Ok(()) };
+    for slot in modelled {
         for trial in 0..TRIALS {
-            let ends = [moved(&filter.slots[0], trial), moved(slot, trial)];
+            let ends = [moved(first, trial), moved(slot, trial)];
             let same =
                 |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()) || a.is_nan() && b.is_nan();
             if !ends[0].iter().zip(&ends[1]).all(same) {
                 let message = format!(
                     "moves the state in another way than that of {}; a plan needs one plant for all barriers",
-                    filter.slots[0].name
+                    first.name
                 );
                 return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
             }

@@ -81,6 +81,9 @@ fn instantiated(
     match built.and_then(|result| result) {
         Ok(instance) => {
             logger.event("instantiated");
+            if let Some(warning) = instance.warning() {
+                logger.warning(&warning);
+            }
             Box::into_raw(Box::new(Handle { instance, logger, poisoned: false })).cast()
         }
         Err(failure) => {

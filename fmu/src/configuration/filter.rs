@@ -24,6 +24,7 @@ use super::{
     IntegrationSection, IntegratorSection, Parameter, PlantSection, PluginLoader, Range, RunSection,
     VariableSection, barrier, integrator, model, plant,
 };
+use crate::text::{number, quantity, shown_unit};
 
 /// Size from which an input bound means "no bound": a finite number that every importer can read.
 pub const UNBOUNDED: f64 = 1e30;
@@ -44,13 +45,30 @@ words! {
 words! {
     /// Whether the filter promises only what a plan keeps.
     pub enum AssuranceName {
-        /// A plan behind every input, where all inputs have bounds and plans account for everything; else the rows alone.
+        /// A plan behind every input, where all inputs have bounds and plans account for everything; else the rows alone, with a
+        /// warning where only the latter fails.
         Auto = "auto",
         /// The rows alone ([`SafetyFilter`]).
         Off = "off",
         /// A plan behind every input ([`AssuredFilter`](punctual_core::filter::AssuredFilter)).
         On = "on",
     }
+}
+
+/// Why a filter follows no plans: the rows act alone.
+#[derive(Clone, Debug, PartialEq)]
+enum RowsOnly {
+    /// The file asks for it.
+    Off,
+    /// A signal that has not both bounds, in words.
+    Unbounded(String),
+    /// What the file declares and no plan accounts for, each with its key, in words.
+    Unaccounted(Vec<String>),
+}
+
+/// Obstacles in one sentence.
+pub(super) fn listed(obstacles: &[String]) -> String {
+    obstacles.join("; ")
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -117,9 +135,9 @@ pub struct FilterConfiguration {
     /// every plan has to end at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
-    /// Why no plan is followed, in words, as the file stands; empty where plans are.
+    /// Why no plan is followed, as the file stands; `None` where plans are.
     #[serde(skip)]
-    unassured: String,
+    rows_only: Option<RowsOnly>,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
     /// Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
@@ -209,7 +227,8 @@ pub(super) static SECTION: Section = Section {
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
                  promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
-                 alone. `auto`: `on` where that is possible and every input has bounds, else `off`; `check` says which",
+                 alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
+                 warning names the keys that switch it off for all barriers",
             ),
             Key::new(
                 "plan_horizon",
@@ -359,7 +378,7 @@ impl FilterConfiguration {
             }),
             assurance: raw.assurance,
             plan_horizon: raw.plan_horizon,
-            unassured: String::new(),
+            rows_only: None,
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
             arm_after: raw.arm_after,
@@ -397,13 +416,13 @@ impl FilterConfiguration {
             configuration.plant.functions::<f64>("policy", policy)?;
         }
         configuration.check_horizon()?;
-        configuration.unassured = configuration.why_unassured();
+        configuration.rows_only = configuration.rows_only();
         for (key, is_given) in [
             ("policy", configuration.policy.is_some()),
             ("plan_horizon", configuration.plan_horizon.is_some()),
         ] {
             if is_given && !configuration.is_assured() {
-                let message = format!("is for plans, of which there are none: {}", configuration.unassured);
+                let message = format!("is for plans, of which there are none: {}", configuration.unassured());
                 return Err(ConfigurationError::new(key, message));
             }
         }
@@ -459,8 +478,12 @@ impl FilterConfiguration {
             let margin = section.margin;
             if margin >= h[i] {
                 let (unit, largest) = (section.unit(&self.plant), h[i]);
+                let unit = match shown_unit(&unit) {
+                    "" => String::new(),
+                    unit => format!(" {unit}"),
+                };
                 let message = format!(
-                    "is {margin} {unit}, must be < {largest:.6} {unit}, the largest that h ever is: h >= margin is aimed at"
+                    "is {margin}{unit}, must be < {largest:.6}{unit}, the largest that h ever is: h >= margin is aimed at"
                 );
                 return Err(ConfigurationError::new(format!("barrier[{i}].margin"), message));
             }
@@ -609,7 +632,7 @@ impl FilterConfiguration {
 
     /// Whether the filter follows plans.
     pub fn is_assured(&self) -> bool {
-        self.unassured.is_empty()
+        self.rows_only.is_none()
     }
 
     /// Whether its plans may end without a rest, so that it tells until when it promises.
@@ -618,26 +641,54 @@ impl FilterConfiguration {
     }
 
     /// Why the filter follows no plans, in words; empty where it does.
-    pub fn unassured(&self) -> &str {
-        &self.unassured
+    pub fn unassured(&self) -> String {
+        match &self.rows_only {
+            None => String::new(),
+            Some(RowsOnly::Off) => "assurance is \"off\"".to_owned(),
+            Some(RowsOnly::Unbounded(signal)) => signal.clone(),
+            Some(RowsOnly::Unaccounted(obstacles)) => listed(obstacles),
+        }
     }
 
-    fn why_unassured(&self) -> String {
+    /// What the user has to know of the file: that something in it switches plans off, though every input has bounds and
+    /// nobody asked for that.
+    pub fn warning(&self) -> Option<String> {
+        let Some(RowsOnly::Unaccounted(obstacles)) = &self.rows_only else { return None };
+        let names: Vec<_> = self.barrier.iter().map(|barrier| barrier.name.as_str()).collect();
+        Some(format!(
+            "plans are off, and with them the guarantee of {}: {}. The rows act alone. `assurance = \"on\"` makes this an \
+             error, `assurance = \"off\"` accepts it",
+            names.join(", "),
+            listed(obstacles)
+        ))
+    }
+
+    fn rows_only(&self) -> Option<RowsOnly> {
         let free = self.commanded().into_iter().find(|signal| self.limits(&signal.name).is_none());
         match (self.assurance, free) {
-            (AssuranceName::Off, _) => "assurance is \"off\"".to_owned(),
-            (AssuranceName::On, _) => String::new(),
+            (AssuranceName::Off, _) => Some(RowsOnly::Off),
+            (AssuranceName::On, _) => None,
             (AssuranceName::Auto, Some(signal)) => {
-                format!("{0} has {1}", signal.name, self.lacking(&signal.name))
+                Some(RowsOnly::Unbounded(format!("{0} has {1}", signal.name, self.lacking(&signal.name))))
             }
-            (AssuranceName::Auto, None) => self.unaccounted().unwrap_or_default(),
+            (AssuranceName::Auto, None) => {
+                let obstacles = self.obstacles();
+                (!obstacles.is_empty()).then_some(RowsOnly::Unaccounted(obstacles))
+            }
+        }
+    }
+
+    /// What no plan accounts for, each with its key, in words.
+    fn obstacles(&self) -> Vec<String> {
+        match self.built(Uneven::Taken) {
+            Ok(filter) => self.obstacles_of(&filter),
+            Err(error) => vec![error.to_string()],
         }
     }
 
     /// What no plan accounts for, in words.
     pub fn unaccounted(&self) -> Option<String> {
-        let filter = self.built(Uneven::Taken).map_err(|e| e.to_string());
-        filter.and_then(|filter| self.assured(filter)).err()
+        Some(self.obstacles()).filter(|obstacles| !obstacles.is_empty()).map(|obstacles| listed(&obstacles))
     }
 
     /// What keeps a plan from being one, in words.
@@ -654,7 +705,7 @@ impl FilterConfiguration {
                     }
                     (None, None) => ("a barrier".to_owned(), String::new()),
                 };
-                format!("{name} is not met at {time:.6} s, by {:.6} {unit}", -slack)
+                format!("{name} is not met at {} s, by {}", number(time), quantity(-slack, &unit))
             }
             Failure::Drift { barrier, time, slack } => {
                 let section = self.barrier.get(barrier);

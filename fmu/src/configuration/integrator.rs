@@ -7,7 +7,7 @@ use punctual_models::mentions;
 use serde::{Deserialize, Serialize};
 
 use super::adding::Uneven;
-use super::filter::AssuranceName;
+use super::filter::{AssuranceName, listed};
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
@@ -207,19 +207,57 @@ impl FilterConfiguration {
         IntegratedFilter::new(filter, of).map_err(refused)
     }
 
+    fn pace(&self) -> Pace {
+        Pace { period: self.experiment.step_size, horizon: self.plan_horizon }
+    }
+
+    /// What keeps plans from being put behind `filter`, built from this configuration: each with its key, in words.
+    pub(super) fn obstacles_of(&self, filter: &SafetyFilter) -> Vec<String> {
+        if let Some(barrier) = self.external() {
+            return vec![format!("barrier {} has no model to run ahead", barrier.name)];
+        }
+        let mut found = Vec::new();
+        let follows = self.barrier_inputs();
+        if let Some(input) = follows.first() {
+            found.push(format!("a barrier follows {}, which others move and no plan foresees", input.name));
+        }
+        for error in AssuredFilter::obstacles(filter, self.pace()) {
+            let (field, message) = (error.field(), error.message());
+            let of = |key: &str| {
+                let name = field.strip_suffix(key)?.strip_suffix('.')?;
+                self.barrier.iter().find(|barrier| barrier.name == name)
+            };
+            if field == "measurement_errors" {
+                let errors = self.measurement_errors.iter().filter(|(_, error)| **error > 0.0);
+                found.extend(
+                    errors.map(|(state, error)| format!("{field}.{state} is {error}, must be 0 for a plan")),
+                );
+            } else if let Some((name, after)) = of("begin").and_then(|b| Some((&b.name, b.after.as_ref()?))) {
+                found.push(format!("{name}.after is {after:?}, and no plan foresees when that is reached"));
+            } else if let Some(barrier) = of("source") {
+                // No key has this name. What follows another thing moves as that does; what moves by itself wants the key of a
+                // horizon.
+                if follows.is_empty() {
+                    found.push(format!("{} {message} (`plan_horizon`)", barrier.name));
+                }
+            } else {
+                found.push(format!("{field} {message}"));
+            }
+        }
+        found
+    }
+
     /// `filter`, built from this configuration, with plans behind it, whether or not `assurance` asks for them.
     ///
     /// # Errors
     ///
     /// What no plan accounts for yet, in words.
     pub fn assured(&self, filter: SafetyFilter) -> Result<AssuredFilter, String> {
-        if let Some(barrier) = self.external() {
-            return Err(format!("barrier {} has no model to run ahead", barrier.name));
+        let obstacles = self.obstacles_of(&filter);
+        if !obstacles.is_empty() {
+            return Err(listed(&obstacles));
         }
-        if let Some(input) = self.barrier_inputs().first() {
-            return Err(format!("a barrier follows {}, which others move and no plan foresees", input.name));
-        }
-        let pace = Pace { period: self.experiment.step_size, horizon: self.plan_horizon };
+        let pace = self.pace();
         let assured = match &self.integrator {
             None => AssuredFilter::new(filter, pace),
             Some(section) => {
@@ -227,11 +265,7 @@ impl FilterConfiguration {
                 AssuredFilter::integrated(integrated, pace)
             }
         }
-        .map_err(|e| match e.field().strip_suffix(".source") {
-            // No key has this name. A barrier without a model is refused above, and one that moves wants the key of a horizon.
-            Some(barrier) => format!("{barrier} {} (`plan_horizon`)", e.message()),
-            None => e.to_string(),
-        })?;
+        .map_err(|e| e.to_string())?;
         let assured = assured.apart(self.apart());
         let Some(policy) = &self.policy else { return Ok(assured) };
         let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;

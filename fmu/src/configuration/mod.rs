@@ -140,6 +140,14 @@ impl Configuration {
         }
     }
 
+    /// What the user has to know of it though it can be used, in words.
+    pub fn warning(&self) -> Option<String> {
+        match self {
+            Self::Filter(c) => c.warning(),
+            Self::Plant(_) | Self::Controller(_) => None,
+        }
+    }
+
     /// The plug-in of its plant, if the plant is one.
     pub fn plugin(&self) -> Option<&Plugin> {
         let plant = match self {
