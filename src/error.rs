@@ -8,10 +8,8 @@ use std::path::{Path, PathBuf};
 use punctual_fmu::configuration::ConfigurationError;
 use serde::Serialize;
 
+use crate::codes;
 use crate::host::{LogMessage, Status};
-
-/// The exit code after Ctrl-C, as shells have it.
-pub const INTERRUPTED: u8 = 130;
 
 /// An error that keeps the command from being carried out.
 #[derive(Debug)]
@@ -286,12 +284,12 @@ impl Error {
         }
     }
 
-    /// The exit code: 1 where an FMU is at fault, 2 where usage, configuration or a file is, [`INTERRUPTED`] after Ctrl-C.
+    /// The exit code, one of [`codes`]: whether an FMU is at fault, a configuration or a file, or it was Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match &*self.0 {
-            Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => 1,
-            Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => 2,
-            Kind::Interrupted { .. } => INTERRUPTED,
+            Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => codes::FOUND,
+            Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => codes::MISUSE,
+            Kind::Interrupted { .. } => codes::INTERRUPTED,
         }
     }
 }

@@ -4,6 +4,7 @@
 //! Each module uses only modules above it (`error` only names the statuses of `host`):
 //!
 //! ```text
+//! codes                the exit codes, in one table
 //! error                the errors of all commands, with names and numbers
 //! text                 files of text, and what is said of others in their place
 //! host                 one FMU: archive, description, library, instance
@@ -29,6 +30,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod campaign;
+pub mod codes;
 pub mod command;
 pub mod coupling;
 pub mod error;

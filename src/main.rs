@@ -6,7 +6,8 @@
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use punctual::codes;
 use punctual::command::{
     build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, shell, validate,
 };
@@ -16,8 +17,7 @@ use serde::Serialize;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 and 3.0 FMUs: build, check, couple, plot and validate.
 ///
-/// Exit codes: 0 success; 1 the run finished but a promise was not kept, or an FMU is at fault; 2 bad
-/// usage or configuration; 130 interrupted, with what was done until then kept. Results go to stdout, talk and progress to stderr.
+/// Results go to stdout, talk and progress to stderr.
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true)]
 struct Arguments {
@@ -61,9 +61,6 @@ enum Command {
     TryPlugin(build::TryPluginArguments),
 }
 
-/// The exit code of wrong usage, as clap has it.
-const USAGE: u8 = 2;
-
 /// What stdout gets under `--json` where a command fails.
 #[derive(Serialize)]
 struct Failure {
@@ -77,12 +74,21 @@ fn main() -> ExitCode {
             output::json(&Failure { error });
         }
     };
-    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+    let program = codes::in_help(Arguments::command());
+    let parsed = program.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
+    let arguments = parsed.unwrap_or_else(|error| {
         // Help and version are no errors.
         if error.use_stderr() {
             let words = error.render().to_string();
             let message = words.trim_start_matches("error: ").trim_end().to_owned();
-            tell(Details { kind: "usage", code: USAGE, file: None, component: None, field: None, message });
+            tell(Details {
+                kind: "usage",
+                code: codes::MISUSE,
+                file: None,
+                component: None,
+                field: None,
+                message,
+            });
         }
         error.exit()
     });

@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use punctual_core::elementary;
+pub use punctual_fmu::text::{labelled, number, number_above, number_below, quantity, shown_unit};
 
 /// Prints a result: `text` and a line break, on stdout.
 pub fn result(text: &str) {
@@ -25,6 +25,29 @@ pub fn json(value: &impl serde::Serialize) {
 /// Prints something that is not a result, on stderr.
 pub fn note(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Prints what the user has to know though the command goes on, on stderr.
+pub fn warning(text: &str) {
+    note(&format!("{} {text}", console::style("warning:").for_stderr().yellow().bold()));
+}
+
+/// `notes` in the form "name: text", those of one text as one note: "name, name: text". Others stay.
+pub fn grouped(notes: impl IntoIterator<Item = String>) -> Vec<String> {
+    let mut groups: Vec<(Vec<String>, String)> = Vec::new();
+    for note in notes {
+        let parts = note.split_once(": ").filter(|(name, _)| !name.contains(' '));
+        let (name, text) = parts.map_or((None, note.as_str()), |(name, text)| (Some(name.to_owned()), text));
+        match groups.iter_mut().find(|(names, known)| known == text && names.is_empty() == name.is_none()) {
+            Some((names, _)) => names.extend(name),
+            None => groups.push((name.into_iter().collect(), text.to_owned())),
+        }
+    }
+    let shown = |(names, text): (Vec<String>, String)| match &names[..] {
+        [] => text,
+        names => format!("{}: {text}", names.join(", ")),
+    };
+    groups.into_iter().map(shown).collect()
 }
 
 /// Prints an error, on stderr.
@@ -156,57 +179,15 @@ fn shown(cell: &str) -> usize {
     console::measure_text_width(cell)
 }
 
-/// A [`number`] with its unit, where it has one.
-pub fn quantity(value: f64, unit: &str) -> String {
-    match unit {
-        "1" | "" => number(value),
-        _ => format!("{} {unit}", number(value)),
-    }
-}
-
-/// A number for people: six significant digits, powers of ten only where they help.
-pub fn number(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !value.is_finite() {
-        return value.to_string();
-    }
-    let size = value.abs();
-    let text = if (1e-4..1e7).contains(&size) {
-        let digits = (5 - elementary::log10(size).floor() as i32).clamp(0, 9) as usize;
-        format!("{value:.digits$}")
-    } else {
-        let text = format!("{value:.5e}");
-        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        return format!("{}e{exponent}", trimmed(mantissa));
-    };
-    trimmed(&text).to_owned()
-}
-
-fn trimmed(text: &str) -> &str {
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short() {
-        let cases = [
-            (0.0, "0"),
-            (10.0, "10"),
-            (-31949.7754, "-31949.8"),
-            (0.001, "0.001"),
-            (1.0 / 3.0, "0.333333"),
-            (1.5e-9, "1.5e-9"),
-            (123_456_789.0, "1.23457e8"),
-            (f64::INFINITY, "inf"),
-        ];
-        for (value, text) in cases {
-            assert_eq!(number(value), text);
-        }
+    fn one_text_is_said_once() {
+        let notes =
+            ["goal: late", "the run ends", "rock: late", "the run ends", "rock: left"].map(str::to_owned);
+        assert_eq!(grouped(notes), ["goal, rock: late", "the run ends", "rock: left"]);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 use punctual_fmu::configuration::{
     BarrierSection, Configuration, FilterConfiguration, RESOURCE, Shape, UNBOUNDED,
 };
+use punctual_fmu::text::labelled;
 
 use crate::coupling::{
     Component, DiscEntry, Model, Outcome, PathEntry, PathPicture, Picture, StartValue, System, TimePicture,
@@ -45,7 +46,7 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Pictur
                 title: None,
                 signals,
                 dashed,
-                ylabel: Some(format!("h, and its profile ({unit})")),
+                ylabel: Some(labelled("h, and its profile", &unit)),
                 deadline: deadlines.next().filter(|_| deadlines.next().is_none()),
                 bounds: vec![0.0],
                 scale: Variant::Linear,
@@ -410,13 +411,8 @@ fn axis_label(recording: &Recording, name: &str, signals: &[&String]) -> String 
         recording.index_of(signal).and_then(|i| recording.columns()[i].unit.clone()).unwrap_or_default()
     };
     let first = signals.first().map(unit).unwrap_or_default();
-    let shared = !first.is_empty() && signals.iter().all(|signal| unit(signal) == first);
-    match (name.is_empty(), shared) {
-        (false, true) => format!("{name} ({first})"),
-        (false, false) => name.to_owned(),
-        (true, true) => format!("value ({first})"),
-        (true, false) => "value".to_owned(),
-    }
+    let shared = signals.iter().all(|signal| unit(signal) == first);
+    labelled(if name.is_empty() { "value" } else { name }, if shared { &first } else { "" })
 }
 
 fn component(signal: &str) -> &str {

@@ -15,7 +15,7 @@ from ._campaign import campaign
 from ._command import run_cli
 from ._configuration import Configuration, to_toml
 from ._enumerations import Assurance, Phase, Status
-from ._error import Error
+from ._error import Error, GuaranteeWarning
 from ._fmu import Variable, build, check, variables
 from ._punctual import BarrierReport, Filter, FilterBatch, Plan, Step, __version__
 from ._pandas import to_pandas
@@ -31,6 +31,7 @@ __all__ = [
     "Error",
     "Filter",
     "FilterBatch",
+    "GuaranteeWarning",
     "Phase",
     "Plan",
     "Promise",

@@ -99,13 +99,13 @@ def _run_for(
     accepted: tuple[int, ...] = (0,),
 ) -> str:
     """Runs the command line for configurations and their files; the names of temporary ones are left out of errors."""
+    temporary = [(configuration, f"{file}: ") for configuration, file in given if isinstance(configuration, Mapping)]
     try:
-        return run(arguments, accepted)
+        return run(arguments, accepted, tuple(head for _, head in temporary))
     except Error as error:
         reason = str(error)
-        for configuration, file in given:
-            if isinstance(configuration, Mapping):
-                reason = with_function(reason.replace(f"{file}: ", ""), configuration)
+        for configuration, head in temporary:
+            reason = with_function(reason.replace(head, ""), configuration)
         raise Error(reason) from None
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate, chain
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from ._command import warn
 from ._error import Error
 from ._slave import Call, Slave, make, opened
 
@@ -61,6 +62,8 @@ def simulate(
     if not 0.0 < step_size < math.inf:
         raise Error(f"step_size: is {step_size}, must be finite and > 0")
     with opened("filter", filter_fmu) as own, opened("plant", plant_fmu) as plant:
+        for text in own.warned:
+            warn(text)
         begin = own.suggested_start if start_time is None else float(start_time)
         if not math.isfinite(begin):
             raise Error(f"start_time: is {begin}, must be finite")

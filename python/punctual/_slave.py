@@ -38,6 +38,8 @@ class Slave:
     def __init__(self, name: str, fmu: Any, description: Any) -> None:
         self.name = name
         self._fmu, self._said = fmu, ""
+        self.warned: list[str] = []
+        """What it warned of."""
         self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
         experiment = description.defaultExperiment
         self.suggested_start = float((experiment and experiment.startTime) or 0.0)
@@ -64,6 +66,8 @@ class Slave:
     def _log(self, _: Any, _name: Any, status: int, _category: Any, message: bytes | None) -> None:
         if status > _WARNING and message:
             self._said = message.decode(errors="replace")
+        elif status == _WARNING and message:
+            self.warned.append(message.decode(errors="replace"))
 
     def names(self, causality: str, kind: str | None = None) -> list[str]:
         """The variables of a causality that are moved, of one kind or of all, in the order of the file."""

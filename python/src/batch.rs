@@ -51,7 +51,10 @@ impl FilterBatch {
     #[new]
     fn new(configuration: &Bound<'_, PyAny>, n: &Bound<'_, PyAny>) -> PyResult<Self> {
         let n = arrays::count(n, "n")?;
-        Self::of(self::configuration(configuration)?, n)
+        let py = configuration.py();
+        let configuration = self::configuration(configuration)?;
+        loading::warn(py, &configuration)?;
+        Self::of(configuration, n)
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, Vec<bool>)>> {

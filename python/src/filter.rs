@@ -46,7 +46,10 @@ pub(crate) struct Filter {
 impl Filter {
     #[new]
     fn new(configuration: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::of(self::configuration(configuration)?)
+        let py = configuration.py();
+        let configuration = self::configuration(configuration)?;
+        loading::warn(py, &configuration)?;
+        Self::of(configuration)
     }
 
     fn __reduce__<'py>(&mut self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, f64, Vec<f64>)>> {

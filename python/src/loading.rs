@@ -12,6 +12,14 @@ use pyo3::types::PyDict;
 
 pyo3::import_exception!(punctual._error, Error);
 
+/// Warns, once for each filter that is made, of what its configuration has lost.
+pub(crate) fn warn(py: Python<'_>, configuration: &FilterConfiguration) -> PyResult<()> {
+    match configuration.warning() {
+        Some(warning) => py.import("punctual._command")?.call_method1("warn", (warning,)).map(|_| ()),
+        None => Ok(()),
+    }
+}
+
 /// Makes `punctual.Error` of the words of `error`.
 pub(crate) fn refused(error: &dyn Display) -> PyErr {
     Error::new_err(error.to_string())

@@ -80,7 +80,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let mut configuration = package::read_configuration(file)?;
+    let mut configuration = super::read(file)?;
     if arguments.model_exchange {
         let refused =
             |e: ConfigurationError| Error::configuration("--model-exchange", e.message()).in_file(file);
@@ -183,6 +183,7 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         Some(Ssp::Two) => SspVersion::Two,
     };
     let packed = package::system::pack(file, &arguments.output, version)?;
+    packed.warnings.iter().for_each(|warning| output::warning(warning));
     output::result(&format!(
         "{}: {} components from {} FMUs, {} connections, {} start values",
         arguments.output.display(),

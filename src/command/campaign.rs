@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use punctual_fmu::configuration::Configuration;
 use serde::Serialize;
 
 use super::run::stem;
 use crate::campaign::{self, Campaign, Measures, Options, Progress, Rare, Rate, Reader, Summary};
-use crate::error::{Error, INTERRUPTED};
+use crate::codes::INTERRUPTED;
+use crate::error::Error;
 use crate::output::{self, Counter, number};
 use crate::report::campaign::{Pages, pages as campaign_pages};
 use crate::whole;
@@ -183,6 +185,11 @@ struct RareReport {
 /// A campaign that cannot be used, files of another one in the way, a file that cannot be read or written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let campaign = Campaign::read(&arguments.campaign)?;
+    for (component, part) in campaign.system().components().iter().zip(campaign.models()) {
+        if let Some(warning) = part.configuration().and_then(Configuration::warning) {
+            output::warning(&format!("{}: {warning}", component.name));
+        }
+    }
     let measures = Measures::new(&campaign)?;
     if let Some(range) = arguments.list {
         return list(arguments, &campaign, range);
@@ -273,8 +280,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let column = format!("{name}.least_h");
             summary.spreads.iter().any(|spread| spread.column == column && spread.count == 0)
         };
-        for barrier in measures.barriers().filter(unseen) {
-            output::note(&format!("note: {barrier}: no run has an h that counts; {}", counts(&campaign)));
+        let note = |barrier: &str| format!("{barrier}: no run has an h that counts; {}", counts(&campaign));
+        for note in output::grouped(measures.barriers().filter(unseen).map(note)) {
+            output::note(&format!("note: {note}"));
         }
     }
     if arguments.json {
@@ -424,7 +432,7 @@ fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {
 fn made(report: &Report) -> String {
     match report.wall_time {
         0.0 => String::new(),
-        time => format!(" in {time:.3} s ({} runs/s)", number(report.runs_per_second)),
+        time => format!(" in {} s ({} runs/s)", number(time), number(report.runs_per_second)),
     }
 }
 
@@ -443,7 +451,8 @@ fn text(report: &Report, summary: &Summary) -> String {
     let mut rows = vec![["number", "unit", "runs", "min", "mean", "max"].map(str::to_owned).to_vec()];
     rows.extend(summary.spreads.iter().filter(|spread| spread.count > 0).map(|s| {
         let numbers = [number(s.min), number(s.mean), number(s.max)];
-        [vec![s.column.clone(), s.unit.clone(), s.count.to_string()], numbers.to_vec()].concat()
+        let unit = output::shown_unit(&s.unit).to_owned();
+        [vec![s.column.clone(), unit, s.count.to_string()], numbers.to_vec()].concat()
     }));
     let spreads = output::table(&rows, &[false, false, true, true, true, true]);
 

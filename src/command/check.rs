@@ -144,7 +144,8 @@ impl StartReport {
     fn words(&self) -> String {
         match (self.on_course, self.simulated) {
             _ if self.guaranteed => {
-                let until = self.guaranteed_until.map(|until| format!(" until {} s", number(until)));
+                let until =
+                    self.guaranteed_until.map(|until| format!(" until {} s", output::number_below(until)));
                 return format!("guaranteed{}, whatever u_ref is", until.unwrap_or_default());
             }
             (true, Some(Kept::Kept)) => "on course, and the closed loop keeps it",
@@ -210,7 +211,7 @@ struct SignalReport {
 /// A configuration or start that cannot be used.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.configuration;
-    let configuration = package::read_configuration(file)?;
+    let configuration = super::read(file)?;
     let started = arguments.plant.is_some() || arguments.x0.is_some();
     if started && !matches!(configuration, Configuration::Filter(_)) {
         let message = format!("is a {}; --plant and --x0 give a start to a filter", configuration.kind());
@@ -507,7 +508,7 @@ fn filter(
         name: c.name.clone(),
         model: c.plant.name(),
         step,
-        no_plans: (!c.is_assured()).then(|| c.unassured().to_owned()),
+        no_plans: (!c.is_assured()).then(|| c.unassured()),
         barriers,
         start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
@@ -756,7 +757,8 @@ fn filter_text(report: &FilterReport) -> String {
     }
     if !report.warnings.is_empty() {
         lines.push(String::new());
-        lines.extend(report.warnings.iter().map(|warning| format!("warning: {warning}")));
+        let warnings = output::grouped(report.warnings.iter().cloned());
+        lines.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
     }
     lines.join("\n")
 }
@@ -766,7 +768,8 @@ fn plant_text(report: &PlantReport) -> String {
     for (prefix, signals) in [("x", &report.states), ("u", &report.inputs)] {
         rows.extend(signals.iter().map(|s| {
             let start = s.start.map(number).unwrap_or_default();
-            vec![format!("{prefix}.{}", s.name), start, s.unit.clone(), s.description.clone()]
+            let unit = output::shown_unit(&s.unit).to_owned();
+            vec![format!("{prefix}.{}", s.name), start, unit, s.description.clone()]
         }));
     }
     format!(
@@ -782,12 +785,10 @@ fn plant_text(report: &PlantReport) -> String {
 
 fn controller_text(report: &ControllerReport) -> String {
     let mut rows = vec![["parameter", "value", "unit", "meaning"].map(str::to_owned).to_vec()];
-    rows.extend(
-        report
-            .parameters
-            .iter()
-            .map(|p| vec![p.name.clone(), number(p.value), p.unit.clone(), p.description.clone()]),
-    );
+    rows.extend(report.parameters.iter().map(|p| {
+        let unit = output::shown_unit(&p.unit).to_owned();
+        vec![p.name.clone(), number(p.value), unit, p.description.clone()]
+    }));
     format!(
         "{}: controller, {} of {}\n\n{}\n\nsteps of {} s; it promises nothing",
         report.name,

@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use crate::coupling::Kept;
 use crate::error::Error;
-use crate::output::{self, number};
+use crate::output::{self, number, number_above, number_below};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.
 const SAMPLES: f64 = 200.0;
@@ -369,13 +369,13 @@ impl ReachReport {
             Verdict::NotKnown => "not known whether it can be met",
         };
         let least = match self.soonest_at_least {
-            Some(time) => format!("at least {} s (no input within the bounds is faster)", number(time)),
+            Some(time) => format!("at least {} s (no input within the bounds is faster)", number_below(time)),
             None => "no lower bound is known".to_owned(),
         };
         let is_planned = self.by_plan && !self.by_loop;
         let who = if is_planned { "a plan does it" } else { "this filter does it, simulated" };
         let most = match self.soonest_at_most {
-            Some(time) => format!("at most {} s ({who})", number(time)),
+            Some(time) => format!("at most {} s ({who})", number_above(time)),
             None => "no upper bound was found".to_owned(),
         };
         vec![("bounds", verdict.to_owned()), ("soonest", least), ("", most)]

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::output::{self, Progress};
+use crate::output::{self, Progress, number, quantity};
 use crate::reproduce::cases::{self, DEADLINE};
 use crate::reproduce::demo::{self, Run, Summary};
 
@@ -88,17 +88,14 @@ fn text(runs: &[[Run; 3]]) -> String {
         rows.push(vec![
             run.case.vehicle.title().to_owned(),
             run.case.title.to_owned(),
+            // To the step, by which some are late.
             format!("{DEADLINE:.3} s"),
             s.arrival.map_or("never".to_owned(), |t| format!("{t:.3} s")),
-            format!("{:.3} {}", s.min_h_after_deadline, run.case.setup.shape.unit()),
-            if s.farthest_outside > 0.0 {
-                format!("{:.2} m", s.farthest_outside)
-            } else {
-                "never".to_owned()
-            },
+            quantity(s.min_h_after_deadline, run.case.setup.shape.unit()),
+            if s.farthest_outside > 0.0 { quantity(s.farthest_outside, "m") } else { "never".to_owned() },
             peaks(run, s.peak_to_arrival, s.peak_norm_to_arrival),
             peaks(run, s.peak, s.peak_norm),
-            output::number(s.steps_per_second.round()),
+            number(s.steps_per_second),
         ]);
     }
     format!(
@@ -114,14 +111,10 @@ fn text(runs: &[[Run; 3]]) -> String {
 /// The length of the input vector where its components share a unit, else both components.
 fn peaks(run: &Run, values: [f64; 2], norm: f64) -> String {
     match run.case.vehicle.inputs() {
-        [first, second] if first.unit == second.unit => format!("{} {}", short(norm), cases::unit(first)),
+        [first, second] if first.unit == second.unit => quantity(norm, &cases::unit(first)),
         inputs => {
-            let each = inputs.iter().zip(values).map(|(input, value)| (cases::unit(input), short(value)));
-            each.map(|(unit, value)| format!("{value} {unit}")).collect::<Vec<_>>().join(", ")
+            let each = inputs.iter().zip(values).map(|(input, value)| quantity(value, &cases::unit(input)));
+            each.collect::<Vec<_>>().join(", ")
         }
     }
-}
-
-fn short(value: f64) -> String {
-    if value < 100.0 { format!("{value:.2}") } else { format!("{value:.0}") }
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::output::Progress;
+use crate::output::{Progress, labelled};
 use crate::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
 use crate::whole;
 
@@ -129,7 +129,7 @@ pub(super) fn starts(
     let signals = c.measured_states();
     let label = |axis: usize| {
         let state = &signals[plane.states[axis]];
-        format!("{} at the start ({})", state.name, state.unit)
+        labelled(&format!("{} at the start", state.name), &state.unit)
     };
     let in_plane = plane.states == [0, 1] && c.plant.model().is_some();
     let promised = cells.iter().filter(|kind| **kind == 0).count();
@@ -180,7 +180,7 @@ pub(super) fn plan(
             barrier.deadline.map(|deadline| Mark { label: "deadline".to_owned(), at: t + deadline });
         panels.push(TimePlot {
             title: if i == 0 { format!("{}: the plan", c.name) } else { String::new() },
-            y_label: format!("{} ({})", barrier.name, barrier.unit(&c.plant)),
+            y_label: labelled(&barrier.name, &barrier.unit(&c.plant)),
             series: vec![series],
             instants: deadline.filter(|mark| mark.at <= end).into_iter().collect(),
             bounds: vec![Mark { label: String::new(), at: 0.0 }],
@@ -198,7 +198,7 @@ pub(super) fn plan(
         };
         let limits = c.bounds.get(&input.name).copied().unwrap_or_default();
         panels.push(TimePlot {
-            y_label: format!("{} ({})", input.name, input.unit),
+            y_label: labelled(&input.name, &input.unit),
             series: vec![series],
             bounds: limits.map(|at| Mark { label: String::new(), at }).into(),
             ..TimePlot::default()
@@ -219,7 +219,7 @@ pub(super) fn plan(
             .and_then(|i| h.iter().position(|h| h[i] >= 0.0));
         let path =
             plot::Path { label: "plan".to_owned(), x: along(0), y: along(1), arrival, style: Style::Solid };
-        let label = |i: usize| format!("{} ({})", states[i].name, states[i].unit);
+        let label = |i: usize| labelled(&states[i].name, &states[i].unit);
         files.push(file("path"));
         let picture = PathPlot {
             title: format!("{}: the plan", c.name),

@@ -16,10 +16,24 @@ pub mod shell;
 pub mod validate;
 mod witness;
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::error::{Error, INTERRUPTED};
+use punctual_fmu::configuration::Configuration;
+
+use crate::codes::INTERRUPTED;
+use crate::error::Error;
+use crate::{output, package};
+
+/// Reads a configuration file, and prints what the user has to know of it.
+fn read(file: &Path) -> Result<Configuration, Error> {
+    let configuration = package::read_configuration(file)?;
+    if let Some(warning) = configuration.warning() {
+        output::warning(&format!("{}: {warning}", file.display()));
+    }
+    Ok(configuration)
+}
 
 /// What is set at the first Ctrl-C; the second one ends the program at once.
 fn interruption() -> Result<Arc<AtomicBool>, Error> {

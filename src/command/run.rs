@@ -6,16 +6,18 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::ValueEnum;
 use punctual_core::filter::Standing;
 use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
 use serde::Serialize;
 
 use super::check;
+use crate::codes;
 use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
-use crate::output::{self, Progress};
+use crate::output::{self, Progress, number};
 use crate::package;
 use crate::pictures;
 use crate::recording::{self, Recording};
@@ -45,35 +47,45 @@ pub struct Arguments {
     /// Run in a process of its own: report a crash of an FMU, and keep the rows until then
     #[arg(long)]
     isolate: bool,
-    /// Exit with code 1 unless every barrier of every filter was on time and inside from then on
-    /// (`on_time_and_inside`), and each of its samples met the constraint too (`kept`)
-    #[arg(long, value_enum, value_name = "WHAT")]
-    require: Option<Requirement>,
+    /// List the signals too: unit, least, greatest and final value
+    #[arg(long)]
+    signals: bool,
+    /// What every barrier of every filter has to fulfil, else the exit code is 1
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = Requirement::Unbroken)]
+    require: Requirement,
     /// The folder of a run that another process watches
     #[arg(long, hide = true, value_name = "DIR", conflicts_with = "isolate")]
     watched: Option<PathBuf>,
 }
 
-/// Requirements on a run.
+/// Requirements on a run, each with what the one before asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 #[value(rename_all = "snake_case")]
-enum Requirement {
-    Kept,
+pub enum Requirement {
+    /// Nothing: the exit code does not tell of promises
+    Nothing,
+    /// No promise was seen broken, whether it was guaranteed, refused or made by rows alone
+    Unbroken,
+    /// On time, and inside from then on: nothing is open at the end, and something was promised
     OnTimeAndInside,
+    /// Every sample met the constraint too
+    Kept,
+    /// A plan was behind it at every sample too
+    Guaranteed,
 }
 
 impl Requirement {
-    fn word(self) -> &'static str {
-        match self {
-            Self::Kept => "kept",
-            Self::OnTimeAndInside => "on_time_and_inside",
-        }
+    fn word(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
     fn is_met(self, promise: &Promise) -> bool {
         match self {
-            Self::Kept => promise.kept(),
+            Self::Nothing => true,
+            Self::Unbroken => promise.promise != Kept::Broken,
             Self::OnTimeAndInside => promise.promise == Kept::Kept,
+            Self::Kept => promise.kept(),
+            Self::Guaranteed => promise.kept() && promise.guaranteed == Some(true),
         }
     }
 }
@@ -146,9 +158,8 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     words.extend(arguments.report.then(|| "--report".into()));
     words.extend(arguments.units.then(|| "--units".into()));
     words.extend(arguments.json.then(|| "--json".into()));
-    if let Some(required) = arguments.require {
-        words.extend(["--require".into(), required.word().into()]);
-    }
+    words.extend(arguments.signals.then(|| "--signals".into()));
+    words.extend(["--require".into(), arguments.require.word().into()]);
     words.extend(["--watched".into(), child.folder().into(), "--".into(), arguments.system.clone().into()]);
     let (how, last) = match child.run(words, Voice::Loud, None)? {
         End::Finished(code) => return Ok(ExitCode::from(u8::try_from(code).unwrap_or(1))),
@@ -226,6 +237,9 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
 
+    for warning in simulation.warnings() {
+        output::warning(warning);
+    }
     simulation.stop_by(super::interruption()?);
     let experiment = *system.experiment();
     let mut progress = Progress::new(path.display().to_string());
@@ -246,11 +260,12 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         return Err(failure);
     }
     let mut notes = outcome.notes.clone();
-    notes.extend(nothing_promised(&outcome.promises));
+    notes.extend(remarks(&outcome.promises));
     if let Some(filter) = filter {
         let is_refused = is_refused(&outcome.recording);
         notes.extend(check::known(&filter, is_refused).map_err(|e| e.in_file(path))?);
     }
+    let notes = output::grouped(notes.into_iter());
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {
@@ -267,17 +282,25 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         }
     }
     let report = summary(path, &system, &models, outcome, files, notes);
-    for note in &report.notes {
+    for note in report.notes.iter().filter(|note| !simulation.warnings().contains(note)) {
         output::note(&format!("note: {note}"));
     }
     if arguments.json {
         output::json(&report);
     } else {
-        output::result(&text(&report));
+        output::result(&text(&report, arguments.signals));
     }
-    let broken =
-        arguments.require.is_some_and(|required| !report.promises.iter().all(|p| required.is_met(p)));
-    Ok(if broken { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    let required = arguments.require;
+    let missed = report.promises.iter().filter(|promise| !required.is_met(promise));
+    let missed: Vec<_> = missed.map(|promise| promise.barrier.as_str()).collect();
+    if missed.is_empty() {
+        return Ok(ExitCode::from(codes::DONE));
+    }
+    // What is broken is seen from the verdict.
+    if required != Requirement::Unbroken {
+        output::note(&format!("note: --require {} is not met by {}", required.word(), missed.join(", ")));
+    }
+    Ok(ExitCode::from(codes::FOUND))
 }
 
 /// Whether the filter of a file that runs alone refused its promise at the first sample.
@@ -360,40 +383,57 @@ fn summary(
     }
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &Report, signals: bool) -> String {
     let row = |cells: [&str; 5]| cells.map(str::to_owned).to_vec();
     let mut components = vec![vec!["component".to_owned(), "model".to_owned(), "FMU".to_owned()]];
     components.extend(report.components.iter().map(|c| vec![c.name.clone(), c.model.clone(), c.fmu.clone()]));
-    let mut signals = vec![row(["signal", "unit", "min", "max", "final"])];
-    signals.extend(report.signals.iter().map(|s| {
-        let number = output::number;
-        row([&s.name, s.unit.as_deref().unwrap_or(""), &number(s.min), &number(s.max), &number(s.last)])
-    }));
     let mut text = format!(
-        "{}\n\n{} steps of {} s to t = {} s in {:.3} s ({} steps/s)\n\n{}{}",
+        "{}\n\n{} steps of {} s to t = {} s in {} s ({} steps/s)",
         output::table(&components, &[]),
         report.steps,
-        report.step,
-        report.final_time,
-        report.wall_time,
-        output::number(report.steps_per_second.round()),
-        promises_text(&report.promises),
-        output::table(&signals, &[false, false, true, true, true]),
+        number(report.step),
+        number(report.final_time),
+        number(report.wall_time),
+        number(report.steps_per_second),
     );
+    if signals {
+        let mut rows = vec![row(["signal", "unit", "min", "max", "final"])];
+        rows.extend(report.signals.iter().map(|s| {
+            let unit = output::shown_unit(s.unit.as_deref().unwrap_or(""));
+            row([&s.name, unit, &number(s.min), &number(s.max), &number(s.last)])
+        }));
+        text += &format!("\n\n{}", output::table(&rows, &[false, false, true, true, true]));
+    } else if report.promises.is_empty() {
+        text += &format!("\n\n{} signals recorded: --signals lists them", report.signals.len());
+    }
     if !report.files.is_empty() {
         text.push_str("\n\nwritten: ");
         text.push_str(&report.files.join("\n         "));
     }
+    // The verdict comes last, where it is read.
+    if let Some((verdict, sentence)) = coupling::verdict(&report.promises) {
+        let sentence = match verdict {
+            Kept::Kept | Kept::Broken => output::verdict(&sentence, verdict == Kept::Kept),
+            Kept::Open | Kept::NothingPromised => sentence,
+        };
+        text += &format!("\n\n{}{sentence}", promises_text(&report.promises));
+    }
     text
 }
 
-/// Barriers without any promise.
-pub(super) fn nothing_promised(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
-    promises.iter().filter(|p| p.promise == Kept::NothingPromised).map(|p| {
-        format!(
-            "{} is outside at the start and without a deadline: nothing is promised; give it a deadline",
-            p.barrier
-        )
+/// What the user should know of promises beside their verdicts.
+fn remarks(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
+    promises.iter().filter_map(|p| {
+        let text = match p.promise {
+            Kept::NothingPromised => {
+                "outside at the start and without a deadline: nothing is promised; give it a deadline"
+            }
+            Kept::Kept if p.refused => {
+                "refused at the start, and kept in this run all the same; another u_ref may miss it"
+            }
+            _ => return None,
+        };
+        Some(format!("{}: {text}", p.barrier))
     })
 }
 
@@ -408,7 +448,7 @@ pub(super) fn shown(promise: Kept) -> String {
 /// By how many seconds a deadline was missed; `never` where what it is for was not reached.
 pub(super) fn lateness(late_by: Option<f64>, never: &str) -> String {
     match late_by {
-        Some(late) if late.is_finite() => output::number(late),
+        Some(late) if late.is_finite() => number(late),
         Some(_) => never.to_owned(),
         None => "-".to_owned(),
     }
@@ -431,7 +471,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
         "violation",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    let time = |t: Option<f64>| t.map_or_else(|| "-".to_owned(), output::number);
+    let time = |t: Option<f64>| t.map_or_else(|| "-".to_owned(), number);
     rows.extend(promises.iter().map(|p| {
         vec![
             p.barrier.clone(),
@@ -442,7 +482,7 @@ pub(super) fn promises_text(promises: &[Promise]) -> String {
             if p.constraint_met { "met" } else { "not met" }.to_owned(),
             p.unmet.to_string(),
             p.longest.to_string(),
-            output::number(p.violation),
+            number(p.violation),
         ]
     }));
     let right = [false, false, true, true, true, false, true, true, true];

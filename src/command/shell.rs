@@ -1,12 +1,13 @@
 //! `punctual completions` and `punctual man`: what a shell and `man` know of the commands.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap_complete::Shell;
 
 use crate::error::Error;
-use crate::{output, whole};
+use crate::{codes, output, whole};
 
 /// Arguments of `punctual completions`.
 #[derive(Debug, clap::Args)]
@@ -50,11 +51,16 @@ pub fn execute_man(arguments: &ManArguments, mut program: clap::Command) -> Resu
         program.get_subcommands().filter(|command| !command.is_hide_set() && command.get_name() != "help");
     let pages = shown.cloned().map(|command| {
         let name = format!("punctual-{}", command.get_name());
-        (name.clone(), command.display_name(name))
+        let codes = codes::in_man(Some(command.get_name()));
+        (name.clone(), command.display_name(name), codes)
     });
-    for (name, command) in pages.chain([("punctual".to_owned(), program.clone())]) {
+    for (name, command, codes) in pages.chain([("punctual".to_owned(), program.clone(), codes::in_man(None))])
+    {
         let man = clap_mangen::Man::new(command);
-        whole::write_with(&folder.join(format!("{name}.1")), |out| man.render(out))?;
+        whole::write_with(&folder.join(format!("{name}.1")), |out| {
+            man.render(out)?;
+            out.write_all(codes.as_bytes())
+        })?;
     }
     output::result(&format!("written: {}", folder.join("punctual.1").display()));
     Ok(ExitCode::SUCCESS)

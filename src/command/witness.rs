@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::closed_loop::LoopReport;
 use super::map;
 use crate::error::Error;
-use crate::output::{self, number};
+use crate::output::{self, number, number_above, number_below};
 
 /// The finding on plans from the start.
 #[derive(Serialize)]
@@ -195,9 +195,9 @@ impl WitnessReport {
     pub(super) fn text(&self) -> String {
         let mut lines = vec![match (self.found, &self.reason) {
             (true, _) => {
-                let until = self
-                    .until()
-                    .map(|until| format!(", until {} s; it is prolonged where one is found", number(until)));
+                let until = self.until().map(|until| {
+                    format!(", until {} s; it is prolonged where one is found", number_below(until))
+                });
                 let keeps = "a plan within the bounds keeps every promise, whatever u_ref is";
                 format!("\nwitness: {keeps}{}", until.unwrap_or_default())
             }
@@ -209,14 +209,17 @@ impl WitnessReport {
             lines.push(format!(
                 "none ends at rest; with plan_horizon = {} there is one until {} s, to be prolonged on the way",
                 number(horizon),
-                number(until)
+                number_below(until)
             ));
         }
         if !self.left_out.is_empty() {
             lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
         }
-        let soonest: Vec<_> =
-            self.soonest.iter().map(|(name, deadline)| format!("{name} {} s", number(*deadline))).collect();
+        let soonest: Vec<_> = self
+            .soonest
+            .iter()
+            .map(|(name, deadline)| format!("{name} {} s", number_above(*deadline)))
+            .collect();
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
         } else if self.has_deadline && !self.found && !self.vain && self.plan.is_none() {
@@ -237,7 +240,9 @@ impl WitnessReport {
             let of = if self.found { "the plan" } else { "the plan for that" };
             let ending = match (plan.rest, plan.until) {
                 (Some(rest), _) => format!("at rest from {} s", number(rest)),
-                (None, until) => format!("until {} s, without a rest", number(until.unwrap_or(f64::NAN))),
+                (None, until) => {
+                    format!("until {} s, without a rest", number_below(until.unwrap_or(f64::NAN)))
+                }
             };
             lines.push(format!("{of}: {ending}; {}", inputs.join(", ")));
             if let Some((barrier, time, slack, unit)) = &plan.tightest {

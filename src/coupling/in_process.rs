@@ -27,7 +27,8 @@ impl InProcess {
     /// A GUID that is not the configuration's.
     pub fn new(name: &str, configuration: Configuration, guid: &str) -> Result<Self, Error> {
         let instance = Instance::new(configuration, guid).map_err(|e| Error::broken(name, e))?;
-        Ok(Self { name: name.to_owned(), instance, notice: None, whole: Vec::new() })
+        let notice = instance.warning();
+        Ok(Self { name: name.to_owned(), instance, notice, whole: Vec::new() })
     }
 
     /// The error of a refused call: the instance, the call and the time.
@@ -66,7 +67,7 @@ impl Participant for InProcess {
 
     fn reset(&mut self) -> Result<(), Error> {
         self.instance.reset();
-        self.notice = None;
+        self.notice = self.instance.warning();
         Ok(())
     }
 

@@ -18,6 +18,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use punctual_fmu::text::number;
+
 use super::grid::Grid;
 use super::layout::{Layout, Recorder};
 use super::model::{Model, Reader};
@@ -93,6 +95,8 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// Whether each slot has been reported as not finite.
     reported: Vec<bool>,
     notes: Vec<String>,
+    /// How many of the notes are [`Self::warnings`], the first ones.
+    warnings: usize,
     /// Notes that hold for every run.
     standing_notes: usize,
     used: bool,
@@ -139,6 +143,11 @@ pub struct Statistics {
     pub final_time: f64,
     /// Wall time of the steps, without loading and initialisation.
     pub wall_time: Duration,
+}
+
+/// What `participant` has to say, with its name.
+fn remark(participant: &impl Participant) -> Option<String> {
+    participant.remark().map(|remark| format!("{}: {remark}", participant.name()))
 }
 
 impl Statistics {
@@ -210,7 +219,8 @@ impl<P: Participant> Simulation<P> {
         // Give slots to all signals that are recorded, watched or connected.
         let watched = promises::ports(system, descriptions, &links);
         let mut read = recorded.clone();
-        read.extend(watched.iter().flat_map(|ports| ports.fields.iter().chain([&ports.status])));
+        let of_plans = |ports: &promises::Ports| ports.plans.into_iter().flatten();
+        read.extend(watched.iter().flat_map(|p| p.fields.into_iter().chain([p.status]).chain(of_plans(p))));
         let mut layout = Layout::default();
         let mut groups = Vec::new();
         for (component, description) in descriptions.iter().enumerate() {
@@ -243,7 +253,13 @@ impl<P: Participant> Simulation<P> {
                 sources: layout.sources(component, &links),
             });
         }
-        // The simulation at its start, with notes that hold for every run.
+        // The simulation at its start, with notes that hold for every run: first those of the components.
+        let remarks = members.iter().filter_map(|member| remark(&member.participant));
+        let mut standing: Vec<String> = remarks.collect();
+        let warnings = standing.len();
+        if system.experiment().order == Order::GaussSeidel {
+            standing.extend(notes);
+        }
         let experiment = system.experiment();
         let mut simulation = Self {
             members,
@@ -260,7 +276,8 @@ impl<P: Participant> Simulation<P> {
             reported: vec![false; layout.ports.len()],
             promises: watched.iter().filter_map(|ports| Watched::new(&layout, ports)).collect(),
             names: layout.names,
-            notes: if experiment.order == Order::GaussSeidel { notes } else { Vec::new() },
+            notes: standing,
+            warnings,
             standing_notes: 0,
             used: false,
             courses: Vec::new(),
@@ -271,6 +288,11 @@ impl<P: Participant> Simulation<P> {
         simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)
+    }
+
+    /// What the components have to say before any run, each with its name: part of the notes of every run.
+    pub fn warnings(&self) -> &[String] {
+        &self.notes[..self.warnings]
     }
 
     /// Gives a Real parameter or input another start value, from the next run on.
@@ -362,9 +384,9 @@ impl<P: Participant> Simulation<P> {
             if ran.is_ok() {
                 ran = member.participant.terminate();
             }
-            if let Some(remark) = member.participant.remark() {
-                self.notes.push(format!("{}: {remark}", member.participant.name()));
-            }
+            // What it said before the run is among the notes.
+            let said = remark(&member.participant).filter(|remark| !self.notes.contains(remark));
+            self.notes.extend(said);
         }
         self.notes.extend(self.promises.iter().filter_map(Watched::note));
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
@@ -546,13 +568,16 @@ impl<P: Participant> Simulation<P> {
 
     #[cold]
     fn report_not_finite(&mut self, slots: std::ops::Range<usize>, time: f64) {
+        let mut found = Vec::new();
         for slot in slots {
             if !self.values[slot].is_finite() && !self.reported[slot] {
                 self.reported[slot] = true;
-                let (name, value, time) = (&self.names[slot], self.values[slot], brief_time(time));
-                self.notes
-                    .push(format!("{name} is {value} at t = {time} s for the first time; the run goes on"));
+                found.push(format!("{} is {}", self.names[slot], self.values[slot]));
             }
+        }
+        if !found.is_empty() {
+            let (found, time) = (found.join(", "), brief_time(time));
+            self.notes.push(format!("{found} at t = {time} s for the first time; the run goes on"));
         }
     }
 
@@ -576,8 +601,9 @@ impl<P: Participant> Simulation<P> {
             if !description.any_step {
                 let name = member.participant.name();
                 self.notes.push(format!(
-                    "the last step is {last} s long, but the FMU of {name} does not say that it can handle steps \
-                     of different length"
+                    "the last step is {} s long, but the FMU of {name} does not say that it can handle steps \
+                     of different length",
+                    number(last)
                 ));
             }
         }

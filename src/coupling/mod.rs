@@ -21,7 +21,7 @@ pub use in_process::InProcess;
 pub use master::{Course, Outcome, Simulation, Statistics};
 pub use model::{Model, Own, Reader};
 pub use network::{Link, Port, links, port};
-pub use promises::{Kept, Promise, check_fed};
+pub use promises::{Kept, Promise, check_fed, verdict};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,
     StartValue, System, TimePicture, Variant,

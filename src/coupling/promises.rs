@@ -5,7 +5,7 @@
 //! Where a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is that of the point
 //! before.
 
-use punctual_core::filter::{Phase, Status};
+use punctual_core::filter::{Phase, Standing as Stands, Status};
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
 use punctual_fmu::configuration::over_seconds;
 use serde::Serialize;
@@ -18,6 +18,10 @@ use crate::host::{Causality, Description, Family};
 
 /// The outputs of a barrier that are read.
 const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
+
+/// Those of a filter that follows plans: that of the whole filter, and that of the barrier.
+const PLANS: &str = "assurance";
+const GUARANTEED: &str = "guaranteed";
 
 /// Verdicts on a promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -43,6 +47,19 @@ impl Kept {
             Self::NothingPromised => "nothing promised",
         }
     }
+}
+
+/// What became of all `promises`, in a sentence; `None` where there are none.
+pub fn verdict(promises: &[Promise]) -> Option<(Kept, String)> {
+    let count = |verdict| promises.iter().filter(|p| p.promise == verdict).count();
+    let (broken, kept) = (count(Kept::Broken), count(Kept::Kept));
+    Some(match (broken, promises.len()) {
+        (_, 0) => return None,
+        (0, all) if kept == all => (Kept::Kept, "Every promise is kept.".to_owned()),
+        (0, all) => (Kept::Open, format!("{kept} of {all} promises are kept, none is broken.")),
+        (_, 1) => (Kept::Broken, "The promise is not kept.".to_owned()),
+        (_, all) => (Kept::Broken, format!("{broken} of {all} promises are not kept.")),
+    })
 }
 
 impl From<Verdict> for Kept {
@@ -83,6 +100,10 @@ pub struct Promise {
     pub left: Option<f64>,
     /// Least h while it was to be inside.
     pub least_h: Option<f64>,
+    /// Whether the filter found no plan at the start, and so promised nothing.
+    pub refused: bool,
+    /// Whether a plan was behind it at every sample; `None` where the filter follows none.
+    pub guaranteed: Option<bool>,
     /// Samples that did not meet its constraint, or had no valid input to meet it with.
     pub unmet: u64,
     /// The greatest number of such samples in a row.
@@ -114,6 +135,8 @@ pub(super) struct Ports {
     name: String,
     pub(super) status: Port,
     pub(super) fields: [Port; FIELDS.len()],
+    /// [`PLANS`] and [`GUARANTEED`], where the filter follows plans.
+    pub(super) plans: Option<[Port; 2]>,
     rearm: Option<Port>,
     /// The value reference of its deadline, and the value where none is set.
     deadline: Option<(u32, f64)>,
@@ -136,6 +159,7 @@ pub(super) struct Watched {
     status: usize,
     rearm: Option<usize>,
     fields: [usize; FIELDS.len()],
+    plans: Option<[usize; 2]>,
     states: Vec<usize>,
     /// The state that changes in the course of a run.
     run: Run,
@@ -154,6 +178,8 @@ struct Run {
     in_a_row: u64,
     longest: u64,
     violation: f64,
+    refused: bool,
+    guaranteed: Option<bool>,
     zeros: Zeros,
 }
 
@@ -226,6 +252,8 @@ impl Run {
             in_a_row: 0,
             longest: 0,
             violation: 0.0,
+            refused: false,
+            guaranteed: None,
             zeros: Zeros::default(),
         }
     }
@@ -257,6 +285,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
                 name: format!("{}.{barrier}", owner.name),
                 status,
                 fields: [unmet, slack, h, late, phase],
+                plans: output(PLANS).zip(output(&format!("{barrier}.{GUARANTEED}"))).map(|(a, g)| [a, g]),
                 rearm: description.index_of("rearm").map(|variable| Port { component, variable }),
                 deadline: parameter.and_then(|v| Some((v.value_reference, v.start?))),
                 course: if straight { Course::Straight } else { Course::Smooth },
@@ -381,6 +410,10 @@ impl Watched {
             status: layout.slot(ports.status)?,
             rearm: ports.rearm.and_then(|port| layout.slot(port)),
             fields: slots,
+            plans: match ports.plans {
+                Some([plans, guaranteed]) => Some([layout.slot(plans)?, layout.slot(guaranteed)?]),
+                None => None,
+            },
             states: ports.states.iter().filter_map(|port| layout.slot(*port)).collect(),
             run: Run::new(None, ports.course),
         })
@@ -418,10 +451,17 @@ impl Watched {
             run.before = run.before.filter(|before| before.verdict() == Verdict::Broken).or(Some(judged));
             run.judge = Judge::new(run.deadline, self.course);
             run.started = false;
+            run.guaranteed = None;
         }
         run.rearm = rearm;
         run.started |= !invalid;
         if run.started {
+            if let Some([plans, guaranteed]) = self.plans.map(|slots| slots.map(|slot| values[slot])) {
+                run.refused |= plans == f64::from(Stands::Refused as u8);
+                // A barrier that is let go is behind its promise.
+                let stands = guaranteed != 0.0 || is(Phase::Released);
+                run.guaranteed = Some(run.guaranteed != Some(false) && stands);
+            }
             let standing = match () {
                 () if is(Phase::Released) => Standing::Released,
                 () if is(Phase::Waiting) => Standing::Waiting,
@@ -461,6 +501,8 @@ impl Watched {
             late_by: None,
             left: None,
             least_h: None,
+            refused: run.refused,
+            guaranteed: run.guaranteed,
             unmet: run.unmet,
             longest: run.longest,
             violation: run.violation,

@@ -22,7 +22,7 @@ use crate::whole;
 const START_VALUES: &str = "resources/start_values.ssv";
 
 /// Numbers of a package.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Packed {
     /// Number of components.
     pub components: usize,
@@ -32,6 +32,8 @@ pub struct Packed {
     pub connections: usize,
     /// Number of start values.
     pub start_values: usize,
+    /// What the user has to know of configurations that were built, by file.
+    pub warnings: Vec<String>,
 }
 
 /// Writes the package of the system at `path` to `file`, in this version of SSP.
@@ -50,16 +52,18 @@ pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Err
     Ok(packed)
 }
 
-/// The FMU at `path`, or the one that the configuration there becomes, and its bytes.
-fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>), Error> {
+/// The FMU at `path`, or the one that the configuration there becomes, and its bytes; what the user has to know of the
+/// configuration.
+fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>, Option<String>), Error> {
     let read = |file: &Path| std::fs::read(file).map_err(|e| Error::io("read", file, e));
     if !text::is_toml(path) {
-        return Ok((Rc::new(Fmu::open(path)?), read(path)?));
+        return Ok((Rc::new(Fmu::open(path)?), read(path)?, None));
     }
     let configuration = super::read_configuration(path)?;
+    let warning = configuration.warning().map(|warning| format!("{}: {warning}", path.display()));
     let folder = tempfile::tempdir().map_err(|e| Error::io("make a folder in", &std::env::temp_dir(), e))?;
     let file = folder.path().join("made.fmu");
-    Ok((super::build(configuration, &[], &file, false)?, read(&file)?))
+    Ok((super::build(configuration, &[], &file, false)?, read(&file)?, warning))
 }
 
 /// The FMUs of a system, each file once.
@@ -68,11 +72,13 @@ struct Store {
     fmus: Vec<(Rc<Fmu>, String, Vec<u8>)>,
     /// The index of the FMU of each component.
     of_component: Vec<usize>,
+    /// What the user has to know of configurations, by file.
+    warnings: Vec<String>,
 }
 
 impl Store {
     fn open(system: &System, base: &Path) -> Result<Self, Error> {
-        let mut store = Self { fmus: Vec::new(), of_component: Vec::new() };
+        let mut store = Self { fmus: Vec::new(), of_component: Vec::new(), warnings: Vec::new() };
         let mut known = BTreeMap::new();
         for (i, component) in system.components().iter().enumerate() {
             let path = base.join(&component.fmu);
@@ -90,7 +96,8 @@ impl Store {
                 let message = format!("there is no file {}{advice}", path.display());
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            let (fmu, bytes) = fmu(&path).map_err(|e| e.in_component(&component.name))?;
+            let (fmu, bytes, warning) = fmu(&path).map_err(|e| e.in_component(&component.name))?;
+            store.warnings.extend(warning);
             let place = store.place(&path);
             known.insert(path, store.fmus.len());
             store.of_component.push(store.fmus.len());
@@ -188,6 +195,7 @@ fn archive(
         fmus: store.fmus.len(),
         connections: structure.connections.len(),
         start_values: parameters.len(),
+        warnings: store.warnings.clone(),
     };
     // Pack.
     let broken = |e: punctual_modeldescription::Error| super::broken(&e);

@@ -13,7 +13,7 @@ use crate::campaign::{
 };
 use crate::coupling::StartValue;
 use crate::error::Error;
-use crate::output::number;
+use crate::output::{labelled, number, shown_unit};
 use crate::page::{Page, escape, json};
 use crate::plot::{self, Chart, Curve, Mark, Scaling, Style, seven_digits};
 
@@ -190,11 +190,8 @@ fn axes(campaign: &Campaign, measures: &Measures, summary: &Summary) -> Vec<Axis
         if varied.is_some_and(|varied| matches!(varied.distribution, Distribution::Seed)) {
             return None;
         }
-        let label = |unit: &str| {
-            if unit.is_empty() { column.name.clone() } else { format!("{} ({unit})", column.name) }
-        };
         Some(Axis {
-            label: label(&column.unit),
+            label: labelled(&column.name, &column.unit),
             logarithmic: varied.is_some_and(|v| matches!(v.distribution, Distribution::LogUniform { .. })),
             values: Vec::new(),
             column: c,
@@ -492,7 +489,7 @@ fn worst(campaign: &Campaign, measures: &Measures, cases: &[Case], again: &[Stri
     let column = |name: &str| measures.columns().iter().find(|column| column.name == name);
     let heads = campaign.varied().iter().map(|varied| {
         let unit = column(&varied.name).map_or("", |column| &column.unit);
-        escape(&if unit.is_empty() { varied.name.clone() } else { format!("{} ({unit})", varied.name) })
+        escape(&labelled(&varied.name, unit))
     });
     let heads: Vec<String> = ["run", "verdict", "again, with pictures", "least h"]
         .map(str::to_owned)
@@ -547,7 +544,7 @@ fn varied(campaign: &Campaign) -> String {
 fn numbers(summary: &Summary) -> String {
     let spreads = summary.spreads.iter().filter(|spread| spread.count > 0);
     let rows = spreads.map(|s| {
-        let texts = [&s.column, &s.unit].map(|text| escape(text));
+        let texts = [&s.column, shown_unit(&s.unit)].map(escape);
         let numbers = [s.count.to_string(), number(s.min), number(s.mean), number(s.max)];
         texts.into_iter().chain(numbers).collect()
     });

@@ -8,8 +8,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::coupling::{Kept, Model, Outcome, Promise, System};
-use crate::output::number;
+use crate::coupling::{self, Kept, Model, Outcome, Promise, System};
+use crate::output::{labelled, number, quantity, shown_unit};
 use crate::page::{Page, escape, json};
 use crate::pictures::{self, Group, Part};
 use crate::plot::{self, Chart, Curve, Mark, POINTS, Scaling, Style};
@@ -126,10 +126,11 @@ fn head(file: &str, parts: &[Part<'_>], outcome: &Outcome, notes: &[String]) -> 
         number(first),
         number(statistics.final_time)
     );
-    if promises.is_empty() {
-        html += "<p>There is no filter of this program in it, so there is no promise to judge.</p>\n";
-    } else {
-        html += &verdicts(parts, outcome);
+    match coupling::verdict(promises) {
+        None => {
+            html += "<p>There is no filter of this program in it, so there is no promise to judge.</p>\n";
+        }
+        Some(verdict) => html += &verdicts(parts, outcome, verdict),
     }
     html += &peaks(parts, &outcome.recording);
     let notes: String = notes.iter().map(|note| format!("<li>{}</li>\n", escape(note))).collect();
@@ -140,16 +141,8 @@ fn head(file: &str, parts: &[Part<'_>], outcome: &Outcome, notes: &[String]) -> 
 }
 
 /// The verdict on each promise.
-fn verdicts(parts: &[Part<'_>], outcome: &Outcome) -> String {
+fn verdicts(parts: &[Part<'_>], outcome: &Outcome, (worst, sentence): (Kept, String)) -> String {
     let promises = &outcome.promises;
-    let broken = promises.iter().filter(|p| p.promise == Kept::Broken).count();
-    let kept = promises.iter().filter(|p| p.promise == Kept::Kept).count();
-    let (worst, sentence) = match (broken, promises.len()) {
-        (0, all) if kept == all => (Kept::Kept, "Every promise is kept.".to_owned()),
-        (0, all) => (Kept::Open, format!("{kept} of {all} promises are kept, none is broken.")),
-        (_, 1) => (Kept::Broken, "The promise is not kept.".to_owned()),
-        (_, all) => (Kept::Broken, format!("{broken} of {all} promises are not kept.")),
-    };
     // Only a filter that follows plans guarantees anything.
     let guaranteed: Vec<Option<bool>> =
         promises.iter().map(|p| guaranteed(parts, p, &outcome.recording)).collect();
@@ -167,7 +160,7 @@ fn verdicts(parts: &[Part<'_>], outcome: &Outcome) -> String {
         }));
         let h = outcome.recording.index_of(&format!("{}.h", p.barrier));
         let unit = h.and_then(|h| outcome.recording.columns()[h].unit.as_deref()).unwrap_or_default();
-        let least = format!("{} {}", cell(p.least_h), escape(unit));
+        let least = p.least_h.map_or_else(|| "–".to_owned(), |h| escape(&quantity(h, unit)));
         row.extend([cell(p.deadline), cell(p.arrival), least, p.unmet.to_string()]);
         row
     });
@@ -192,7 +185,7 @@ fn peaks(parts: &[Part<'_>], recording: &Recording) -> String {
         let limit = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), number);
         Some(vec![
             escape(shown(parts, &part.signal(input))),
-            escape(&unit),
+            escape(shown_unit(&unit)),
             number(low),
             number(high),
             limit(limits[0]),
@@ -257,7 +250,7 @@ fn plane(parts: &[Part<'_>], outcome: &Outcome, scene: &mut Scene) -> Option<Cha
     let label = |signal: &String| {
         let unit = recording.index_of(signal).and_then(|i| recording.columns()[i].unit.as_deref());
         let name = signal.rsplit('.').next().unwrap_or(signal);
-        unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})"))
+        labelled(name, unit.unwrap_or_default())
     };
     let labels = [label(x), label(y)];
     let all = |extents: Vec<[Option<(f64, f64)>; 2]>, axis: usize| {
@@ -334,7 +327,7 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
         let mut chart = Chart {
             title: "h of each barrier, its profile dashed".to_owned(),
             x: time_axis(outcome),
-            y: Scaling::linear(format!("h ({unit})")),
+            y: Scaling::linear(labelled("h", &unit)),
             horizontals: vec![Mark { label: String::new(), at: 0.0 }],
             ..Chart::default()
         };
@@ -388,7 +381,7 @@ fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> 
         Some(Chart {
             title: format!("{input}{wanted}"),
             x: time_axis(outcome),
-            y: Scaling { label: format!("{input} ({unit})"), range, logarithmic: false },
+            y: Scaling { label: labelled(input, &unit), range, logarithmic: false },
             curves: std::iter::once(solid).chain(dashed).collect(),
             horizontals: ["lower limit", "upper limit"].into_iter().zip(limits).filter_map(limit).collect(),
             ..Chart::default()

@@ -91,10 +91,10 @@ fn what_cannot_be_promised_is_refused() {
 fn what_no_plan_accounts_for_is_an_error() {
     let workshop = Workshop::new();
     for (more, wanted) in [
-        ("actuation_delay = 0.01", "actuation_delay: is not 0, which no plan accounts for yet"),
+        ("actuation_delay = 0.01", "actuation_delay is 0.01, must be 0 for a plan"),
         (
             "sampling = \"measured\"\nmeasurement_errors = { v = 0.1 }",
-            "measurement_errors: are not 0, which no plan accounts for yet",
+            "measurement_errors.v is 0.1, must be 0 for a plan",
         ),
     ] {
         workshop.write("filter.toml", filter("on", 8.0, more));
@@ -127,10 +127,7 @@ fn plans_are_followed_where_that_is_possible() {
     let unbounded = left("").replace(", omega = [-2.0, 2.0]", "");
     assert_eq!(line(&unbounded), "plans: none, since omega has no bounds");
     let delayed = left("actuation_delay = 0.01");
-    assert_eq!(
-        line(&delayed),
-        "plans: none, since actuation_delay: is not 0, which no plan accounts for yet"
-    );
+    assert_eq!(line(&delayed), "plans: none, since actuation_delay is 0.01, must be 0 for a plan");
     let moving = left("").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
     assert!(
         line(&moving).starts_with("plans: none, since a barrier follows tree.centre[1]"),
@@ -201,4 +198,128 @@ fn starts_that_can_be_promised_are_drawn() {
     ] {
         workshop.punctual(["check", "filter.toml", "--map", ranges]).fails(2, &format!("--map: {message}"));
     }
+}
+
+/// What a file declares, and what the warning has to name of it: the keys that no plan accounts for.
+const DECLARED: [(&str, &str, &[&str]); 9] = [
+    ("actuation_delay = 0.05", "", &["actuation_delay is 0.05, "]),
+    ("measurement_errors = { v = 0.1, x_p = 0.0 }", "", &["measurement_errors.v is 0.1, "]),
+    ("", "disturbance = 0.2", &["tree.disturbance is 0.2, "]),
+    ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
+    ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
+    ("", "centre_input = true", &["a barrier follows tree.centre[1], "]),
+    ("", "velocity = [1.0, 0.0]", &["tree moves with time, ", "(`plan_horizon`)"]),
+    (
+        "actuation_delay = 0.01",
+        "disturbance = 0.3",
+        &["actuation_delay is 0.01, ", "tree.disturbance is 0.3, "],
+    ),
+    (
+        "measurement_errors = { v = 0.1 }",
+        "begin = 2.0\ndeadline = 9.0",
+        &["measurement_errors.v", "tree.begin is 2, "],
+    ),
+];
+
+fn declared(assurance: &str, top: &str, barrier: &str) -> String {
+    filter(assurance, 8.0, top).replace("name = \"tree\"", &format!("name = \"tree\"\n{barrier}"))
+}
+
+/// What switches plans off though every input has bounds is named where the file is read, once; `on` makes it an error,
+/// `off` accepts it.
+#[test]
+fn what_switches_plans_off_is_said() {
+    let workshop = Workshop::with_library();
+    workshop.write("plant.toml", PLANT);
+    workshop.write("system.toml", SYSTEM.replace("plant.fmu", "plant.toml"));
+    for (top, barrier, named) in DECLARED {
+        let case = format!("{top} {barrier}");
+        workshop.write("filter.toml", declared("auto", top, barrier));
+        let build = ["build", "filter.toml", "-o", "filter.fmu"];
+        for command in
+            [&["check", "filter.toml"][..], &build, &["run", "filter.toml", "--require", "nothing"]]
+        {
+            let done = workshop.punctual(command);
+            assert_eq!(done.code, 0, "{case}: {done:#?}");
+            let warnings: Vec<_> = done.stderr.lines().filter(|line| line.starts_with("warning: ")).collect();
+            let [warning] = warnings[..] else { panic!("{case}: {done:#?}") };
+            let lost = "plans are off, and with them the guarantee of goal, tree: ";
+            assert!(
+                warning.contains(lost) && warning.contains("`assurance = \"on\"` makes this an error"),
+                "{warning}"
+            );
+            assert!(named.iter().all(|key| warning.contains(key)), "{case}: {warning}");
+            assert_eq!(done.stderr.matches("plans are off").count(), 1, "{case}: {}", done.stderr);
+        }
+        // An FMU says it in its log, and a run of it hands that on.
+        let inputs = if barrier.starts_with("centre_input") {
+            ", \"tree.centre[1]\" = 0.0, \"tree.centre[2]\" = 40.0 }"
+        } else {
+            " }"
+        };
+        workshop.write("system.toml", SYSTEM.replace("plant.fmu", "plant.toml").replace(" }", inputs));
+        let done = workshop.punctual(["run", "system.toml", "--json", "--require", "nothing"]);
+        assert!(done.stderr.starts_with("warning: filter: plans are off"), "{case}: {done:#?}");
+        let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
+        let notes = report["notes"].as_array().expect("a list");
+        let said =
+            notes.iter().filter(|note| note.as_str().is_some_and(|n| n.contains("plans are off"))).count();
+        assert_eq!(said, 1, "{case}: {notes:?}");
+
+        workshop.write("filter.toml", declared("on", top, barrier));
+        let refused = workshop.punctual(["check", "filter.toml"]);
+        assert!(refused.code == 2 && named.iter().all(|key| refused.stderr.contains(key)), "{refused:#?}");
+        workshop.write("filter.toml", declared("off", top, barrier));
+        let meant = workshop.punctual(["run", "filter.toml", "--require", "nothing"]);
+        assert!(meant.code == 0 && !meant.stderr.contains("warning: "), "{meant:#?}");
+    }
+    // Rows alone are the ordinary case where an input has no bounds, and plans where nothing is in their way.
+    for (from, to) in [(", omega = [-2.0, 2.0]", ""), ("", "")] {
+        workshop.write("filter.toml", filter("auto", 8.0, "").replace(from, to));
+        let done = workshop.punctual(["run", "filter.toml", "--require", "nothing"]);
+        assert!(done.code == 0 && !done.stderr.contains("warning: "), "{done:#?}");
+    }
+}
+
+/// A broken promise is exit code 1 whether a plan guaranteed it or was refused; one that was refused and kept is a note.
+#[test]
+fn the_exit_code_tells_of_broken_promises() {
+    let code = |workshop: &Workshop, start: &str, require: &str| {
+        workshop.write("system.toml", SYSTEM.replace("\"u_ref.a\" = 4.0, \"u_ref.omega\" = -1.0", start));
+        let words = ["run", "system.toml", "--require", require];
+        workshop.punctual(if require.is_empty() { &words[..2] } else { &words })
+    };
+    let every = ["", "nothing", "unbroken", "on_time_and_inside", "kept", "guaranteed"];
+    let codes = |workshop: &Workshop, start: &str| every.map(|require| code(workshop, start, require).code);
+    let wanted = "\"u_ref.a\" = 4.0, \"u_ref.omega\" = -1.0";
+    let kept = workshop("on", 8.0);
+    assert_eq!(codes(&kept, wanted), [0, 0, 0, 0, 0, 0]);
+    let done = code(&kept, wanted, "");
+    assert!(done.stdout.ends_with("Every promise is kept.\n"), "{}", done.stdout);
+    // Refused, and missed.
+    let missed = workshop("on", 2.5);
+    assert_eq!(codes(&missed, wanted), [1, 0, 1, 1, 1, 1]);
+    let done = code(&missed, wanted, "");
+    assert!(done.stdout.ends_with("1 of 2 promises are not kept.\n"), "{}", done.stdout);
+    // Without plans nothing is guaranteed.
+    let without = codes(&workshop("off", 8.0), wanted);
+    assert_eq!((without[1], without[5]), (0, 1), "{without:?}");
+    // Refused, since it never rests, and met all the same.
+    let lucky = Workshop::new();
+    lucky.write(
+        "drift.toml",
+        "kind = \"filter\"\nbounds = { u = [-0.5, 0.5] }\nexperiment = { step_size = 0.05, stop_time = 6.0 }\n\
+         [plant]\nstates = [{ name = \"p\", unit = \"m\" }]\ninputs = [{ name = \"u\", unit = \"m/s\" }]\n\
+         parameters = [{ name = \"c\", unit = \"m/s\", start = 1.0 }, { name = \"d\", unit = \"m\", start = 1.0 }]\n\
+         derivatives = { p = \"c + u\" }\n\
+         [[barrier]]\nname = \"there\"\nexpression = \"p - d\"\ndeadline = 3.0\n",
+    );
+    let codes = every.map(|require| {
+        let words = ["run", "drift.toml", "--require", require];
+        let done = lucky.punctual(if require.is_empty() { &words[..2] } else { &words });
+        let note = "note: filter.there: refused at the start, and kept in this run all the same";
+        assert!(done.stderr.contains(note), "{done:#?}");
+        done.code
+    });
+    assert_eq!(codes, [0, 0, 0, 0, 0, 1]);
 }

@@ -274,7 +274,7 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     assert!(soonest.zip(factor(&witness)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9), "{witness}");
     // What no plan accounts for is said.
     let (witness, text) = with("8.0", "\ndisturbance = 0.1 #");
-    let reason = "goal.disturbance: is not 0, which no plan accounts for yet";
+    let reason = "goal.disturbance is 0.1, must be 0 for a plan";
     assert_eq!((&witness["found"], &witness["reason"]), (&false.into(), &reason.into()), "{witness}");
     assert!(text.contains(&format!("witness: NONE was found: {reason}\n")), "{text}");
 }

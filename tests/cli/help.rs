@@ -1,5 +1,7 @@
 //! `--help`, `--version` and wrong usage.
 
+use punctual::codes::of;
+
 use crate::workshop::{Workshop, assert_golden};
 
 #[test]
@@ -27,7 +29,11 @@ fn help_of_every_command() {
         "validate",
     ];
     for command in commands {
-        assert_golden(&format!("help-{command}.txt"), &workshop.punctual([command, "--help"]).success());
+        let help = workshop.punctual([command, "--help"]).success();
+        for (code, means) in of(Some(command)) {
+            assert!(help.contains(&format!("\n  {code:<3}  {means}\n")), "{command}, {code}: {help}");
+        }
+        assert_golden(&format!("help-{command}.txt"), &help);
     }
 }
 
@@ -69,6 +75,8 @@ fn shells_and_man_know_every_command() {
     workshop.punctual(["man", "pages"]).success();
     for page in ["punctual", "punctual-check", "punctual-run"] {
         let text = workshop.text(&format!("pages/{page}.1"));
+        let (_, codes) = text.split_once(".SH \"EXIT STATUS\"\n").expect("a section on exit codes");
+        assert_eq!(codes.matches(".TP\n").count(), 4, "{page}: {codes}");
         assert!(text.starts_with(".ie") && text.contains(".SH NAME"), "{page}: {text}");
     }
     assert!(!workshop.path("pages/punctual-trial.1").exists(), "a hidden command has a page");

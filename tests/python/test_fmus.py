@@ -1,9 +1,11 @@
 """`build`, `check`, `variables` and `run_cli`: the command line by way of the package."""
 
+import copy
 import pickle
 import shutil
 import subprocess
 import sys
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import numpy as np
 import punctual
 import pytest
 
-from conftest import FILTER, PLANT, ROOT, goal
+from conftest import ASSURED, FILTER, PLANT, ROOT, STEP, goal
 
 
 def test_a_dict_and_a_file_of_the_same_content_make_the_same_fmu(tmp_path):
@@ -113,3 +115,39 @@ def test_the_command_line_is_there(tmp_path):
     assert done.returncode == 2 and "none.toml" in done.stderr
     with pytest.raises(punctual.Error, match="^unexpected argument '--none'"):
         punctual.run_cli("--none")
+
+
+DECLARED = {"actuation_delay": STEP, "measurement_errors": {"v": 0.01}}
+
+
+@pytest.mark.parametrize("keys", [["actuation_delay"], ["measurement_errors"], [*DECLARED]])
+def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, tmp_path):
+    lost = ASSURED | {key: DECLARED[key] for key in keys}
+    filter_fmu, plant_fmu = tmp_path / "filter.fmu", punctual.build(PLANT, tmp_path / "plant.fmu")
+    made = {
+        "Filter": lambda: punctual.Filter(lost),
+        "FilterBatch": lambda: punctual.FilterBatch(lost, 3),
+        "build": lambda: punctual.build(lost, filter_fmu),
+        "check": lambda: punctual.check(lost),
+        "simulate": lambda: punctual.simulate(filter_fmu, plant_fmu, stop_time=0.1, step_size=STEP),
+    }
+    for name, make in made.items():
+        with warnings.catch_warnings(record=True) as seen:
+            warnings.simplefilter("always")
+            make()
+        (one,) = seen
+        assert one.category is punctual.GuaranteeWarning and issubclass(one.category, UserWarning)
+        text = str(one.message)
+        assert text.startswith("plans are off, and with them the guarantee of goal, post: "), (name, text)
+        assert all(key in text for key in keys) and 'assurance = "on"' in text, (name, text)
+        assert one.filename == __file__, "where it was made"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(punctual.GuaranteeWarning):
+            punctual.Filter(lost)
+        own = punctual.Filter(lost | {"assurance": "off"})
+        for configuration in (FILTER, ASSURED):
+            punctual.Filter(configuration)
+        copy.copy(own), pickle.loads(pickle.dumps(own))
+    with pytest.raises(punctual.Error, match="assurance: is .on., must be"):
+        punctual.Filter(lost | {"assurance": "on"})

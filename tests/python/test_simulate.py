@@ -33,7 +33,7 @@ components = ["filter", "plant"]
 {connections}
 """
     )
-    punctual.run_cli("run", folder / "system.toml", "--out", folder)
+    punctual.run_cli("run", folder / "system.toml", "--out", folder, "--require", "nothing")
     with open(folder / "system.csv", newline="") as file:
         rows = list(csv.reader(file))
     return dict(zip(rows[0], np.array(rows[1:], float).T))
@@ -202,7 +202,7 @@ components = ["filter", "plant"]
 {DAMPED}
 """
     )
-    told = json.loads(punctual.run_cli("run", tmp_path / "system.toml", "--json"))["promises"]
+    told = json.loads(punctual.run_cli("run", tmp_path / "system.toml", "--json", "--require", "nothing"))["promises"]
     for said in told:
         found = punctual.promise(result, said["barrier"].removeprefix("filter."))
         # JSON has no infinity.

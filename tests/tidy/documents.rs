@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
+use punctual::codes::{CODES, FOUND_BY};
 use punctual::coupling::System;
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::product::Product;
@@ -220,6 +221,23 @@ fn every_subcommand_is_documented() {
     let unique: BTreeSet<_> = listed.iter().cloned().collect();
     assert_eq!(unique.len(), listed.len(), "docs/commands.md lists a command twice: {listed:?}");
     assert_eq!(unique, subcommands(), "the commands of docs/commands.md, and those of the program");
+}
+
+#[test]
+fn the_exit_codes_are_listed() {
+    let document = text("docs/commands.md");
+    let (_, section) = document.split_once("\n## Exit codes\n").expect("a section on exit codes");
+    let row = |(head, means): (String, &str)| format!("| {head} | {means} |\n");
+    let all: String = CODES.iter().map(|(code, means)| row((code.to_string(), means))).collect();
+    assert!(
+        section.contains(&format!("| code | means |\n|---|---|\n{all}\n")),
+        "docs/commands.md: not\n{all}"
+    );
+    let found = FOUND_BY.iter().filter(|(_, means)| !means.is_empty());
+    let found: String = found.map(|(name, means)| row((format!("`{name}`"), means))).collect();
+    assert!(section.contains(&format!("|---|---|\n{found}\n")), "docs/commands.md: not\n{found}");
+    let known: BTreeSet<_> = FOUND_BY.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(known, subcommands(), "the commands of the table, and those of the program");
 }
 
 #[test]
