@@ -3,6 +3,9 @@
 /// Digits after the first one.
 const MORE: usize = 3;
 
+/// The largest round-off of a number, as a part of it: what is within it of a short number is that.
+const ROUND_OFF: f64 = 1e-9;
+
 /// A whole number from here on is written with a power of ten, as the others are from 10⁴ on.
 const LONG: f64 = 1e6;
 
@@ -29,13 +32,21 @@ pub fn number(value: f64) -> String {
 /// A [`number`] that is not below `value`, finite: for what has to be had, such as a deadline.
 pub fn number_above(value: f64) -> String {
     let text = number(value);
-    if text.parse().is_ok_and(|read: f64| read < value) { number(value + half_unit(value)) } else { text }
+    if text.parse().is_ok_and(|read: f64| read < value - ROUND_OFF * value.abs()) {
+        number(value + half_unit(value))
+    } else {
+        text
+    }
 }
 
 /// A [`number`] that is not above `value`, finite: for what is certain until then.
 pub fn number_below(value: f64) -> String {
     let text = number(value);
-    if text.parse().is_ok_and(|read: f64| read > value) { number(value - half_unit(value)) } else { text }
+    if text.parse().is_ok_and(|read: f64| read > value + ROUND_OFF * value.abs()) {
+        number(value - half_unit(value))
+    } else {
+        text
+    }
 }
 
 /// Half a unit of the last digit that is shown.
@@ -113,7 +124,8 @@ mod tests {
             assert!(text.len() <= 11, "{text}");
             let [above, below] = [number_above, number_below].map(|shown| shown(value));
             let [high, low] = [&above, &below].map(|text| text.parse::<f64>().expect("a number"));
-            assert!(low <= value && value <= high, "{below} <= {value:e} <= {above}");
+            let off = ROUND_OFF * value;
+            assert!(low <= value + off && value <= high + off, "{below} <= {value:e} <= {above}");
             assert!(high - low <= 1.001e-3 * value, "{below} and {above}");
         }
     }

@@ -434,7 +434,7 @@ fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
     workshop.write("plane.toml", &file);
     let checked = workshop.punctual(["check", "plane.toml"]).success();
     assert!(
-        checked.contains("outside, h = -215.41 m; guaranteed until 60.8 s, whatever u_ref is"),
+        checked.contains("outside, h = -215.4 m; guaranteed until 60.8 s, whatever u_ref is"),
         "{checked}"
     );
     assert!(

@@ -252,12 +252,11 @@ fn what_switches_plans_off_is_said() {
             assert_eq!(done.stderr.matches("plans are off").count(), 1, "{case}: {}", done.stderr);
         }
         // An FMU says it in its log, and a run of it hands that on.
-        let inputs = if barrier.starts_with("centre_input") {
-            ", \"tree.centre[1]\" = 0.0, \"tree.centre[2]\" = 40.0 }"
-        } else {
-            " }"
-        };
-        workshop.write("system.toml", SYSTEM.replace("plant.fmu", "plant.toml").replace(" }", inputs));
+        let moved = ["centre[1]", "centre[2]", "velocity[1]", "velocity[2]"]
+            .map(|of| format!(", \"tree.{of}\" = 9.0"));
+        let inputs = if barrier == "centre_input = true" { moved.concat() } else { String::new() };
+        let system = SYSTEM.replace("plant.fmu", "plant.toml");
+        workshop.write("system.toml", system.replace("-1.0 }", &format!("-1.0{inputs} }}")));
         let done = workshop.punctual(["run", "system.toml", "--json", "--require", "nothing"]);
         assert!(done.stderr.starts_with("warning: filter: plans are off"), "{case}: {done:#?}");
         let report: Value = serde_json::from_str(&done.stdout).expect("JSON");

@@ -146,7 +146,7 @@ fn a_start_without_authority_is_code_one() {
     let done = workshop(&[COARSE, pointwise]).punctual(["check", "filter.toml", "--x0", &across]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(done.stdout.contains("first step with u_ref = 0: no_authority\n"), "{done:#?}");
-    assert!(done.stdout.contains("outside, h = -60.8426 m; not on course\n"), "{done:#?}");
+    assert!(done.stdout.contains("outside, h = -60.84 m; not on course\n"), "{done:#?}");
 }
 
 #[test]

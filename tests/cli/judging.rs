@@ -140,7 +140,7 @@ fn outside_without_a_deadline_nothing_is_promised() {
             "side: outside at the start and without a deadline: nothing is promised; give it a deadline";
         let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
         assert!(done.code == 1 && done.stdout.contains(&format!("warning: {words}")), "{done:#?}");
-        let told = words.replace("side:", "filter.side is");
+        let told = words.replace("side:", "filter.side:");
         for (require, code) in [("kept", 1), ("on_time_and_inside", 1)] {
             let done = workshop.punctual(["run", "system.toml", "--require", require]);
             assert!(done.code == code && done.stderr.contains(&told), "{done:#?}");
