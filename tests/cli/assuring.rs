@@ -208,7 +208,7 @@ const DECLARED: [(&str, &str, &[&str]); 9] = [
     ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
     ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
     ("", "centre_input = true", &["a barrier follows tree.centre[1], "]),
-    ("", "velocity = [1.0, 0.0]", &["tree moves with time, ", "(`plan_horizon`)"]),
+    ("", "velocity = [1.0, 0.0]", &["goal moves with time, ", "(`plan_horizon`)"]),
     (
         "actuation_delay = 0.01",
         "disturbance = 0.3",
@@ -222,7 +222,9 @@ const DECLARED: [(&str, &str, &[&str]); 9] = [
 ];
 
 fn declared(assurance: &str, top: &str, barrier: &str) -> String {
-    filter(assurance, 8.0, top).replace("name = \"tree\"", &format!("name = \"tree\"\n{barrier}"))
+    // What is to be reached moves for ever; what is to be kept away from is left behind.
+    let name = if barrier.starts_with("velocity") { "name = \"goal\"" } else { "name = \"tree\"" };
+    filter(assurance, 8.0, top).replace(name, &format!("{name}\n{barrier}"))
 }
 
 /// What switches plans off though every input has bounds is named where the file is read, once; `on` makes it an error,

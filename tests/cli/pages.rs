@@ -78,7 +78,7 @@ fn the_page_on_obstacles_is_what_happens() {
     for part in parts {
         let (file, rest) = part.split_once("```").expect("its end");
         workshop.write("my.toml", file);
-        let told = workshop.punctual(["run", "my.toml"]);
+        let told = workshop.punctual(["run", "my.toml", "--signals"]);
         let shown = blocks(rest, "text").first().copied().unwrap_or_default();
         assert_eq!(told.code, i32::from(shown.contains("not kept")), "{told:#?}");
         assert_told(shown, &told.stdout);
