@@ -52,18 +52,21 @@ pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Err
     Ok(packed)
 }
 
+/// An FMU and the bytes of its file.
+type Opened = (Rc<Fmu>, Vec<u8>);
+
 /// The FMU at `path`, or the one that the configuration there becomes, and its bytes; what the user has to know of the
 /// configuration.
-fn fmu(path: &Path) -> Result<(Rc<Fmu>, Vec<u8>, Option<String>), Error> {
+fn fmu(path: &Path) -> Result<(Opened, Option<String>), Error> {
     let read = |file: &Path| std::fs::read(file).map_err(|e| Error::io("read", file, e));
     if !text::is_toml(path) {
-        return Ok((Rc::new(Fmu::open(path)?), read(path)?, None));
+        return Ok(((Rc::new(Fmu::open(path)?), read(path)?), None));
     }
     let configuration = super::read_configuration(path)?;
     let warning = configuration.warning().map(|warning| format!("{}: {warning}", path.display()));
     let folder = tempfile::tempdir().map_err(|e| Error::io("make a folder in", &std::env::temp_dir(), e))?;
     let file = folder.path().join("made.fmu");
-    Ok((super::build(configuration, &[], &file, false)?, read(&file)?, warning))
+    Ok(((super::build(configuration, &[], &file, false)?, read(&file)?), warning))
 }
 
 /// The FMUs of a system, each file once.
@@ -96,7 +99,7 @@ impl Store {
                 let message = format!("there is no file {}{advice}", path.display());
                 return Err(Error::configuration(format!("component[{i}].fmu"), message));
             }
-            let (fmu, bytes, warning) = fmu(&path).map_err(|e| e.in_component(&component.name))?;
+            let ((fmu, bytes), warning) = fmu(&path).map_err(|e| e.in_component(&component.name))?;
             store.warnings.extend(warning);
             let place = store.place(&path);
             known.insert(path, store.fmus.len());

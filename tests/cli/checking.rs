@@ -70,7 +70,8 @@ fn a_filter_that_is_given_the_derivatives() {
     let text = fs::read_to_string(workshop.path("external.toml")).expect("written above");
     workshop.write("zero.toml", text.replace("margin = 0.05", "margin = 0.0 "));
     let told = workshop.punctual(["check", "zero.toml"]).success();
-    let wanted = "warning: goal: the margin is 0, so that an input held over 0.01 s can cost the deadline\n";
+    let wanted =
+        "warning: goal, speed: the margin is 0, so that an input held over 0.01 s can cost the deadline\n";
     assert!(told.contains(wanted), "{told}");
 }
 
