@@ -8,6 +8,7 @@
 //! | [`text`] | numbers for people |
 //! | `filter_loop` | a filter with its plans or its integrator, if it has them, and its memory |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
+//! | [`units`] | the units of two variables that are connected, whoever wrote them |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
 //! | [`block`] | the computation: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
@@ -31,6 +32,7 @@ pub mod instance;
 pub mod product;
 pub mod state;
 pub mod text;
+pub mod units;
 
 #[cfg(windows)]
 pub use abi::loadable;

@@ -204,6 +204,7 @@ impl Located {
                 quantity: at.optional("quantity"),
                 unit: at.optional("unit"),
                 display_unit: at.optional("displayUnit"),
+                relative_quantity: at.flag("relativeQuantity"),
                 min: at.value("min", double),
                 max: at.value("max", double),
                 nominal: at.value("nominal", double),

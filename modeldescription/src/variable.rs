@@ -177,6 +177,9 @@ pub struct Real {
     /// The name of one of the display units of `unit`.
     #[serde(rename = "@displayUnit", skip_serializing_if = "Option::is_none")]
     pub display_unit: Option<String>,
+    /// Offsets of units do not count, as in differences of temperature; default false.
+    #[serde(rename = "@relativeQuantity", skip_serializing_if = "xsd::is_default")]
+    pub relative_quantity: bool,
     /// Smallest allowed value, in `unit`; not NaN and not `INF`; absent: no limit.
     #[serde(rename = "@min", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub min: Option<f64>,

@@ -170,6 +170,7 @@ pub struct Campaign {
     seed: u64,
     runs: u64,
     success: Success,
+    notes: Vec<String>,
 }
 
 impl Campaign {
@@ -360,7 +361,8 @@ impl Campaign {
         check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
-        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success })
+        let notes = coupling::unit_notes(&system, &refer, &connected);
+        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success, notes })
     }
 
     /// The texts it is made of.
@@ -396,6 +398,11 @@ impl Campaign {
     /// The number of runs.
     pub fn runs(&self) -> u64 {
         self.runs
+    }
+
+    /// What holds for every run and the user should know.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The condition on a successful run.

@@ -184,6 +184,9 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
     };
     let packed = package::system::pack(file, &arguments.output, version)?;
     packed.warnings.iter().for_each(|warning| output::warning(warning));
+    for note in &packed.notes {
+        output::note(&format!("note: {note}"));
+    }
     output::result(&format!(
         "{}: {} components from {} FMUs, {} connections, {} start values",
         arguments.output.display(),

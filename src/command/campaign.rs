@@ -190,6 +190,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             output::warning(&format!("{}: {warning}", component.name));
         }
     }
+    for note in campaign.notes() {
+        output::note(&format!("note: {note}"));
+    }
     let measures = Measures::new(&campaign)?;
     if let Some(range) = arguments.list {
         return list(arguments, &campaign, range);

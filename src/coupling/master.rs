@@ -285,6 +285,7 @@ impl<P: Participant> Simulation<P> {
         };
         simulation.note_shortened_step(descriptions);
         simulation.note_what_is_not_recorded(descriptions);
+        simulation.notes.extend(network::unit_notes(system, descriptions, &links));
         simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)

@@ -20,7 +20,7 @@ pub use grid::Grid;
 pub use in_process::InProcess;
 pub use master::{Course, Outcome, Simulation, Statistics};
 pub use model::{Model, Own, Reader};
-pub use network::{Link, Port, links, port};
+pub use network::{Link, Port, Units, links, port, unit_notes};
 pub use promises::{Kept, Promise, check_fed, verdict};
 pub use system::{
     ByName, Component, Connection, DiscEntry, Experiment, Order, PathEntry, PathPicture, Picture, Record,

@@ -1,7 +1,10 @@
 //! Resolves a system file against the descriptions of its FMUs. Names become positions, and every error says
 //! which field of the file it comes from. Runs nothing.
 
+use std::collections::BTreeMap;
+
 use punctual_fmu::configuration::nearest;
+use punctual_fmu::units::{self, Fit};
 
 use super::graph::{self, Edge};
 use super::starts::{self, Start};
@@ -29,6 +32,21 @@ pub struct Link {
     pub factor: f64,
     /// In the unit of the input.
     pub offset: f64,
+    /// What the units of its ends have to do with that.
+    pub units: Units,
+}
+
+/// What the units of the ends of a connection have to do with its factor and offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Units {
+    /// Nothing: they are the same, or the file says how the number is meant.
+    Same,
+    /// They make them.
+    Converted,
+    /// Nothing, since they cannot be compared.
+    Unknown,
+    /// The file has another factor than this one, which they would make.
+    Overruled(f64),
 }
 
 /// The resolved system.
@@ -43,7 +61,7 @@ pub(super) struct Network {
     pub(super) direct: Vec<usize>,
     /// Components without, in file order.
     pub(super) delayed: Vec<usize>,
-    /// Notes for the user, such as a signal read one step late.
+    /// Notes on signals that are read one step late.
     pub(super) notes: Vec<String>,
 }
 
@@ -72,6 +90,51 @@ pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<
 /// A name, type or value that does not fit, with the field of the system file.
 pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>, Error> {
     resolve(system, descriptions).map(|network| network.links)
+}
+
+/// Notes on `links` whose units differ, or cannot be compared.
+pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
+    /// Most connections named in a note.
+    const NAMED: usize = 8;
+    let resolver = Resolver { system, descriptions };
+    let mut notes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for link in links {
+        let ends = [link.from, link.to].map(|port| (resolver.name(port), resolver.unit(port)));
+        let [(from, given), (to, taken)] = &ends;
+        let (what, which) = match link.units {
+            Units::Same => continue,
+            Units::Converted => {
+                let scale = match (brief(link.factor), brief(link.offset)) {
+                    (factor, 0.0) => format!("times {factor}"),
+                    (1.0, offset) => format!("plus {offset}"),
+                    (factor, offset) => format!("times {factor} plus {offset}"),
+                };
+                (format!("units are converted, {given} to {taken} ({scale})"), format!("{from} → {to}"))
+            }
+            Units::Unknown => (
+                "units that cannot be compared, so numbers pass as they are".to_owned(),
+                format!("{from} ({given}) → {to} ({taken})"),
+            ),
+            Units::Overruled(by) => (
+                "a factor of the file stands, though the units make another one".to_owned(),
+                format!("{from} ({given}) → {to} ({taken}) has {}, not {}", brief(link.factor), brief(by)),
+            ),
+        };
+        notes.entry(what).or_default().push(which);
+    }
+    let note = |(what, all): (String, Vec<String>)| {
+        let named = all[..all.len().min(NAMED)].join(", ");
+        match all.len().saturating_sub(NAMED) {
+            0 => format!("{what}: {named}"),
+            more => format!("{what}: {named} and {more} more"),
+        }
+    };
+    notes.into_iter().map(note).collect()
+}
+
+/// A number with six digits.
+fn brief(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
 }
 
 /// Resolves `text`, `component.variable`, to a variable; `field` is its place in the file.
@@ -121,6 +184,11 @@ impl<'a> Resolver<'a> {
     /// `component.variable` of a port.
     fn name(&self, port: Port) -> String {
         format!("{}.{}", self.component_name(port.component), self.variable(port).name)
+    }
+
+    /// The name of the unit of a port.
+    fn unit(&self, port: Port) -> &'a str {
+        self.variable(port).unit.as_deref().unwrap_or("no unit")
     }
 
     fn component(&self, field: &str, name: &str) -> Result<usize, Error> {
@@ -236,13 +304,14 @@ impl<'a> Resolver<'a> {
                 return Err(Error::configuration(field, message));
             }
             for (from, to) in from.into_iter().zip(to) {
-                let (factor, offset) = (connection.factor, connection.offset);
                 if let Some(other) = links.iter().position(|link| link.to == to) {
                     let by = owners[other];
                     let message = format!("input {} is already connected by connection[{by}]", self.name(to));
                     return Err(Error::configuration(format!("{field}.to"), message));
                 }
-                links.push(self.link(&field, Link { from, to, factor, offset })?);
+                self.expect_causality(&format!("{field}.from"), from, Causality::Output)?;
+                self.expect_causality(&format!("{field}.to"), to, Causality::Input)?;
+                links.push(self.link(&field, [from, to], connection.factor, connection.offset)?);
                 owners.push(i);
             }
         }
@@ -253,17 +322,37 @@ impl<'a> Resolver<'a> {
         Ok(links)
     }
 
-    /// Checks a link of scalars.
-    fn link(&self, field: &str, link: Link) -> Result<Link, Error> {
-        self.expect_causality(&format!("{field}.from"), link.from, Causality::Output)?;
-        self.expect_causality(&format!("{field}.to"), link.to, Causality::Input)?;
-        self.check_types(field, link.from, link.to)?;
-        if self.family(link.to) != Family::Real && (link.factor != 1.0 || link.offset != 0.0) {
-            let (to, kind) = (self.name(link.to), self.variable(link.to).type_name);
+    /// The link of an output to an input, both scalars, with the factor and offset of the file.
+    fn link(&self, field: &str, [from, to]: [Port; 2], own: Option<f64>, offset: f64) -> Result<Link, Error> {
+        /// Digits that a factor in a file may leave out, in parts of 1.
+        const ROUNDED: f64 = 1e-3;
+        self.check_types(field, from, to)?;
+        if self.family(to) != Family::Real && (own.is_some_and(|own| own != 1.0) || offset != 0.0) {
+            let (to, kind) = (self.name(to), self.variable(to).type_name);
             let message = format!("factor and offset are for Real signals; {to} is {kind}");
             return Err(Error::configuration(field, message));
         }
-        Ok(link)
+        let [said, wanted] = [from, to].map(|port| self.descriptions[port.component].unit(port.variable));
+        let link = |factor, offset, units| Ok(Link { from, to, factor, offset, units });
+        match (units::fit(&said, &wanted), own) {
+            (Ok(Fit::Scaled { factor, .. }), Some(own)) if (own.abs() / factor - 1.0).abs() > ROUNDED => {
+                link(own, offset, Units::Overruled(factor))
+            }
+            (_, Some(own)) => link(own, offset, Units::Same),
+            (Ok(Fit::Scaled { factor, offset: by }), None) => link(factor, by + offset, Units::Converted),
+            (Ok(Fit::Same), None) => link(1.0, offset, Units::Same),
+            (Ok(Fit::Unknown), None) => link(1.0, offset, Units::Unknown),
+            (Err(why), None) => {
+                let (given, taken) = (self.unit(from), self.unit(to));
+                let message = format!(
+                    "{} is in {given}, but {} in {taken}, {why}; a [[connection]] of the two with a `factor`, in \
+                     {taken} per {given}, says how it is meant",
+                    self.name(from),
+                    self.name(to),
+                );
+                Err(Error::configuration(field, message))
+            }
+        }
     }
 
     fn connect_by_name(
@@ -302,8 +391,7 @@ impl<'a> Resolver<'a> {
                     }
                     None => {}
                 }
-                self.check_types(field, from, to)?;
-                links.push(Link { from, to, factor: 1.0, offset: 0.0 });
+                links.push(self.link(field, [from, to], None, 0.0)?);
             }
         }
         if matches == 0 {

@@ -159,7 +159,8 @@ impl<'de> Deserialize<'de> for StartValue {
     }
 }
 
-/// One signal from an output to an input: `to = factor · from + offset`.
+/// One signal from an output to an input: `to = factor · from + offset`. Without a factor of its own the units make it, where
+/// they differ.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
@@ -167,9 +168,8 @@ pub struct Connection {
     pub from: String,
     /// `component.variable` of an input.
     pub to: String,
-    /// Factor, finite, in units of the input per unit of the output; default 1. Real signals only.
-    #[serde(default = "one")]
-    pub factor: f64,
+    /// Factor, finite, in units of the input per unit of the output; default: what the units make it. Real signals only.
+    pub factor: Option<f64>,
     /// Offset, finite, in the unit of the input; default 0. Real signals only.
     #[serde(default)]
     pub offset: f64,
@@ -412,10 +412,6 @@ pub enum Variant {
     Log,
 }
 
-fn one() -> f64 {
-    1.0
-}
-
 fn one_step() -> u64 {
     1
 }
@@ -510,7 +506,7 @@ impl System {
         })?;
         self.check_components()?;
         for (i, connection) in self.connection.iter().enumerate() {
-            finite(&format!("connection[{i}].factor"), connection.factor)?;
+            finite(&format!("connection[{i}].factor"), connection.factor.unwrap_or_default())?;
             finite(&format!("connection[{i}].offset"), connection.offset)?;
         }
         ensure(self.record.every >= 1, "record.every", || "is 0; must be ≥ 1".to_owned())?;
@@ -622,7 +618,7 @@ signals = ["a.y"]
         let system = System::parse(VALID).unwrap();
         assert_eq!(system.experiment().order, Order::GaussSeidel);
         assert_eq!(system.experiment().start_time, 0.0);
-        assert_eq!(system.connections()[0].factor, 1.0);
+        assert_eq!(system.connections()[0].factor, None);
         assert_eq!(system.components()[0].start["goal.deadline"], StartValue::Real(5.0));
         assert_eq!(system.components()[0].start["n"], StartValue::Integer(3));
         assert_eq!(system.components()[0].start["on"], StartValue::Boolean(true));

@@ -34,6 +34,8 @@ pub struct Packed {
     pub start_values: usize,
     /// What the user has to know of configurations that were built, by file.
     pub warnings: Vec<String>,
+    /// Notes on the units of connections.
+    pub notes: Vec<String>,
 }
 
 /// Writes the package of the system at `path` to `file`, in this version of SSP.
@@ -199,6 +201,7 @@ fn archive(
         connections: structure.connections.len(),
         start_values: parameters.len(),
         warnings: store.warnings.clone(),
+        notes: coupling::unit_notes(system, &descriptions, &links),
     };
     // Pack.
     let broken = |e: punctual_modeldescription::Error| super::broken(&e);

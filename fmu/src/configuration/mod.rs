@@ -48,6 +48,7 @@ use serde::{Deserialize, Serialize};
 
 use plugin::NoPlugins;
 use unit::{check_unit, unit_per};
+pub(crate) use unit::{multiply, symbol_of};
 
 /// The name of the canonical configuration inside an FMU's `resources/`.
 pub const RESOURCE: &str = "configuration.toml";

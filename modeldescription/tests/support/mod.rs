@@ -52,6 +52,7 @@ pub(crate) fn small() -> ModelDescription {
         nominal: Some(1e-7),
         quantity: Some("Length".into()),
         unit: Some("m".into()),
+        relative_quantity: true,
         ..Real::default()
     });
     ModelDescription {

@@ -110,6 +110,8 @@ fn fill_in(model: &mut ModelDescription) {
                 if own.unit.is_none() {
                     own.unit = given.and_then(VariableKind::unit).map(str::to_owned);
                 }
+                own.relative_quantity |=
+                    matches!(given, Some(VariableKind::Real(of)) if of.relative_quantity);
             }
             (
                 VariableKind::Integer(own) | VariableKind::Enumeration(own),

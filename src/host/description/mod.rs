@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use punctual_fmu::product::CODE;
+use punctual_fmu::units::Said;
 use punctual_modeldescription::{Causality, DefaultExperiment, ScalarType, Variability, VariableKind};
 use roxmltree::Document;
 
@@ -266,6 +267,26 @@ impl Description {
         let is_whole = variable.family() == Family::Integer;
         let of = variable.name.strip_suffix(CODE).filter(|_| is_whole);
         of.is_some_and(|of| self.variables.iter().any(|v| v.name == of && v.of == DataType::Enumeration))
+    }
+
+    /// What is said of the unit of the variable at `index`.
+    pub fn unit(&self, index: usize) -> Said<'_> {
+        let variable = &self.variables[index];
+        let (units, is_difference) = match &self.written {
+            Written::Fmi2(written) => {
+                let own = written.model.variables.get(index).map(|v| &v.kind);
+                (&written.model.units, matches!(own, Some(VariableKind::Real(own)) if own.relative_quantity))
+            }
+            Written::Fmi3(written) => {
+                let own = written.model.by_reference(variable.value_reference);
+                let kinds = own.map(|own| [Some(&own.kind), written.model.declared(own).map(|of| &of.kind)]);
+                let mut floats = kinds.into_iter().flatten().flatten().filter_map(|kind| kind.as_float());
+                (&written.model.units, floats.any(|float| float.relative_quantity))
+            }
+        };
+        let name = variable.unit.as_deref();
+        let base = units.iter().find(|unit| Some(unit.name.as_str()) == name).and_then(|unit| unit.base);
+        Said { name, base, is_difference }
     }
 
     /// The inputs an output depends on directly, as positions in the variables.
