@@ -1,7 +1,7 @@
 //! The units of two variables that are connected: whether they are the same, what makes one of the other, or why
 //! nothing does. A definition in base units counts. Where there is none, the name is read as tools write it.
 
-use punctual_modeldescription::BaseUnit;
+pub use punctual_modeldescription::BaseUnit;
 
 use crate::configuration::{multiply, symbol_of};
 

@@ -1,5 +1,5 @@
 from collections.abc import Sequence
-from typing import Any, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ __all__ = [
     "Plan",
     "Step",
     "__version__",
+    "fit_units",
     "judge",
     "unpickled_batch",
     "unpickled_filter",
@@ -22,6 +23,9 @@ __all__ = [
 
 __version__: str
 
+_Unit: TypeAlias = tuple[str | None, tuple[Sequence[int], float, float] | None, bool]
+
+def fit_units(given: _Unit, taken: _Unit) -> tuple[float, float] | None: ...
 def judge(
     rows: Sequence[tuple[float, float, int, bool, int]], deadline: float | None, units: tuple[str, str]
 ) -> dict[str, Any]: ...

@@ -5,12 +5,14 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate, chain
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ._command import warn
 from ._error import Error
+from ._punctual import fit_units
 from ._slave import Call, Slave, make, opened
 
 if TYPE_CHECKING:
@@ -38,7 +40,8 @@ def simulate(
 ) -> NDArray[np.void]:
     """Couples a filter FMU with a plant FMU in FMPy from `start_time` to `stop_time` in steps of `step_size` (s).
 
-    Equal names connect: `x.v` of the plant to `x.v` of the filter, `u.a` of the filter to `u.a` of the plant. At every
+    Equal names connect: `x.v` of the plant to `x.v` of the filter, `u.a` of the filter to `u.a` of the plant. Where their
+    units differ, values are converted, which a warning tells; so does one of units that cannot be compared. At every
     communication point the filter is stepped first, then the plant with what the filter gives: the calls of
     `punctual run` in Gauss-Seidel order, and the same numbers bit for bit.
 
@@ -47,7 +50,7 @@ def simulate(
     - `nominal`: the wanted input. A dict of terms that are linear in what the plant gives, such as `{"a": ("v", -1.0)}`
       for u_ref.a = -1.0 x.v, or with an offset `("v", -1.0, 3.0)`; or a function of the time in s and of what the plant
       gives to the filter (an array in the order of the filter's inputs, the states first; valid during the call) that
-      returns all of u_ref. Default: the start values of u_ref, zeros.
+      returns all of u_ref. In the filter's units where the plant has others. Default: the start values of u_ref, zeros.
     - `parameters`: start values of the filter by name, such as `{"goal.deadline": 8.0}`; also of inputs that the plant
       does not give.
     - `record`: the names of what is returned. Default: all outputs of the plant, `u_ref.*` and all outputs of the
@@ -56,7 +59,7 @@ def simulate(
     Returns an array with the field `time` and one for each recorded variable, a row for each communication point: as
     FMPy's `simulate_fmu` does, so that its `plot_result` and `write_csv` take it. `promise` judges a barrier.
 
-    Raises `ImportError` without FMPy (`pip install fmpy`); `Error` for names or numbers that do not fit, an
+    Raises `ImportError` without FMPy (`pip install fmpy`); `Error` for names, units or numbers that do not fit, an
     input that nothing feeds, and a call that an FMU refuses.
     """
     if not 0.0 < step_size < math.inf:
@@ -98,6 +101,27 @@ def _check_fed(slave: Slave, field: str, fed: Sequence[str], other: Slave) -> No
         )
 
 
+def _scales(giver: Slave, taker: Slave, names: Sequence[str], notes: list[str]) -> dict[str, tuple[float, float]]:
+    """Factor and offset of each of `names`, an output of one and an input of the other, if any of them has another unit."""
+    scales = {}
+    for name in names:
+        given, taken = giver.unit(name), taker.unit(name)
+        words = given[0] or "no unit", taken[0] or "no unit"
+        try:
+            scale = fit_units(given, taken)
+        except ValueError as why:
+            raise Error(
+                f"{name} is in {words[0]} in the {giver.name}, but in {words[1]} in the {taker.name}, {why}"
+            ) from None
+        if scale is None:
+            notes.append(f"{name} of the {giver.name} as it is, since {words[0]} and {words[1]} cannot be compared")
+        elif scale != (1.0, 0.0):
+            plus = f" plus {scale[1]:.6g}" if scale[1] else ""
+            notes.append(f"{name} of the {giver.name} from {words[0]} to {words[1]} (times {scale[0]:.6g}{plus})")
+        scales[name] = scale or (1.0, 0.0)
+    return scales if any(scale != (1.0, 0.0) for scale in scales.values()) else {}
+
+
 def _columns(own: Slave, plant: Slave, record: Sequence[str] | None) -> dict[str, tuple[Slave, str]]:
     """The recorded variables, by the names of the result's fields."""
     outputs = own.names("output")
@@ -115,11 +139,14 @@ class _Pair:
     """A filter and a plant, with the memory between them.
 
     All reals lie in one array, in five parts, so that every call reads or writes one stretch of it and nothing is
-    copied from one FMU to the other:
+    copied from one FMU to the other, unless units differ:
 
         others | connected | u_ref | seen | driving
         ------ plant gives |       |- filter gives |
                |- filter takes ----|      |- plant takes
+
+    Where a value that the plant gives has to be converted, all of them are among the others too, in its units; where one
+    that the filter gives, all of these are among the seen.
 
     Integers, then Booleans, lie in a second one.
     """
@@ -138,14 +165,19 @@ class _Pair:
         _check_fed(own, "parameters", [*connected, *self.wanted, *starts[0]], plant)
         _check_fed(plant, "start", [*driving, *starts[1]], own)
 
-        seen = [n for n in answers if n not in driving and (own, n) in self.columns.values()]
-        others = [n for n in gives if n not in connected]
+        notes: list[str] = []
+        into, out = _scales(plant, own, connected, notes), _scales(own, plant, driving, notes)
+        if notes:
+            warnings.warn(f"units: {'; '.join(notes)}", stacklevel=3)
+        seen = [n for n in answers if (n in out or n not in driving) and (n in out or (own, n) in self.columns.values())]
+        others = [n for n in gives if n in into or n not in connected]
         parts = [others, connected, self.wanted, seen, driving]
         ends = list(accumulate(map(len, parts), initial=0))
         self.values = (ctypes.c_double * ends[-1])()
         self.reals = numpy.ctypeslib.as_array(self.values)
         names = list(chain(*parts))
-        owners = [plant] * ends[2] + [own] * (ends[5] - ends[2])
+        owners = [plant] * ends[1] + [own if into else plant] * len(connected) + [own] * (ends[4] - ends[2])
+        owners += [plant if out else own] * len(driving)
         self.slots = {(owner, name): i for i, (owner, name) in enumerate(zip(owners, names))}
         self.x, self.u_ref = self.reals[ends[1] : ends[2]], slice(ends[2], ends[3])
         self.x.flags.writeable = False
@@ -157,11 +189,25 @@ class _Pair:
             at = (ctypes.c_double * len(moved)).from_buffer(self.values, 8 * ends[first]) if moved else None
             return slave.moved(function, moved, at)
 
-        self.give = stretch("fmi2GetReal", plant, 0, 2)
+        self.give = [*stretch("fmi2GetReal", plant, 0, 1 if into else 2), *self._converted(plant, own, into)]
         self.take = stretch("fmi2SetReal", own, 1, 3)
-        self.answer = stretch("fmi2GetReal", own, 3, 5)
+        self.answer = [*stretch("fmi2GetReal", own, 3, 4 if out else 5), *self._converted(own, plant, out)]
         self.drive = stretch("fmi2SetReal", plant, 4, 5)
         self._add_numbers()
+
+    def _converted(self, giver: Slave, taker: Slave, scales: Mapping[str, tuple[float, float]]) -> list[Call]:
+        """The call that converts what one gives to what the other takes; none where nothing is to be converted."""
+        moves = [(self.slots[taker, name], self.slots[giver, name], *scale) for name, scale in scales.items()]
+
+        def convert() -> int:
+            values = self.values
+            for to, at, factor, offset in moves:
+                value = factor * values[at]
+                # Adding 0 would change the sign of -0.
+                values[to] = value if offset == 0.0 else value + offset
+            return 0
+
+        return [Call(convert)] if moves else []
 
     def _add_numbers(self) -> None:
         """The integers and Booleans that are recorded."""
@@ -216,7 +262,9 @@ class _Pair:
         output = next((n for n in (source, f"x.{source}") if n in gives), None)
         if output is None:
             raise Error(f"nominal.{name}: {source!r} is no output of the plant, which has {', '.join(gives)}")
-        return self.slots[self.own, full], self.slots[self.plant, output], float(factor), float(offset)
+        # Converted, where the filter takes it in another unit.
+        at = self.slots.get((self.own, output), self.slots[self.plant, output])
+        return self.slots[self.own, full], at, float(factor), float(offset)
 
     def begin(self, begin: float, stop: float) -> None:
         """Start values, then initialization mode: values are passed on until they stay the same."""

@@ -43,6 +43,7 @@ class Slave:
         self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
         experiment = description.defaultExperiment
         self.suggested_start = float((experiment and experiment.startTime) or 0.0)
+        self._bases = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
         depends = {o.variable.name: o.dependencies for o in description.outputs}
         self.direct = {
             output
@@ -76,6 +77,19 @@ class Slave:
 
     def kind(self, name: str) -> str:
         return KINDS[self.variables[name].type]
+
+    def unit(self, name: str) -> tuple[str | None, tuple[list[int], float, float] | None, bool]:
+        """What is said of the unit of a variable, as `fit_units` takes it."""
+        variable = self.variables[name]
+        told = [variable, *([variable.declaredType] if variable.declaredType else [])]
+        unit = next((of.unit for of in told if of.unit), None)
+        base = self._bases.get(unit)
+        exponents = [int(getattr(base, of)) for of in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")] if base else []
+        return (
+            unit,
+            (exponents, float(base.factor), float(base.offset)) if base else None,
+            any(of.relativeQuantity in (True, "true", "1") for of in told),
+        )
 
     def prepared(self, function: str, *arguments: Any) -> Call:
         """The call of `function` on this instance; `arguments` are objects of ctypes."""

@@ -13,6 +13,7 @@
 //! | `promise` | the verdict on a promise in a recorded run |
 //! | `report` | the report of a step, as Python objects |
 //! | `plan` | the plan of a filter that follows plans |
+//! | `units` | the units of two variables that are connected |
 //! | `filter` | `Filter`: one loop |
 //! | `pool` | the threads, one set for each process |
 //! | `batch` | `FilterBatch`: many loops, a row each |
@@ -28,6 +29,7 @@ mod promise;
 mod report;
 mod sample;
 mod saved;
+mod units;
 
 use pyo3::prelude::*;
 
@@ -41,6 +43,7 @@ fn _punctual(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<report::BarrierReport>()?;
     module.add_function(wrap_pyfunction!(promise::judge, module)?)?;
     module.add_function(wrap_pyfunction!(loading::vehicle, module)?)?;
+    module.add_function(wrap_pyfunction!(units::fit_units, module)?)?;
     module.add_function(wrap_pyfunction!(filter::unpickled_filter, module)?)?;
     module.add_function(wrap_pyfunction!(batch::unpickled_batch, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -81,6 +81,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return Err(Error::configuration("--ssp", message));
     }
     let mut configuration = super::read(file)?;
+    for note in configuration.in_degrees() {
+        output::note(&format!("note: {note}"));
+    }
     if arguments.model_exchange {
         let refused =
             |e: ConfigurationError| Error::configuration("--model-exchange", e.message()).in_file(file);

@@ -376,7 +376,7 @@ fn filter(
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
     let witness = simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
-    let mut warnings = Vec::new();
+    let mut warnings = Configuration::Filter(c.clone()).in_degrees();
     let runs_for = experiment.stop_time - experiment.start_time;
     if arm_after > 0.0 {
         let seconds = number(arm_after);

@@ -13,11 +13,13 @@
 //! Jacobi order: at t_k all inputs are set to the values read after the previous step, the row is recorded, all
 //! step, all is read.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use punctual_fmu::configuration::Configuration;
 use punctual_fmu::text::number;
 
 use super::grid::Grid;
@@ -26,7 +28,7 @@ use super::model::{Model, Reader};
 use super::network::{self, Network};
 use super::ports::{Group, Source};
 use super::promises::{self, Promise, Watched};
-use super::starts::{Start, Values};
+use super::starts::{self, Start, Values};
 use super::system::{Order, System};
 use crate::error::{Error, brief_time};
 use crate::host::{Causality, DataType, Description, Participant};
@@ -190,10 +192,16 @@ impl Simulation<Box<dyn Participant>> {
     pub fn of(system: &System, models: &[Model]) -> Result<Self, Error> {
         let descriptions: Vec<_> = models.iter().map(Model::description).collect();
         promises::check_fed(system, &descriptions, &network::links(system, &descriptions)?, &[])?;
-        Self::assembled(system, &descriptions, |c| {
+        let mut simulation = Self::assembled(system, &descriptions, |c| {
             let name = &system.components()[c].name;
             models[c].instance(name).map_err(|e| e.in_component(name))
-        })
+        })?;
+        let notes = models.iter().filter_map(Model::configuration).flat_map(Configuration::in_degrees);
+        // The start in the file of a filter is that of its plant.
+        let notes: BTreeSet<_> = notes.collect();
+        simulation.notes.extend(notes);
+        simulation.standing_notes = simulation.notes.len();
+        Ok(simulation)
     }
 }
 
@@ -286,6 +294,7 @@ impl<P: Participant> Simulation<P> {
         simulation.note_shortened_step(descriptions);
         simulation.note_what_is_not_recorded(descriptions);
         simulation.notes.extend(network::unit_notes(system, descriptions, &links));
+        simulation.notes.extend(starts::in_degrees(system.components(), descriptions));
         simulation.notes.extend(promises::unwanted(system, descriptions, &links));
         simulation.standing_notes = simulation.notes.len();
         Ok(simulation)

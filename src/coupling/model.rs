@@ -93,6 +93,14 @@ impl Model {
         Ok(Self::Fmu(fmu, Rc::new(sized)))
     }
 
+    /// Its configuration, where it is one.
+    pub fn configuration(&self) -> Option<&Configuration> {
+        match self {
+            Self::Fmu(..) => None,
+            Self::Own(own, _) => Some(&own.configuration),
+        }
+    }
+
     /// The file that it is from.
     pub fn path(&self) -> &Path {
         match self {

@@ -94,14 +94,15 @@ pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>
 
 /// Notes on `links` whose units differ, or cannot be compared.
 pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
-    /// Most connections named in a note.
+    /// Most connections named of a pair of units.
     const NAMED: usize = 8;
     let resolver = Resolver { system, descriptions };
-    let mut notes: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    // By kind and then by units.
+    let mut notes: BTreeMap<&str, BTreeMap<String, Vec<String>>> = BTreeMap::new();
     for link in links {
         let ends = [link.from, link.to].map(|port| (resolver.name(port), resolver.unit(port)));
         let [(from, given), (to, taken)] = &ends;
-        let (what, which) = match link.units {
+        let (what, how, which) = match link.units {
             Units::Same => continue,
             Units::Converted => {
                 let scale = match (brief(link.factor), brief(link.offset)) {
@@ -109,25 +110,30 @@ pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]
                     (1.0, offset) => format!("plus {offset}"),
                     (factor, offset) => format!("times {factor} plus {offset}"),
                 };
-                (format!("units are converted, {given} to {taken} ({scale})"), format!("{from} → {to}"))
+                ("units are converted", format!("{given} to {taken} ({scale}) of "), format!("{from} → {to}"))
             }
             Units::Unknown => (
-                "units that cannot be compared, so numbers pass as they are".to_owned(),
+                "units that cannot be compared, so numbers pass as they are",
+                String::new(),
                 format!("{from} ({given}) → {to} ({taken})"),
             ),
             Units::Overruled(by) => (
-                "a factor of the file stands, though the units make another one".to_owned(),
+                "a factor of the file stands, though the units make another one",
+                String::new(),
                 format!("{from} ({given}) → {to} ({taken}) has {}, not {}", brief(link.factor), brief(by)),
             ),
         };
-        notes.entry(what).or_default().push(which);
+        notes.entry(what).or_default().entry(how).or_default().push(which);
     }
-    let note = |(what, all): (String, Vec<String>)| {
+    let part = |(how, all): (String, Vec<String>)| {
         let named = all[..all.len().min(NAMED)].join(", ");
         match all.len().saturating_sub(NAMED) {
-            0 => format!("{what}: {named}"),
-            more => format!("{what}: {named} and {more} more"),
+            0 => format!("{how}{named}"),
+            more => format!("{how}{named} and {more} more"),
         }
+    };
+    let note = |(what, parts): (&str, BTreeMap<_, _>)| {
+        format!("{what}: {}", parts.into_iter().map(part).collect::<Vec<_>>().join("; "))
     };
     notes.into_iter().map(note).collect()
 }

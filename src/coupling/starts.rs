@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use punctual_fmu::configuration::ConfigurationError;
+use punctual_fmu::configuration::{self, ConfigurationError};
 
 use super::network::sizes;
 use super::system::{Component, StartValue};
@@ -96,6 +96,25 @@ pub(super) fn structural(component: &Component, description: &Description) -> BT
         (variable.causality == Causality::StructuralParameter).then_some((variable.value_reference, value))
     });
     given.collect()
+}
+
+/// What to say of angles of more than a turn among the start values.
+pub(super) fn in_degrees(components: &[Component], descriptions: &[&Description]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (component, description) in components.iter().zip(descriptions) {
+        let unit = |name: &str| {
+            let array = || description.array(name).map(|array| array.first);
+            let index =
+                description.index_of(name).or_else(array).filter(|i| *i < description.variables.len())?;
+            description.variables[index].unit.as_deref()
+        };
+        for (name, value) in &component.start {
+            let values = value.flat().into_iter().filter_map(StartValue::number);
+            let name = (format!("{}.{name}", component.name), unit(name).unwrap_or_default());
+            notes.extend(values.filter_map(|value| configuration::in_degrees(&name.0, value, name.1)));
+        }
+    }
+    notes
 }
 
 fn check_causality(variable: &Variable) -> Result<(), String> {

@@ -33,6 +33,7 @@ mod sundry;
 mod surviving;
 mod table;
 mod trying;
+mod units;
 mod validating;
 mod vehicles;
 mod workshop;

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import warnings
 
 import fmpy
 import fmpy.util
@@ -260,4 +261,72 @@ def test_without_a_package_the_message_says_what_to_install(fmus, monkeypatch):
         punctual.plot(result)
     monkeypatch.setitem(__import__("sys").modules, "fmpy", None)
     with pytest.raises(ImportError, match=r"pip install fmpy"):
+        punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)
+
+
+CENTI = {"x_p": "cm", "y_p": "cm", "theta": "deg", "v": "cm/s", "a": "cm/s2", "omega": "deg/s"}
+
+
+def centi(folder, **units):
+    """The unicycle in centimetres and degrees, as an FMU."""
+    units = CENTI | units
+    plant = {
+        "kind": "plant",
+        "name": "centi",
+        "plant": {
+            "states": [{"name": n, "unit": units[n]} for n in ("x_p", "y_p", "theta", "v")],
+            "inputs": [{"name": n, "unit": units[n]} for n in ("a", "omega")],
+            "derivatives": {
+                "x_p": "v * cos(theta * d)" if units["x_p"] == "cm" else "0",
+                "y_p": "v * sin(theta * d)",
+                "theta": "omega",
+                "v": "a",
+            },
+            "parameters": [{"name": "d", "start": math.pi / 180, "unit": "rad/deg"}],
+        },
+    }
+    return punctual.build(plant, folder / "centi.fmu")
+
+
+@pytest.mark.parametrize("direct", [True, False])
+def test_a_plant_in_other_units_is_converted_as_by_punctual_run(fmus, tmp_path, direct):
+    start = {"v": 20.0, "theta": 30.0}
+    parameters = {"u_ref.a": 0.5}
+    own, plant = fmus[0], centi(tmp_path)
+    if not direct:
+        own = punctual.build(FILTER | {"direct_feedthrough": False}, tmp_path / "late.fmu")
+    with pytest.warns(UserWarning, match=r"x\.x_p of the plant from cm to m \(times 0\.01\).*u\.omega of the filter from rad/s to"):
+        result = punctual.simulate(own, plant, stop_time=3.0, step_size=STEP, start=start, parameters=parameters)
+    columns = recorded(
+        tmp_path,
+        own,
+        plant,
+        f"stop_time = 3.0\nstep = {STEP}",
+        start='start = { "x0.v" = 20.0, "x0.theta" = 30.0 }\nfeedthrough = false',
+        connections="",
+    )
+    with pytest.warns(UserWarning):
+        plain = punctual.simulate(own, plant, stop_time=3.0, step_size=STEP, start=start)
+    assert_same(plain, columns)
+    assert result["u.a"].tolist() != plain["u.a"].tolist()
+    assert plain["x.theta"][0] == 30.0
+    # The wish is in the filter's units.
+    with pytest.warns(UserWarning):
+        wished = punctual.simulate(own, plant, stop_time=0.5, step_size=STEP, start=start, nominal=DAMPING)
+    assert wished["u_ref.a"][0] == -0.01 * 20.0
+    with pytest.warns(UserWarning):
+        called = punctual.simulate(
+            own, plant, stop_time=0.5, step_size=STEP, start=start, nominal=lambda t, x: [-1.0 * x[3], 0.0]
+        )
+    assert called["u_ref.a"].tolist() == wished["u_ref.a"].tolist()
+
+
+def test_units_that_do_not_fit_are_refused_and_equal_ones_say_nothing(fmus, tmp_path):
+    words = "^x.x_p is in kg in the plant, but in m in the filter, which measures another quantity$"
+    with pytest.raises(punctual.Error, match=words):
+        punctual.simulate(fmus[0], centi(tmp_path, x_p="kg"), stop_time=0.1, step_size=STEP)
+    with pytest.warns(UserWarning, match="x.x_p of the plant as it is, since 1 and m cannot be compared"):
+        punctual.simulate(fmus[0], centi(tmp_path, x_p="1"), stop_time=0.1, step_size=STEP)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         punctual.simulate(*fmus, stop_time=0.1, step_size=STEP)

@@ -6,6 +6,7 @@
 
 mod adding;
 mod alone;
+mod angle;
 mod apart;
 mod barrier;
 mod controller;
@@ -26,6 +27,7 @@ mod unit;
 mod words;
 
 pub use alone::RunSection;
+pub use angle::in_degrees;
 pub use barrier::{
     Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
 };
