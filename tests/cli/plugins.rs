@@ -175,7 +175,7 @@ fn libraries_that_are_refused() {
         "NAME=\"x\"",
         "NAME=\"end\"",
         "NAME=\"v\\xff\"",
-        "UNIT=\"mph\"",
+        "UNIT=\"mile\"",
         "UNIT=\"\\xc3\"",
         "DESCRIPTION=\"\\x80\"",
         "MINIMUM=NAN",
