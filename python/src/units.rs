@@ -8,17 +8,18 @@ use pyo3::prelude::*;
 /// where it is defined, and whether offsets do not count.
 type Unit = (Option<String>, Option<([i32; 8], f64, f64)>, bool);
 
+fn said(unit: &Unit) -> Said<'_> {
+    let base = unit.1.map(|(exponents, factor, offset)| {
+        let [kg, m, s, a, k, mol, cd, rad] = exponents;
+        BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
+    });
+    Said { name: unit.0.as_deref(), base, is_difference: unit.2 }
+}
+
 /// The factor and offset that make a value in the unit `given` one in `taken`, or `None` where they cannot be compared. Raises
 /// `ValueError` with the reason where they do not fit.
 #[pyfunction]
 pub(crate) fn fit_units(given: Unit, taken: Unit) -> PyResult<Option<(f64, f64)>> {
-    let said = |unit: &Unit| -> Said<'_> {
-        let base = unit.1.map(|(exponents, factor, offset)| {
-            let [kg, m, s, a, k, mol, cd, rad] = exponents;
-            BaseUnit { kg, m, s, a, k, mol, cd, rad, factor, offset }
-        });
-        Said { name: unit.0.as_deref(), base, is_difference: unit.2 }
-    };
     match fit(&said(&given), &said(&taken)).map_err(PyValueError::new_err)? {
         Fit::Same => Ok(Some((1.0, 0.0))),
         Fit::Scaled { factor, offset } => Ok(Some((factor, offset))),
