@@ -7,7 +7,6 @@ use punctual_fmu::fmi2::{self, CO_SIMULATION, FALSE, TRUE};
 
 use super::handle::{CTexts, Handle, c_text, get_through, plain_calls, set_through};
 use super::library::functions;
-use super::logging::owned;
 use super::number::{self, DataType, Truth};
 use super::participant::{Participant, Slave, remark};
 use super::{Description, Fmu, LogMessage, Version};
@@ -197,6 +196,10 @@ impl Slave for Instance {
         self.handle.log()
     }
 
+    fn log_fault(&self) -> Option<String> {
+        self.handle.log_fault()
+    }
+
     fn get_text(&mut self, reference: u32, count: usize) -> Result<Option<Vec<Option<String>>>, Error> {
         let Some(call) = self.functions.get_string.filter(|_| count == 1) else { return Ok(None) };
         self.handle.entering("fmi2GetString");
@@ -204,9 +207,7 @@ impl Slave for Instance {
         // SAFETY: the instance lives; one reference can be read and one address written.
         let status = unsafe { call(self.handle.component(), &raw const reference, 1, &raw mut text) };
         self.handle.check("fmi2GetString", status)?;
-        // SAFETY: the standard has the FMU keep a zero-terminated text until its next call; NULL is allowed for.
-        let text = (!text.is_null()).then(|| unsafe { owned(text) });
-        Ok(Some(vec![text]))
+        self.handle.texts("fmi2GetString", &[text]).map(Some)
     }
 }
 

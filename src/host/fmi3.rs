@@ -8,7 +8,6 @@ use punctual_fmu::fmi3::{self, FALSE, TRUE};
 
 use super::handle::{CTexts, Handle, c_text, get_through, plain_calls, set_through};
 use super::library::functions;
-use super::logging::owned;
 use super::number::{self, DataType, Truth};
 use super::participant::{Participant, Saved, Slave, remark};
 use super::{Description, Fmu, LogMessage, Version};
@@ -352,6 +351,10 @@ impl Slave for Instance {
         self.handle.log()
     }
 
+    fn log_fault(&self) -> Option<String> {
+        self.handle.log_fault()
+    }
+
     fn get_text(&mut self, reference: u32, count: usize) -> Result<Option<Vec<Option<String>>>, Error> {
         let Some(call) = self.functions.get_string else { return Ok(None) };
         self.handle.entering("fmi3GetString");
@@ -360,9 +363,7 @@ impl Slave for Instance {
         // SAFETY: the instance lives; one reference can be read and `count` addresses written.
         let status = unsafe { call(component, &raw const reference, 1, first, count) };
         self.handle.check("fmi3GetString", status)?;
-        // SAFETY: the standard has the FMU keep zero-terminated texts until its next call; NULL is allowed for.
-        let text = |text: fmi3::Text| (!text.is_null()).then(|| unsafe { owned(text) });
-        Ok(Some(texts.into_iter().map(text).collect()))
+        self.handle.texts("fmi3GetString", &texts).map(Some)
     }
 
     fn may_go_back(&mut self, may: bool) {

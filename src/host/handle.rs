@@ -5,7 +5,7 @@ use std::ffi::{CString, c_char, c_void};
 use std::ptr::NonNull;
 use std::rc::Rc;
 
-use super::logging::Logging;
+use super::logging::{self, Copied, Logging};
 use super::number::{DataType, Loss};
 use super::{Description, Fmu, LogMessage, Status, journal};
 use crate::error::{CallFailure, Error};
@@ -42,6 +42,7 @@ impl Handle {
     ) -> Result<Self, Error> {
         let logging = Logging::new();
         journal::entering(call, name, fmu.path(), None);
+        logging.call();
         let mut component = make(&logging, false);
         if component.is_null() && logging.messages().is_empty() {
             // Some tell the reason only where the log is wanted.
@@ -76,6 +77,24 @@ impl Handle {
         self.logging.messages()
     }
 
+    /// What was wrong with the first call of its log callback that was not as the standard says.
+    pub(super) fn log_fault(&self) -> Option<String> {
+        self.logging.fault()
+    }
+
+    /// The texts that a call gave; `None` for each that is NULL.
+    pub(super) fn texts(
+        &self,
+        call: &'static str,
+        texts: &[*const c_char],
+    ) -> Result<Vec<Option<String>>, Error> {
+        let text = |address: &*const c_char| match logging::value(*address) {
+            Copied::Null => Ok(None),
+            copied => copied.text().map(Some).map_err(|what| self.broken(call, format!("gave {what}"))),
+        };
+        texts.iter().map(text).collect()
+    }
+
     /// The instance as its library knows it.
     pub(super) fn component(&self) -> *mut c_void {
         self.component.as_ptr()
@@ -89,6 +108,7 @@ impl Handle {
 
     #[inline]
     pub(super) fn entering(&self, call: &'static str) {
+        self.logging.call();
         journal::entering(call, &self.name, self.fmu.path(), self.time);
     }
 

@@ -5,7 +5,7 @@ use std::ffi::c_char;
 use std::path::Path;
 
 use super::archive::chain;
-use super::logging::owned;
+use super::logging::{self, Copied};
 use super::{Version, fmi2, fmi3};
 use crate::error::FmuProblem;
 
@@ -97,8 +97,10 @@ impl Library {
         for (call, function, expected) in functions.questions() {
             // SAFETY: the function takes nothing and may be called at any time.
             let answer = unsafe { function() };
-            // SAFETY: the standard has it return a zero-terminated text; NULL is allowed for.
-            let answer = unsafe { owned(answer) };
+            let answer = match logging::value(answer) {
+                Copied::Null => String::new(),
+                answer => answer.text().unwrap_or_else(str::to_owned),
+            };
             if !answer.starts_with(expected) {
                 return Err(FmuProblem::Version { call, answer, wanted: version.as_str() });
             }

@@ -149,6 +149,9 @@ pub trait Slave: Participant {
     /// Its last log messages, oldest first; at most eight.
     fn log(&self) -> Vec<LogMessage>;
 
+    /// What was wrong with the first call of its log callback that was not as the standard says.
+    fn log_fault(&self) -> Option<String>;
+
     /// Reads a text, or all `count` texts of an array; `None` for each that is NULL, and for all where there is no
     /// such function.
     ///

@@ -35,11 +35,20 @@ impl Status {
         self == Self::Fmi2(fmi2::Status::PENDING)
     }
 
+    /// Whether the standard knows this number.
+    pub fn is_known(self) -> bool {
+        match self {
+            Self::Fmi2(status) => status.is_known(),
+            Self::Fmi3(status) => status.is_known(),
+        }
+    }
+
     /// Whether the standard forbids to free the instance after it, or does not know it.
     pub fn is_last(self) -> bool {
         match self {
-            Self::Fmi2(status) => status == fmi2::Status::FATAL || self.is_pending() || !status.is_known(),
-            Self::Fmi3(status) => status == fmi3::Status::FATAL || !status.is_known(),
+            _ if !self.is_known() => true,
+            Self::Fmi2(status) => status == fmi2::Status::FATAL || self.is_pending(),
+            Self::Fmi3(status) => status == fmi3::Status::FATAL,
         }
     }
 }
