@@ -75,17 +75,24 @@ pub enum FmuProblem {
     },
     /// The model description is missing, of another version, or malformed; with the reason.
     Description(String),
-    /// It offers no co-simulation interface.
+    /// It offers no interface at all.
     NoCoSimulation,
     /// The references that it carries cannot be read; with the reason.
     References(String),
-    /// Its model identifier is not a C identifier, so it names no library.
+    /// Its model identifier is no file name, so it names no library.
     ModelIdentifier(String),
     /// No shared library for this platform.
     NoBinary {
         /// The folder looked for, such as `linux64`.
         wanted: &'static str,
         /// The folders present.
+        present: Vec<String>,
+    },
+    /// The folder for this platform lacks the library that its model identifier names.
+    NoLibrary {
+        /// The library.
+        wanted: String,
+        /// The files in the folder.
         present: Vec<String>,
     },
     /// The shared library cannot be loaded; with the loader's words.
@@ -124,15 +131,22 @@ impl fmt::Display for FmuProblem {
                 write!(f, "; allowed are at most {allowed}")
             }
             Self::Description(reason) => write!(f, "modelDescription.xml: {reason}"),
-            Self::NoCoSimulation => f.write_str("has no co-simulation interface (no CoSimulation element)"),
+            Self::NoCoSimulation => f.write_str("has no co-simulation interface, nor any other"),
             Self::References(reason) => write!(f, "its references: {reason}"),
-            Self::ModelIdentifier(name) => write!(f, "modelIdentifier {name:?} is not a C identifier"),
+            Self::ModelIdentifier(name) => {
+                write!(f, "modelIdentifier is {name:?}, which names no file, so there is no library")
+            }
             Self::NoBinary { wanted, present } if present.is_empty() => {
                 write!(f, "holds no binary at all, so none for {wanted}")
             }
             Self::NoBinary { wanted, present } => {
                 write!(f, "holds no binary for {wanted}, only for {}", present.join(", "))
             }
+            Self::NoLibrary { wanted, present } => write!(
+                f,
+                "holds no {wanted}, the library that its modelIdentifier names; in that folder is {}",
+                present.join(", ")
+            ),
             Self::Load(reason) => {
                 write!(f, "its library cannot be loaded: {reason}")?;
                 // Those of pythonfmu do: the symbols are Python's own.

@@ -71,8 +71,13 @@ pub enum Break {
     Exception(u32),
     /// Ended with this exit code, which the FMU chose by ending the process.
     Exit(i32),
-    /// Stopped because it took longer than this.
-    Late(Duration),
+    /// Stopped because it took too long.
+    Late {
+        /// The time it had.
+        limit: Duration,
+        /// How long its last call had lasted.
+        call: Duration,
+    },
 }
 
 impl fmt::Display for Break {
@@ -81,7 +86,7 @@ impl fmt::Display for Break {
             Self::Signal(number) => write!(f, "crashed with signal {number}{}", meaning(*number)),
             Self::Exception(number) => write!(f, "crashed with exception {number:#X}{}", cause(*number)),
             Self::Exit(code) => write!(f, "ended the whole process with exit code {code}"),
-            Self::Late(limit) => write!(f, "did not come back within {} s", limit.as_secs_f64()),
+            Self::Late { limit, .. } => write!(f, "did not come back within {} s", limit.as_secs_f64()),
         }
     }
 }
@@ -163,16 +168,25 @@ impl Child {
             command.stdout(Stdio::null()).stderr(Stdio::null());
         }
         let begin = Instant::now();
+        // The record of the last call, and when it was first seen.
+        let (mut record, mut entered) = (Vec::new(), begin);
         let mut child = command.spawn().map_err(failed)?;
         let status = loop {
             if let Some(status) = child.try_wait().map_err(failed)? {
                 break status;
             }
+            if limit.is_some() {
+                let now = std::fs::read(journal_file(self.folder.path())).unwrap_or_default();
+                if now != record {
+                    (record, entered) = (now, Instant::now());
+                }
+            }
             if let Some(limit) = limit.filter(|limit| begin.elapsed() >= *limit) {
+                let call = entered.elapsed();
                 // The child may just have ended by itself; either way it is waited for.
                 let _ = child.kill();
                 child.wait().map_err(failed)?;
-                return Ok(End::Broken { how: Break::Late(limit), last: self.last_call() });
+                return Ok(End::Broken { how: Break::Late { limit, call }, last: self.last_call() });
             }
             std::thread::sleep(LOOK);
         };

@@ -67,8 +67,8 @@ impl Located {
             place,
             message: message.to_owned(),
         };
-        if self.interfaces == 0 {
-            let message = "there is no CoSimulation element; this program looks at co-simulation only";
+        if self.interfaces == 0 && self.description.model_exchange.is_none() {
+            let message = "there is neither a CoSimulation nor a ModelExchange element";
             report(add(Place::Root, message));
         }
         for i in 1..self.interfaces {

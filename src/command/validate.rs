@@ -20,7 +20,7 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// How long the trial may take, in seconds (0.01 to 86400)
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = seconds)]
     time_limit: Duration,
     /// Look at the files only; nothing of the FMU is run
     #[arg(long)]
@@ -43,6 +43,9 @@ pub struct TrialArguments {
     file: PathBuf,
     /// The folder that the watching process made
     folder: PathBuf,
+    /// The time that it may take, in seconds
+    #[arg(long, value_parser = seconds)]
+    time_limit: Duration,
     /// Compare with the references that the FMU carries, within this share
     #[arg(long)]
     references: Option<f64>,
@@ -143,6 +146,6 @@ fn rules(json: bool) {
 ///
 /// The folder cannot be written to.
 pub fn execute_trial(arguments: &TrialArguments) -> Result<ExitCode, Error> {
-    trial::perform(&arguments.file, &arguments.folder, arguments.references)?;
+    trial::perform(&arguments.file, &arguments.folder, arguments.time_limit, arguments.references)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -132,6 +132,18 @@ impl Archive {
     ///
     /// Those of [`xml`](Self::xml).
     pub fn model_description(&self) -> Result<String, FmuProblem> {
+        let is_inside =
+            |entry: &&String| entry.rsplit_once('/').is_some_and(|(_, file)| file == MODEL_DESCRIPTION);
+        if !self.entries.iter().any(|entry| entry == MODEL_DESCRIPTION)
+            && let Some(entry) = self.entries.iter().find(is_inside)
+        {
+            let folder = entry.trim_end_matches(MODEL_DESCRIPTION);
+            let text = format!(
+                "is not at the top of the archive, but in {folder}: an FMU holds what is in that folder, without the \
+                 folder; archive it anew from inside"
+            );
+            return Err(FmuProblem::Description(text));
+        }
         self.xml(MODEL_DESCRIPTION)
     }
 

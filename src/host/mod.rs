@@ -25,6 +25,7 @@ pub use archive::{
 };
 #[cfg(test)]
 pub(crate) use description::example;
+pub(crate) use description::foreign_version;
 pub use description::{
     Array, Description, Fmi2Description, Fmi3Description, Output, Variable, Version, Written,
 };
@@ -99,11 +100,17 @@ impl Fmu {
         let version = self.description.version();
         let path = self.archive.library(version, &self.description.model_identifier);
         if !path.is_file() {
-            let present = self.archive.platforms().to_vec();
-            return Err(Error::fmu(
-                self.path(),
-                FmuProblem::NoBinary { wanted: version.platform(), present },
-            ));
+            let (wanted, platforms) = (version.platform(), self.archive.platforms());
+            let problem = if platforms.iter().any(|platform| platform == wanted) {
+                let folder = format!("binaries/{wanted}/");
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let inside = |entry: &String| entry.strip_prefix(&folder).map(str::to_owned);
+                let files = self.archive.entries().iter().filter_map(inside).filter(|e| !e.is_empty());
+                FmuProblem::NoLibrary { wanted: format!("{folder}{name}"), present: files.take(8).collect() }
+            } else {
+                FmuProblem::NoBinary { wanted, present: platforms.to_vec() }
+            };
+            return Err(Error::fmu(self.path(), problem));
         }
         journal::entering("loading its library", "", self.path(), None);
         let library = Library::load(&path, version).map_err(|problem| Error::fmu(self.path(), problem))?;

@@ -29,7 +29,7 @@ pub use finding::{Finding, Place, rules};
 pub use punctual_modeldescription::Severity;
 
 use crate::error::{Error, FmuProblem};
-use crate::host::{Archive, Description};
+use crate::host::{Archive, Description, foreign_version};
 use finding::{DESCRIPTION, Findings};
 use model::Model;
 
@@ -54,7 +54,8 @@ impl Report {
 ///
 /// # Errors
 ///
-/// The file cannot be read, or the trial's process cannot be started. Any defect of the FMU is a finding.
+/// The file cannot be read, it is of another version of FMI, or the trial's process cannot be started. Any defect of
+/// the FMU is a finding.
 pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
@@ -79,6 +80,9 @@ pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -
         skipped.push("everything else: the description is not well-formed".to_owned());
         return Ok(Report { findings: findings.finish(), skipped });
     };
+    if let Some(foreign) = foreign_version(&document) {
+        return Err(Error::fmu(path, FmuProblem::CannotRun(foreign)));
+    }
     let model = Model::read(&document);
     schema::check(&document, model.schema(), &mut findings);
     model.check(&mut findings);
@@ -88,9 +92,13 @@ pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -
     }
     symbols::check(&archive, &model, &mut findings);
     let reason = trial::reason_to_skip(&archive, model.version(), model.needs_tool(), &findings);
-    let reason =
-        reason.or_else(|| (!model.has_co_simulation()).then(|| "there is no co-simulation".to_owned()));
-    let reason = reason.or_else(|| Description::parse(&text).ok()?.obstacle());
+    let reason = reason.or_else(|| match Description::parse(&text) {
+        Ok(description) => description.obstacle(),
+        Err(FmuProblem::CannotRun(reason)) => Some(reason),
+        Err(_) if !model.has_co_simulation() => Some("there is no co-simulation".to_owned()),
+        Err(problem @ FmuProblem::ModelIdentifier(_)) => Some(problem.to_string()),
+        Err(_) => None,
+    });
     match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),

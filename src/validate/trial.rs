@@ -7,14 +7,14 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::finding::{Finding, Findings, Place, severity};
 use crate::error::{Error, FmuProblem};
 use crate::host::{
     Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
-use crate::isolation::{self, Child, End, Voice};
+use crate::isolation::{self, Break, Child, End, Voice};
 use crate::references::{Difference, References};
 
 /// The name of the trial's instance.
@@ -23,6 +23,8 @@ const INSTANCE: &str = "trial";
 const PLACE: &str = "trial";
 /// The greatest number of steps of one pass.
 const STEPS: u32 = 10;
+/// The share of the time limit that the steps of one pass may take. An FMU that is slow makes fewer of them.
+const SHARE_OF_PASS: f64 = 0.2;
 /// The step in seconds where the FMU suggests none.
 const STEP: f64 = 0.01;
 /// Relative difference of a real value from its start value that is allowed, since decimals can be read in other
@@ -49,7 +51,6 @@ pub(super) fn reason_to_skip(
     for (head, reason) in [
         ("schema.", "the description breaks the schema"),
         ("interface.co-simulation", "there is no co-simulation"),
-        ("interface.identifier", "modelIdentifier names no library"),
     ] {
         if findings.any(head) {
             return Some(reason.to_owned());
@@ -79,7 +80,8 @@ pub(super) fn run(
     findings: &mut Findings,
 ) -> Result<(), Error> {
     let child = Child::new()?;
-    let mut words: Vec<OsString> = vec!["trial".into()];
+    let mut words: Vec<OsString> =
+        vec!["trial".into(), "--time-limit".into(), limit.as_secs_f64().to_string().into()];
     words.extend(references.into_iter().flat_map(|share| ["--references".into(), share.to_string().into()]));
     words.extend(["--".into(), path.into(), child.folder().into()]);
     let end = child.run(words, Voice::Silent, Some(limit))?;
@@ -108,7 +110,17 @@ pub(super) fn run(
                     None => format!("in {} the FMU", last.call),
                 },
             };
-            findings.archive("trial.crash", PLACE, format!("{what} {how}"));
+            match how {
+                Break::Late { limit, call } => {
+                    let [limit, call] = [limit, call].map(|of| (of.as_secs_f64() * 10.0).round() / 10.0);
+                    let text = format!(
+                        "{what} had been at work for {call} s when the time limit of the trial, {limit} s, had passed: it \
+                         is slow, or it hangs; --time-limit SECONDS waits longer"
+                    );
+                    findings.archive("trial.time", PLACE, text);
+                }
+                how => findings.archive("trial.crash", PLACE, format!("{what} {how}")),
+            }
         }
     }
     Ok(())
@@ -118,16 +130,16 @@ fn findings_file(folder: &Path) -> PathBuf {
     folder.join("findings.jsonl")
 }
 
-/// Tries the FMU at `path` in this process, and compares with its `references` within this share. Its findings go into files in `folder`, at once.
+/// Tries the FMU at `path` in this process, which has so much time, and compares with its `references` within this share. Its findings go into files in `folder`, at once.
 ///
 /// # Errors
 ///
 /// The folder cannot be written to.
-pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<(), Error> {
+pub fn perform(path: &Path, folder: &Path, limit: Duration, references: Option<f64>) -> Result<(), Error> {
     isolation::settle(folder)?;
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
-    let mut trial = Trial { file, told: HashSet::new() };
+    let mut trial = Trial { file, limit, told: HashSet::new() };
     match Fmu::open(path).map(Rc::new) {
         Ok(fmu) => {
             trial.note(|trial| trial.all(&fmu));
@@ -144,6 +156,8 @@ pub fn perform(path: &Path, folder: &Path, references: Option<f64>) -> Result<()
 
 struct Trial {
     file: File,
+    /// The time that the trial may take.
+    limit: Duration,
     /// Rule and variable of the findings told: the same finding at every step teaches nothing.
     told: HashSet<(&'static str, Option<String>)>,
 }
@@ -183,12 +197,25 @@ impl Trial {
                 self.tell("trial.version", None, &format!("{call} answered {answer:?}; must be {wanted:?}"));
             }
         }
-        let plan = Plan::of(&description);
         let mut slave = fmu.instantiate(&description, INSTANCE)?;
-        let slave = &mut *slave;
-        let first = self.pass(slave, &description, plan, false)?;
+        let done = self.passes(fmu, &mut *slave, &description);
+        if let Some(fault) = slave.log_fault() {
+            self.tell("trial.log", None, &format!("the FMU called the logger, and {fault}"));
+        }
+        done
+    }
+
+    /// Two runs, the second after a reset and with start values set, and a second instance.
+    fn passes(
+        &mut self,
+        fmu: &Rc<Fmu>,
+        slave: &mut dyn Slave,
+        description: &Description,
+    ) -> Result<(), Error> {
+        let mut plan = Plan::of(description);
+        let first = self.pass(slave, description, &mut plan, false)?;
         slave.reset()?;
-        let second = self.pass(slave, &description, plan, true)?;
+        let second = self.pass(slave, description, &mut plan, true)?;
         let fmi = description.version().prefix();
         let as_started = !self.told.iter().any(|(rule, _)| *rule == "trial.start");
         for (name, a, b) in first.iter().zip(&second).map(|((name, a), (_, b))| (name, a, b)) {
@@ -245,7 +272,7 @@ impl Trial {
         &mut self,
         slave: &mut dyn Slave,
         description: &Description,
-        plan: Plan,
+        plan: &mut Plan,
         set: bool,
     ) -> Result<Vec<(String, f64)>, Error> {
         let variables = &description.variables;
@@ -258,11 +285,17 @@ impl Trial {
         if !set {
             variables.chunk_by(same).try_for_each(|array| self.compare_start(slave, array))?;
         }
-        for k in 0..plan.steps {
+        let mut k = 0;
+        while k < plan.steps {
             if !set && k == plan.steps / 2 && description.states[0] {
                 self.go_back(slave, description, (plan.time(k), plan.step))?;
             }
+            let begin = Instant::now();
             slave.do_step(plan.time(k), plan.step)?;
+            if !set && k == 0 {
+                plan.shorten(begin.elapsed(), self.limit);
+            }
+            k += 1;
             self.outputs(slave, variables)?;
             if slave.asks_to_end() {
                 break;
@@ -313,9 +346,17 @@ impl Trial {
         let first = &array[0];
         if first.of == DataType::String {
             let texts = slave.get_text(first.value_reference, array.len())?;
-            if texts.is_none_or(|texts| texts.contains(&None)) {
-                let call = format!("{}GetString", slave.version().prefix());
-                self.tell("trial.text", Some(&first.name), &format!("{call} gave NULL; must give a text"));
+            let call = format!("{}GetString", slave.version().prefix());
+            let is_garbled = |text: &Option<String>| {
+                text.as_ref().is_some_and(|text| text.contains(char::REPLACEMENT_CHARACTER))
+            };
+            let fault = match &texts {
+                Some(texts) if texts.iter().any(is_garbled) => Some("gave what is not UTF-8"),
+                Some(texts) if !texts.contains(&None) => None,
+                _ => Some("gave NULL; must give a text"),
+            };
+            if let Some(fault) = fault {
+                self.tell("trial.text", Some(&first.name), &format!("{call} {fault}"));
             }
             return Ok(None);
         }
@@ -502,6 +543,12 @@ impl Plan {
     /// The time of step `k`.
     fn time(&self, k: u32) -> f64 {
         self.start + f64::from(k) * self.step
+    }
+
+    /// Makes fewer steps where one takes so long that a pass would take too much of the time limit.
+    fn shorten(&mut self, step: Duration, limit: Duration) {
+        let most = SHARE_OF_PASS * limit.as_secs_f64() / step.as_secs_f64().max(1e-9);
+        self.steps = self.steps.min(most.clamp(1.0, f64::from(STEPS)) as u32);
     }
 
     /// The suggested experiment, cut short.

@@ -212,10 +212,11 @@ fn a_name_that_is_no_text() {
 
 #[test]
 fn a_description_that_is_missing() {
+    refused(&archive(&[("a/other.xml", b"<a/>")]), "xml.readable", "modelDescription.xml: cannot be read: ");
     refused(
         &archive(&[("a/modelDescription.xml", b"<a/>")]),
         "xml.readable",
-        "modelDescription.xml: cannot be read: ",
+        "modelDescription.xml: is not at the top of the archive, but in a/: ",
     );
 }
 

@@ -43,7 +43,7 @@ use Severity::{Error, Warning};
 /// Every rule on descriptions: its name, the severity of breaking it, and its demand. A rule's name never changes
 /// its meaning.
 pub const RULES: &[(&str, Severity, &str)] = &[
-    ("interface.co-simulation", Error, "the FMU offers co-simulation, once"),
+    ("interface.co-simulation", Error, "the FMU offers co-simulation, once, or model exchange"),
     ("interface.identifier", Error, "modelIdentifier is a C identifier"),
     ("interface.guid", Error, "guid is not empty"),
     ("interface.kind", Error, "FMI 3.0: the FMU offers an interface"),

@@ -16,11 +16,11 @@ use std::ops::Deref;
 use fmi_rs::model_description::fmi2 as importer;
 use punctual_modeldescription::{
     Causality, DefaultExperiment, Located, ModelDescription, ModelStructure, SimpleType, Unknown,
-    VariableKind, is_c_identifier,
+    VariableKind,
 };
 use roxmltree::{Document, Node};
 
-use super::Output;
+use super::{Output, names_library, without_co_simulation};
 use crate::error::FmuProblem;
 
 /// The description of a co-simulation FMU of FMI 2.0: a [`ModelDescription`], and what follows from it.
@@ -59,9 +59,10 @@ impl Fmi2Description {
         let problems = judged(document.root_element())?;
         let Located { description: mut model, structure, interfaces, starts, .. } = Located::read(document);
         if interfaces == 0 {
-            return Err(FmuProblem::NoCoSimulation);
+            let exchange = model.model_exchange.as_ref().map(|_| "ModelExchange");
+            return Err(without_co_simulation(exchange.as_slice()));
         }
-        if !is_c_identifier(&model.co_simulation.model_identifier) {
+        if !names_library(&model.co_simulation.model_identifier) {
             return Err(FmuProblem::ModelIdentifier(model.co_simulation.model_identifier));
         }
         let outputs = outputs(&model, &structure)?;
@@ -204,7 +205,7 @@ mod tests {
             Fmi2Description::read(&document).unwrap_err().to_string()
         };
         assert!(error(&xml("", "")).contains("no co-simulation interface"));
-        assert!(error(&xml(r#"<CoSimulation modelIdentifier="../m"/>"#, "")).contains("not a C identifier"));
+        assert!(error(&xml(r#"<CoSimulation modelIdentifier="../m"/>"#, "")).contains("names no file"));
         assert!(error(&xml(cs, r#"<Unknown index="5"/>"#)).contains("names variable 5 of 4"));
     }
 }

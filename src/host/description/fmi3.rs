@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use punctual_modeldescription::fmi3::{self, CoSimulation, ModelDescription, VariableKind};
-use punctual_modeldescription::{Causality, Place, is_c_identifier};
+use punctual_modeldescription::{Causality, Place};
 use roxmltree::Document;
 
-use super::{Array, Description, Output, Variable, Written};
+use super::{Array, Description, Output, Variable, Written, names_library, without_co_simulation};
 use crate::error::FmuProblem;
 
 /// The greatest number of elements of all arrays of an FMU.
@@ -47,15 +47,9 @@ impl Fmi3Description {
     fn of(model: ModelDescription) -> Result<Self, FmuProblem> {
         let Some(co_simulation) = model.co_simulation.clone() else {
             let others: Vec<_> = model.interfaces().into_iter().map(|(name, _)| name).collect();
-            return Err(match others.as_slice() {
-                [] => FmuProblem::NoCoSimulation,
-                others => FmuProblem::CannotRun(format!(
-                    "it offers {} only, and this program runs co-simulation",
-                    others.join(" and ")
-                )),
-            });
+            return Err(without_co_simulation(&others));
         };
-        if !is_c_identifier(&co_simulation.interface.model_identifier) {
+        if !names_library(&co_simulation.interface.model_identifier) {
             return Err(FmuProblem::ModelIdentifier(co_simulation.interface.model_identifier));
         }
         Ok(Self { model, co_simulation, problems: Vec::new() })

@@ -175,6 +175,33 @@ pub struct Description {
     pub problems: Vec<String>,
 }
 
+/// What there is to say of a description of FMI 1.0, or of a version that is not known here.
+pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
+    let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
+    let is_known = version.is_empty() || ["2.", "3."].iter().any(|head| version.starts_with(head));
+    (!is_known).then(|| {
+        format!(
+            "it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as one of these"
+        )
+    })
+}
+
+/// Whether a model identifier can be the name of a library. The standard asks for a C identifier; other names are in the field.
+fn names_library(identifier: &str) -> bool {
+    !identifier.trim().is_empty() && !identifier.contains(['/', '\\', ':', '\0'])
+}
+
+/// The reason why an FMU with other interfaces only is not run.
+fn without_co_simulation(interfaces: &[&str]) -> FmuProblem {
+    match interfaces {
+        [] => FmuProblem::NoCoSimulation,
+        others => FmuProblem::CannotRun(format!(
+            "it offers {} only, and this program runs co-simulation; export it for that",
+            others.join(" and ")
+        )),
+    }
+}
+
 impl Description {
     /// Reads a model description from its text.
     ///
@@ -188,9 +215,8 @@ impl Description {
         if version.starts_with("3.") {
             return Self::of_fmi3(Arc::new(Fmi3Description::read(&document)?), &BTreeMap::new());
         }
-        if !version.is_empty() && !version.starts_with("2.") {
-            let text = format!("fmiVersion is {version:?}; this program runs FMUs of 2.0 and 3.0");
-            return Err(FmuProblem::Description(text));
+        if let Some(foreign) = foreign_version(&document) {
+            return Err(FmuProblem::CannotRun(foreign));
         }
         Fmi2Description::read(&document).map(|written| Self::of_fmi2(Arc::new(written)))
     }
