@@ -249,7 +249,7 @@ fn run(
     let given = inputs.map(|table| columns(fmu, table)).transpose()?.unwrap_or_default();
     let mut slave = fmu.instantiate(fmu.description(), INSTANCE)?;
     let (Some(&start), Some(&stop)) = (wanted.times.first(), wanted.times.last()) else { return Ok(()) };
-    slave.setup_experiment(start, stop)?;
+    slave.setup_experiment(start, stop, None)?;
     slave.enter_initialization_mode()?;
     set(&mut *slave, &given, inputs, start)?;
     slave.exit_initialization_mode()?;

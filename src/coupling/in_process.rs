@@ -71,7 +71,13 @@ impl Participant for InProcess {
         Ok(())
     }
 
-    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error> {
+    /// A block has no solver that takes a tolerance.
+    fn setup_experiment(
+        &mut self,
+        start_time: f64,
+        stop_time: f64,
+        _tolerance: Option<f64>,
+    ) -> Result<(), Error> {
         let done = self.instance.setup_experiment(start_time, Some(stop_time));
         done.map_err(|reason| self.refused("fmi2SetupExperiment", &reason))
     }

@@ -4,6 +4,7 @@ use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
 use super::starts::{Start, Values};
 use super::system::System;
+use crate::error::Error;
 use crate::host::{Causality, Description, Variable};
 use crate::recording::{Column, Recording};
 
@@ -22,9 +23,9 @@ impl Layout {
         self.ports.iter().position(|other| *other == port)
     }
 
-    /// Gives slots to the outputs of a component that are connected or `read`, and to its connected inputs; of an
-    /// array to all elements as soon as one needs it. The groups are outputs without feedthrough, outputs with
-    /// feedthrough, inputs.
+    /// Gives slots to the variables of a component that are connected or `read`; of an array to all elements as soon as one
+    /// needs it. The groups are outputs without feedthrough, outputs with feedthrough, connected inputs, and others that
+    /// are read.
     pub(super) fn add(
         &mut self,
         system: &System,
@@ -32,22 +33,28 @@ impl Layout {
         component: usize,
         links: &[Link],
         read: &[Port],
-    ) -> [Group; 3] {
-        let mut wanted = vec![false; description.variables.len()];
-        let ends = links.iter().flat_map(|link| [link.from, link.to]);
-        for port in ends.chain(read.iter().copied()).filter(|port| port.component == component) {
-            let variable = &description.variables[port.variable];
-            let first = port.variable - variable.element;
-            wanted[first..first + variable.count].fill(true);
-        }
-        let mut parts: [Vec<(usize, &Variable)>; 3] = Default::default();
-        for (position, variable) in description.variables.iter().enumerate().filter(|(v, _)| wanted[*v]) {
+    ) -> [Group; 4] {
+        let of_arrays = |ports: &mut dyn Iterator<Item = Port>| {
+            let mut is_in = vec![false; description.variables.len()];
+            for port in ports.filter(|port| port.component == component) {
+                let variable = &description.variables[port.variable];
+                let first = port.variable - variable.element;
+                is_in[first..first + variable.count].fill(true);
+            }
+            is_in
+        };
+        let fed = of_arrays(&mut links.iter().map(|link| link.to));
+        let wanted = of_arrays(&mut links.iter().map(|link| link.from).chain(read.iter().copied()));
+        let mut parts: [Vec<(usize, &Variable)>; 4] = Default::default();
+        let is_needed = |(v, _): &(usize, &Variable)| fed[*v] || wanted[*v];
+        for (position, variable) in description.variables.iter().enumerate().filter(is_needed) {
             let part = match variable.causality {
                 Causality::Output => {
                     let owner = &system.components()[component];
                     usize::from(network::has_feedthrough(owner, description, position))
                 }
-                _ => 2,
+                _ if fed[position] => 2,
+                _ => 3,
             };
             parts[part].push((position, variable));
         }
@@ -62,8 +69,8 @@ impl Layout {
         })
     }
 
-    /// The slots of inputs of a component that no link feeds, each with its start value. There are such slots where
-    /// other elements of the same array are fed.
+    /// The slots of a component that no link feeds and that are not read before the run begins, each with its start value.
+    /// There are such slots of inputs where other elements of the same array are fed.
     pub(super) fn constants(
         &self,
         component: usize,
@@ -88,6 +95,25 @@ impl Layout {
             .collect()
     }
 
+    /// The enumerations of a component that are fed by something with other items.
+    pub(super) fn choices(
+        &self,
+        component: usize,
+        descriptions: &[&Description],
+        links: &[Link],
+    ) -> Vec<Choice> {
+        let variable = |port: Port| &descriptions[port.component].variables[port.variable];
+        let numbers = |port: Port| variable(port).items.iter().map(|(_, number)| *number as f64);
+        let of_link = |link: &Link| {
+            let items: Vec<f64> = numbers(link.to).collect();
+            let may_differ = numbers(link.from).next().is_none()
+                || numbers(link.from).any(|number| !items.contains(&number));
+            let start = variable(link.to).start.or(items.first().copied()).filter(|_| may_differ)?;
+            Some(Choice { slot: self.slot(link.to)?, items, start }).filter(|choice| !choice.items.is_empty())
+        };
+        links.iter().filter(|link| link.to.component == component).filter_map(of_link).collect()
+    }
+
     /// The sources of the inputs of a component.
     pub(super) fn sources(&self, component: usize, links: &[Link]) -> Vec<Source> {
         let of_link = |link: &Link| {
@@ -95,6 +121,30 @@ impl Layout {
             Some(Source::new(input, output, link.factor, link.offset))
         };
         links.iter().filter(|link| link.to.component == component).filter_map(of_link).collect()
+    }
+}
+
+/// An enumeration that is an input.
+pub(super) struct Choice {
+    pub(super) slot: usize,
+    /// The numbers of its items; at least one.
+    items: Vec<f64>,
+    pub(super) start: f64,
+}
+
+impl Choice {
+    /// Whether its value is an item.
+    pub(super) fn has(&self, values: &[f64]) -> bool {
+        self.items.contains(&values[self.slot])
+    }
+
+    /// The error of a value that is none.
+    #[cold]
+    pub(super) fn error(&self, names: &[String], values: &[f64]) -> Error {
+        let (name, value) = (&names[self.slot], values[self.slot]);
+        let items: Vec<_> = self.items.iter().map(f64::to_string).collect();
+        let how = format!("is given {value}; must be an item of its enumeration, {}", items.join(", "));
+        Error::broken(name, how)
     }
 }
 

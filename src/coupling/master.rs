@@ -23,7 +23,7 @@ use punctual_fmu::configuration::Configuration;
 use punctual_fmu::text::number;
 
 use super::grid::Grid;
-use super::layout::{Layout, Recorder};
+use super::layout::{Choice, Layout, Recorder};
 use super::model::{Model, Reader};
 use super::network::{self, Network};
 use super::ports::{Group, Source};
@@ -37,22 +37,44 @@ use crate::recording::{Column, Recording};
 /// A component while it runs.
 struct Member<P> {
     participant: P,
+    /// Relative tolerance for its own solver.
+    tolerance: Option<f64>,
     starts: Vec<Start>,
     /// Outputs without feedthrough.
     states: Group,
     /// Outputs with feedthrough.
     direct: Group,
     inputs: Group,
+    /// What is read beside outputs, such as local variables. The standard lets nobody read them during the initialisation.
+    others: Group,
     sources: Vec<Source>,
+    /// The enumerations that something with other items feeds.
+    choices: Vec<Choice>,
     /// Slots of elements of connected arrays that are not connected themselves, and their values.
     constants: Vec<(usize, f64)>,
 }
 
 impl<P: Participant> Member<P> {
     /// Takes over what feeds its inputs.
-    fn set_inputs(&mut self, values: &mut [f64]) -> Result<(), Error> {
+    fn set_inputs(&mut self, values: &mut [f64], names: &[String]) -> Result<(), Error> {
         for source in &self.sources {
             source.transfer(values);
+        }
+        if let Some(wrong) = self.choices.iter().find(|choice| !choice.has(values)) {
+            return Err(wrong.error(names, values));
+        }
+        self.inputs.write(&mut self.participant, values)
+    }
+
+    /// The same during the initialisation, where a source may have no value yet. Then an enumeration keeps its start value.
+    fn set_first_inputs(&mut self, values: &mut [f64]) -> Result<(), Error> {
+        for source in &self.sources {
+            source.transfer(values);
+        }
+        for choice in &self.choices {
+            if !choice.has(values) {
+                values[choice.slot] = choice.start;
+            }
         }
         self.inputs.write(&mut self.participant, values)
     }
@@ -221,7 +243,7 @@ impl<P: Participant> Simulation<P> {
             let message = format!("{} FMUs for {} components", descriptions.len(), system.components().len());
             return Err(Error::configuration("component", message));
         }
-        let Network { links, mut starts, recorded, direct, delayed, notes } =
+        let Network { links, mut starts, recorded, direct, delayed, notes, remarks } =
             network::resolve(system, descriptions)?;
 
         // Give slots to all signals that are recorded, watched or connected.
@@ -245,7 +267,7 @@ impl<P: Participant> Simulation<P> {
             .collect();
         // Make the participants.
         let mut members = Vec::new();
-        for (component, [mut states, mut direct, mut inputs]) in groups.into_iter().enumerate() {
+        for (component, [mut states, mut direct, mut inputs, others]) in groups.into_iter().enumerate() {
             let starts = std::mem::take(&mut starts[component]);
             let participant = participant(component)?;
             states.place(&participant, Causality::Output);
@@ -253,11 +275,14 @@ impl<P: Participant> Simulation<P> {
             inputs.place(&participant, Causality::Input);
             members.push(Member {
                 participant,
+                tolerance: system.components()[component].tolerance.or(system.experiment().tolerance),
                 constants: layout.constants(component, descriptions[component], &links, &starts),
                 starts,
                 states,
                 direct,
                 inputs,
+                others,
+                choices: layout.choices(component, descriptions, &links),
                 sources: layout.sources(component, &links),
             });
         }
@@ -291,6 +316,7 @@ impl<P: Participant> Simulation<P> {
             courses: Vec::new(),
             stop: None,
         };
+        simulation.notes.extend(remarks);
         simulation.note_shortened_step(descriptions);
         simulation.note_what_is_not_recorded(descriptions);
         simulation.notes.extend(network::unit_notes(system, descriptions, &links));
@@ -412,12 +438,12 @@ impl<P: Participant> Simulation<P> {
             for i in 0..self.direct.len() {
                 let c = self.direct[i];
                 let member = &mut self.members[c];
-                member.set_inputs(&mut self.values)?;
+                member.set_inputs(&mut self.values, &self.names)?;
                 member.participant.do_step(time, step)?;
                 self.read_direct(c, time)?;
             }
             for &c in &self.delayed {
-                self.members[c].set_inputs(&mut self.values)?;
+                self.members[c].set_inputs(&mut self.values, &self.names)?;
             }
             self.take(recorder, k, time);
             for &c in &self.delayed {
@@ -437,11 +463,11 @@ impl<P: Participant> Simulation<P> {
         recorder.end_at(end);
         for i in 0..self.direct.len() {
             let c = self.direct[i];
-            self.members[c].set_inputs(&mut self.values)?;
+            self.members[c].set_inputs(&mut self.values, &self.names)?;
             self.read_direct(c, time)?;
         }
         for &c in &self.delayed {
-            self.members[c].set_inputs(&mut self.values)?;
+            self.members[c].set_inputs(&mut self.values, &self.names)?;
         }
         self.take(recorder, end, time);
         Ok(())
@@ -456,7 +482,7 @@ impl<P: Participant> Simulation<P> {
             let (time, step) = (self.grid.time(k), self.grid.step(k));
             self.check_stop(time)?;
             for member in &mut self.members {
-                member.set_inputs(&mut self.values)?;
+                member.set_inputs(&mut self.values, &self.names)?;
             }
             self.take(recorder, k, time);
             for member in &mut self.members {
@@ -473,7 +499,7 @@ impl<P: Participant> Simulation<P> {
             }
         }
         for member in &mut self.members {
-            member.set_inputs(&mut self.values)?;
+            member.set_inputs(&mut self.values, &self.names)?;
         }
         recorder.end_at(end);
         self.take(recorder, end, self.grid.time(end));
@@ -512,7 +538,7 @@ impl<P: Participant> Simulation<P> {
                 member.participant.reset()?;
             }
             member.set_starts(true)?;
-            member.participant.setup_experiment(self.start_time, self.stop_time)?;
+            member.participant.setup_experiment(self.start_time, self.stop_time, member.tolerance)?;
             member.set_starts(false)?;
             for (slot, value) in &member.constants {
                 self.values[*slot] = *value;
@@ -527,11 +553,11 @@ impl<P: Participant> Simulation<P> {
             }
             for &c in &self.direct {
                 let member = &mut self.members[c];
-                member.set_inputs(&mut self.values)?;
+                member.set_first_inputs(&mut self.values)?;
                 member.direct.read(&mut member.participant, &mut self.values)?;
             }
             for &c in &self.delayed {
-                self.members[c].set_inputs(&mut self.values)?;
+                self.members[c].set_first_inputs(&mut self.values)?;
             }
             let unchanged = before.len() == self.values.len()
                 && before.iter().zip(&self.values).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -561,6 +587,12 @@ impl<P: Participant> Simulation<P> {
         let reals = member.states.read(&mut member.participant, &mut self.values)?;
         if !reals.iter().all(|value| value.is_finite()) {
             let slots = member.states.real_slots();
+            self.report_not_finite(slots, time);
+        }
+        let member = &mut self.members[c];
+        let reals = member.others.read(&mut member.participant, &mut self.values)?;
+        if !reals.iter().all(|value| value.is_finite()) {
+            let slots = member.others.real_slots();
             self.report_not_finite(slots, time);
         }
         Ok(())

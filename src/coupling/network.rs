@@ -10,7 +10,7 @@ use super::graph::{self, Edge};
 use super::starts::{self, Start};
 use super::system::{Component, Picture, System};
 use crate::error::Error;
-use crate::host::{Array, Causality, DataType, Description, Family, Output, Variable};
+use crate::host::{Array, Causality, DataType, Description, Family, Output, Variability, Variable};
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,9 +61,14 @@ pub(super) struct Network {
     pub(super) direct: Vec<usize>,
     /// Components without, in file order.
     pub(super) delayed: Vec<usize>,
-    /// Notes on signals that are read one step late.
+    /// Notes for the user that hold in Gauss–Seidel order, such as a signal read one step late.
     pub(super) notes: Vec<String>,
+    /// Notes for the user on what is recorded and connected beside outputs.
+    pub(super) remarks: Vec<String>,
 }
+
+/// The greatest number of local variables of a component that are recorded where nobody says which.
+const MAX_LOCALS: usize = 200;
 
 /// Resolves `system` against the descriptions of its components' FMUs, one for each, in order.
 pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<Network, Error> {
@@ -76,10 +81,11 @@ pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<
     };
     let starts = (0..descriptions.len()).map(of_component).collect::<Result<_, _>>()?;
     let links = resolver.links()?;
-    let recorded = resolver.recorded(&links)?;
+    let (recorded, mut remarks) = resolver.recorded(&links)?;
     resolver.check_pictures(&recorded)?;
+    remarks.extend(resolver.begins_with(&links));
     let (direct, delayed, notes) = resolver.order(&links);
-    Ok(Network { links, starts, recorded, direct, delayed, notes })
+    Ok(Network { links, starts, recorded, direct, delayed, notes, remarks })
 }
 
 /// Checks the connections of `system`, those by name included, against the descriptions of its components' FMUs,
@@ -279,12 +285,13 @@ impl<'a> Resolver<'a> {
         format!("; did you mean {}?", found.join(" or "))
     }
 
-    fn expect_causality(&self, field: &str, port: Port, wanted: Causality) -> Result<(), Error> {
+    fn expect_causality(&self, field: &str, port: Port, wanted: &[Causality]) -> Result<(), Error> {
         let found = self.variable(port).causality;
-        if found == wanted {
+        if wanted.contains(&found) {
             return Ok(());
         }
-        let (name, found, wanted) = (self.name(port), found.as_str(), wanted.as_str());
+        let (name, found) = (self.name(port), found.as_str());
+        let wanted = wanted.iter().map(|wanted| wanted.as_str()).collect::<Vec<_>>().join(" or ");
         Err(Error::configuration(field, format!("{name} has causality {found}; must be {wanted}")))
     }
 
@@ -315,8 +322,10 @@ impl<'a> Resolver<'a> {
                     let message = format!("input {} is already connected by connection[{by}]", self.name(to));
                     return Err(Error::configuration(format!("{field}.to"), message));
                 }
-                self.expect_causality(&format!("{field}.from"), from, Causality::Output)?;
-                self.expect_causality(&format!("{field}.to"), to, Causality::Input)?;
+                use Causality::{CalculatedParameter, Input, Local, Output};
+                let sources = [Output, Local, CalculatedParameter];
+                self.expect_causality(&format!("{field}.from"), from, &sources)?;
+                self.expect_causality(&format!("{field}.to"), to, &[Input])?;
                 links.push(self.link(&field, [from, to], connection.factor, connection.offset)?);
                 owners.push(i);
             }
@@ -436,9 +445,14 @@ impl<'a> Resolver<'a> {
     fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
         let (given, taken) = (self.variable(from), self.variable(to));
         let types = (given.type_name, taken.type_name);
-        if given.family() != taken.family() || given.is_number() != taken.is_number() {
+        // Both are whole numbers; a number that is no item of the enumeration ends the run.
+        let is_whole = |v: &Variable| matches!(v.family(), Family::Integer | Family::Enumeration);
+        if given.family() != taken.family() && !(is_whole(given) && is_whole(taken)) {
             let (from, to, (given, taken)) = (self.name(from), self.name(to), types);
-            let message = format!("{from} is {given}, but {to} is {taken}; types must be equal");
+            let message = format!(
+                "{from} is {given}, but {to} is {taken}; types must be equal, but for Integer and Enumeration, which are \
+                 whole numbers both"
+            );
             return Err(Error::configuration(field, message));
         }
         if !given.is_number() {
@@ -448,9 +462,16 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    fn recorded(&self, links: &[Link]) -> Result<Vec<Port>, Error> {
+    /// What is recorded, and notes on it.
+    fn recorded(&self, links: &[Link]) -> Result<(Vec<Port>, Vec<String>), Error> {
         let Some(signals) = &self.system.record().signals else {
-            return Ok((0..self.descriptions.len()).flat_map(|c| self.default_columns(c, links)).collect());
+            let (mut ports, mut notes) = (Vec::new(), Vec::new());
+            for component in 0..self.descriptions.len() {
+                let (columns, note) = self.default_columns(component, links);
+                ports.extend(columns);
+                notes.extend(note);
+            }
+            return Ok((ports, notes));
         };
         let mut ports = Vec::with_capacity(signals.len());
         for (i, signal) in signals.iter().enumerate() {
@@ -462,21 +483,18 @@ impl<'a> Resolver<'a> {
                         format!("{name} is {}; {} is not recorded", variable.type_name, unfit(variable));
                     return Err(Error::configuration(field, message));
                 }
-                if variable.causality != Causality::Output && !links.iter().any(|link| link.to == port) {
-                    let message = format!("{name} is neither an output nor a connected input");
-                    return Err(Error::configuration(field, message));
-                }
                 if ports.contains(&port) {
                     return Err(Error::configuration(field, format!("{name} is named twice")));
                 }
                 ports.push(port);
             }
         }
-        Ok(ports)
+        Ok((ports, Vec::new()))
     }
 
-    /// All outputs but [twins](Description::is_twin), then all connected inputs of a component.
-    fn default_columns(&self, component: usize, links: &[Link]) -> Vec<Port> {
+    /// All outputs but [twins](Description::is_twin), then all connected inputs of a component. Of one without outputs that
+    /// are numbers its local variables, with a note.
+    fn default_columns(&self, component: usize, links: &[Link]) -> (Vec<Port>, Option<String>) {
         let ports = || {
             (0..self.descriptions[component].variables.len())
                 .map(move |variable| Port { component, variable })
@@ -486,8 +504,45 @@ impl<'a> Resolver<'a> {
                 && self.variable(p).is_number()
                 && !self.descriptions[component].is_twin(p.variable)
         });
+        let outputs: Vec<_> = outputs.collect();
+        let (locals, note) = if outputs.is_empty() { self.locals(component) } else { (Vec::new(), None) };
         let inputs = ports().filter(|p| links.iter().any(|link| link.to == *p));
-        outputs.chain(inputs).collect()
+        (outputs.into_iter().chain(locals).chain(inputs).collect(), note)
+    }
+
+    /// The local variables of a component, which has no outputs, and a note on that.
+    fn locals(&self, component: usize) -> (Vec<Port>, Option<String>) {
+        let description = self.descriptions[component];
+        let is_moving = |v: &Variable| {
+            let moves = matches!(v.variability, Variability::Continuous | Variability::Discrete);
+            v.causality == Causality::Local && v.is_number() && moves
+        };
+        let all = description.variables.iter().enumerate().filter(|(_, v)| is_moving(v));
+        let all: Vec<_> = all.map(|(variable, _)| Port { component, variable }).collect();
+        let (name, count) = (self.component_name(component), all.len());
+        let note = match count {
+            0 => format!("{name} has neither outputs nor local variables that are numbers and change"),
+            1 => format!("{name} has no outputs that are numbers: its local variable is recorded"),
+            2..=MAX_LOCALS => {
+                format!("{name} has no outputs that are numbers: its {count} local variables are recorded")
+            }
+            _ => format!(
+                "{name} has no outputs that are numbers: the first {MAX_LOCALS} of its {count} local variables are \
+                 recorded; record.signals can name any"
+            ),
+        };
+        (all.into_iter().take(MAX_LOCALS).collect(), Some(note))
+    }
+
+    /// Notes on connections whose source nobody may read before the run begins, and for which there is no start value.
+    fn begins_with(&self, links: &[Link]) -> Vec<String> {
+        let is_unknown = |v: &Variable| v.causality != Causality::Output && v.start.is_none();
+        let unknown = links.iter().filter(|link| is_unknown(self.variable(link.from)));
+        let note = |link: &Link| {
+            let (from, to) = (self.name(link.from), self.name(link.to));
+            format!("{from} is no output, so it is not read during the initialisation: {to} gets 0 there")
+        };
+        unknown.map(note).collect()
     }
 
     fn check_pictures(&self, recorded: &[Port]) -> Result<(), Error> {

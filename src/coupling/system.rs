@@ -44,6 +44,8 @@ pub struct Experiment {
     /// Order of calls within a communication step; default Gauss–Seidel.
     #[serde(default)]
     pub order: Order,
+    /// Relative tolerance for the solvers inside FMUs, finite, > 0; default none, so that each takes its own.
+    pub tolerance: Option<f64>,
 }
 
 /// Order of calls within a communication step.
@@ -70,6 +72,8 @@ pub struct Component {
     /// Default true, as the standard says; false suits a plant, whose outputs change in steps only.
     #[serde(default = "yes")]
     pub feedthrough: bool,
+    /// Relative tolerance for the solver inside this FMU, finite, > 0; default that of the experiment.
+    pub tolerance: Option<f64>,
     /// Start values of parameters and inputs, in the variable's unit.
     #[serde(default)]
     pub start: BTreeMap<String, StartValue>,
@@ -489,7 +493,8 @@ impl System {
     }
 
     fn check(&self) -> Result<(), ConfigurationError> {
-        let Experiment { start_time, stop_time, step, .. } = self.experiment;
+        let Experiment { start_time, stop_time, step, tolerance, .. } = self.experiment;
+        check_tolerance("experiment.tolerance", tolerance)?;
         finite("experiment.start_time", start_time)?;
         finite("experiment.stop_time", stop_time)?;
         finite("experiment.step", step)?;
@@ -515,7 +520,8 @@ impl System {
 
     fn check_components(&self) -> Result<(), ConfigurationError> {
         ensure(!self.component.is_empty(), "component", || "at least one component is needed".to_owned())?;
-        for (i, Component { name, fmu, start, .. }) in self.component.iter().enumerate() {
+        for (i, Component { name, fmu, start, tolerance, .. }) in self.component.iter().enumerate() {
+            check_tolerance(&format!("component[{i}].tolerance"), *tolerance)?;
             let field = format!("component[{i}].name");
             ensure(!name.is_empty(), &field, || "is empty; must be a name".to_owned())?;
             ensure(!name.contains(['.', '\0']), &field, || format!("is {name:?}; must not contain a dot"))?;
@@ -571,6 +577,13 @@ fn check_picture(i: usize, picture: &Picture) -> Result<(), ConfigurationError> 
 
 fn ensure(kept: bool, field: &str, message: impl FnOnce() -> String) -> Result<(), ConfigurationError> {
     if kept { Ok(()) } else { Err(ConfigurationError::new(field, message())) }
+}
+
+fn check_tolerance(field: &str, tolerance: Option<f64>) -> Result<(), ConfigurationError> {
+    let Some(value) = tolerance else { return Ok(()) };
+    ensure(value.is_finite() && value > 0.0, field, || {
+        format!("is {value}; must be finite and > 0, such as 1e-6")
+    })
 }
 
 fn finite(field: &str, value: f64) -> Result<(), ConfigurationError> {
@@ -636,6 +649,16 @@ signals = ["a.y"]
             ("stop_time = 2.0", "stop_time = nan", "experiment.stop_time: is NaN; must be finite"),
             ("stop_time = 2.0", "", "experiment.stop_time: missing, it must be given"),
             ("step = 0.5", "step = -0.5", "experiment.step: is -0.5 s; must be > 0"),
+            (
+                "step = 0.5",
+                "step = 0.5\ntolerance = 0",
+                "experiment.tolerance: is 0; must be finite and > 0, such as 1e-6",
+            ),
+            (
+                "name = \"b\"",
+                "name = \"b\"\ntolerance = nan",
+                "component[1].tolerance: is NaN; must be finite and > 0",
+            ),
             ("step = 0.5", "step = 1e-30", "experiment.step: is 1e-30 s, which makes"),
             ("step = 0.5", "step = 0.5\nsteps = 1", "experiment.steps: is no key here (did you mean step?)"),
             (

@@ -95,13 +95,18 @@ impl Participant for Instance {
         self.handle.check("fmi2Reset", status)
     }
 
-    /// `fmi2SetupExperiment` without a tolerance.
-    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error> {
+    fn setup_experiment(
+        &mut self,
+        start_time: f64,
+        stop_time: f64,
+        tolerance: Option<f64>,
+    ) -> Result<(), Error> {
         self.handle.time = Some(start_time);
         self.handle.entering("fmi2SetupExperiment");
         let (call, component) = (self.functions.setup_experiment, self.handle.component());
+        let (defined, tolerance) = tolerance.map_or((FALSE, 0.0), |tolerance| (TRUE, tolerance));
         // SAFETY: the instance lives; the arguments are plain numbers.
-        let status = unsafe { call(component, FALSE, 0.0, start_time, TRUE, stop_time) };
+        let status = unsafe { call(component, defined, tolerance, start_time, TRUE, stop_time) };
         self.handle.check("fmi2SetupExperiment", status)
     }
 

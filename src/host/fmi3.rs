@@ -72,8 +72,8 @@ const ON_TIME: f64 = 1e-6;
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
-    /// Start and stop time, for the call that begins the initialisation.
-    experiment: (f64, f64),
+    /// Start and stop time and tolerance, for the call that begins the initialisation.
+    experiment: (f64, f64, Option<f64>),
     /// Whether the last step asked for the end of the run.
     asks_to_end: bool,
     /// Whether a step may be taken back.
@@ -129,7 +129,7 @@ impl Instance {
         Ok(Self {
             handle,
             functions,
-            experiment: (0.0, 0.0),
+            experiment: (0.0, 0.0, None),
             asks_to_end: false,
             may_go_back: false,
             off: None,
@@ -203,20 +203,25 @@ impl Participant for Instance {
         self.configure("fmi3ExitConfigurationMode", self.functions.exit_configuration_mode)
     }
 
-    /// Keeps the times for the next call.
-    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error> {
+    /// Keeps the numbers for the next call.
+    fn setup_experiment(
+        &mut self,
+        start_time: f64,
+        stop_time: f64,
+        tolerance: Option<f64>,
+    ) -> Result<(), Error> {
         self.handle.time = Some(start_time);
-        self.experiment = (start_time, stop_time);
+        self.experiment = (start_time, stop_time, tolerance);
         Ok(())
     }
 
-    /// `fmi3EnterInitializationMode` without a tolerance.
     fn enter_initialization_mode(&mut self) -> Result<(), Error> {
         self.handle.entering("fmi3EnterInitializationMode");
         let (call, component) = (self.functions.enter_initialization_mode, self.handle.component());
-        let (start, stop) = self.experiment;
+        let (start, stop, tolerance) = self.experiment;
+        let (defined, tolerance) = tolerance.map_or((FALSE, 0.0), |tolerance| (TRUE, tolerance));
         // SAFETY: the instance lives; the arguments are plain numbers.
-        let status = unsafe { call(component, FALSE, 0.0, start, TRUE, stop) };
+        let status = unsafe { call(component, defined, tolerance, start, TRUE, stop) };
         self.handle.check("fmi3EnterInitializationMode", status)
     }
 

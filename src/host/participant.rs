@@ -45,12 +45,17 @@ pub trait Participant {
         Ok(())
     }
 
-    /// Sets start and stop time of the run, in s.
+    /// Sets start and stop time of the run, in s, and the relative tolerance of the FMU's own solver, if it is to get one.
     ///
     /// # Errors
     ///
     /// As above.
-    fn setup_experiment(&mut self, start_time: f64, stop_time: f64) -> Result<(), Error>;
+    fn setup_experiment(
+        &mut self,
+        start_time: f64,
+        stop_time: f64,
+        tolerance: Option<f64>,
+    ) -> Result<(), Error>;
 
     /// Begins the initialisation.
     ///
@@ -250,7 +255,7 @@ macro_rules! calls_of_a_run {
         calls! {
             enter_configuration_mode();
             exit_configuration_mode();
-            setup_experiment(start_time: f64, stop_time: f64);
+            setup_experiment(start_time: f64, stop_time: f64, tolerance: Option<f64>);
             enter_initialization_mode();
             exit_initialization_mode();
             do_step(time: f64, step: f64);

@@ -185,7 +185,7 @@ fn tried(product: &Product, file: &Path) -> Result<Rc<Fmu>, Error> {
     let fmu = Rc::new(Fmu::open(file)?);
     let mut slave = fmu.instantiate(fmu.description(), product.configuration.name())?;
     let experiment = product.configuration.experiment();
-    slave.setup_experiment(experiment.start_time, experiment.stop_time)?;
+    slave.setup_experiment(experiment.start_time, experiment.stop_time, None)?;
     slave.enter_initialization_mode()?;
     slave.exit_initialization_mode()?;
     Ok(fmu)

@@ -142,6 +142,7 @@ fn archive(
     let models = system.components().iter().enumerate().map(sized).collect::<Result<Vec<_>, _>>()?;
     let descriptions: Vec<&Description> = models.iter().map(coupling::Model::description).collect();
     let links = coupling::links(system, &descriptions)?;
+    refuse_others(system, &descriptions, &links)?;
     if version == SspVersion::One {
         refuse_arrays(system, &descriptions, &links)?;
     }
@@ -183,7 +184,12 @@ fn archive(
     let structure = SystemStructure {
         version,
         name: name.to_owned(),
-        description: format!("coupled with a communication step of {} s", experiment.step),
+        description: match experiment.tolerance {
+            None => format!("coupled with a communication step of {} s", experiment.step),
+            Some(tolerance) => {
+                format!("coupled with a communication step of {} s, tolerance {tolerance:e}", experiment.step)
+            }
+        },
         generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
         start_values: (!parameters.is_empty()).then(|| START_VALUES.to_owned()),
         components,
@@ -220,6 +226,28 @@ fn archive(
 /// The array that a scalar is an element of.
 fn array_of(description: &Description, variable: usize) -> Option<&Array> {
     description.arrays.iter().find(|array| (array.first..array.first + array.count).contains(&variable))
+}
+
+/// SSP connects outputs to inputs of the same type only.
+fn refuse_others(system: &System, descriptions: &[&Description], links: &[Link]) -> Result<(), Error> {
+    for link in links {
+        let variable = |port: Port| &descriptions[port.component].variables[port.variable];
+        let (from, to) = (variable(link.from), variable(link.to));
+        let name =
+            |port: Port| format!("{}.{}", system.components()[port.component].name, variable(port).name);
+        let what = if from.causality != Causality::Output {
+            format!("{} has causality {}", name(link.from), from.causality.as_str())
+        } else if from.family() != to.family() {
+            format!("{} is {}, but {} is {}", name(link.from), from.type_name, name(link.to), to.type_name)
+        } else {
+            continue;
+        };
+        let message = format!(
+            "{what}; an .ssp file connects outputs to inputs of the same type only, though `punctual run` couples them"
+        );
+        return Err(Error::configuration("connection", message));
+    }
+    Ok(())
 }
 
 /// SSP 1.0 knows no arrays, so none can be connected or given a value.

@@ -279,7 +279,7 @@ impl Trial {
         if set {
             variables.chunk_by(same).try_for_each(|array| set_start(slave, array))?;
         }
-        slave.setup_experiment(plan.start, plan.stop)?;
+        slave.setup_experiment(plan.start, plan.stop, None)?;
         slave.enter_initialization_mode()?;
         slave.exit_initialization_mode()?;
         if !set {
@@ -515,7 +515,7 @@ impl Trial {
 
     fn two_instances(&mut self, fmu: &Rc<Fmu>, other: &dyn Slave, plan: Plan) {
         let made = fmu.instantiate(fmu.description(), "trial2").and_then(|mut slave| {
-            slave.setup_experiment(plan.start, plan.stop)?;
+            slave.setup_experiment(plan.start, plan.stop, None)?;
             slave.enter_initialization_mode()?;
             slave.exit_initialization_mode()?;
             slave.do_step(plan.start, plan.step)

@@ -77,7 +77,7 @@ fn a_connection_to_an_unknown_component() {
 #[test]
 fn a_connection_in_the_wrong_direction() {
     run("plant.x.v", "plant.u.a")
-        .fails(2, "system.toml: connection[0].from: plant.u.a has causality input; must be output");
+        .fails(2, "system.toml: connection[0].from: plant.u.a has causality input; must be output or local or calculatedParameter");
 }
 
 #[test]

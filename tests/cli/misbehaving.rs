@@ -57,6 +57,9 @@ fn compile(source: &str, macros: &[String]) -> Vec<u8> {
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let mut command = Command::new(&compiler);
     command.args(["-shared", "-fPIC", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]).args(macros);
+    if cfg!(unix) {
+        command.arg("-pthread");
+    }
     command.arg(fixture(source)).arg("-o").arg(&product).arg("-lm");
     let done = command.output().unwrap_or_else(|e| {
         panic!("these tests need a C compiler, and {compiler} (or what CC names) cannot be started: {e}")
@@ -68,6 +71,11 @@ fn compile(source: &str, macros: &[String]) -> Vec<u8> {
 /// Writes the FMU with this description and library.
 pub(crate) fn write(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, library: &[u8]) {
     put(workshop, name, xml, (&format!("{PLATFORM}/misbehaving"), library), &[]);
+}
+
+/// Writes the FMU with this description and its library at this place, without its ending, below `binaries/`.
+pub(crate) fn write_at(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, place: &str) {
+    put(workshop, name, xml, (place, &library(&[])), &[]);
 }
 
 /// Writes the FMU of FMI 3.0 with this description, its library compiled with these macros.

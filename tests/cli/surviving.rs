@@ -1,6 +1,8 @@
 //! `punctual run` with FMUs that misbehave. The message names the component and its deed. The recorded rows are
 //! kept, with `--isolate` even when an FMU ends its process.
 
+use punctual::host::PLATFORM;
+
 use crate::misbehaving::{self, description};
 use crate::table::Table;
 use crate::workshop::{Done, Workshop};
@@ -57,6 +59,8 @@ fn a_missing_function_and_a_wrong_version_name_the_component() {
     run(&["WITHOUT_RESET"]).fails(1, "bad (bad.fmu): its library does not export fmi2Reset");
     run(&["VERSION=\"1.0\""]).fails(1, "bad (bad.fmu): fmi2GetVersion answered \"1.0\", not FMI 2.0");
     run(&["PLATFORM=NULL"]).fails(1, "bad (bad.fmu): fmi2GetTypesPlatform answered \"\", not FMI 2.0");
+    run(&["VERSION=((char *)1)"])
+        .fails(1, "bad (bad.fmu): fmi2GetVersion answered \"an address that cannot be read\", not FMI 2.0");
     // A run does not use these functions.
     run(&["WITHOUT_STATE"]).success();
 }
@@ -85,6 +89,36 @@ fn odd_logs_are_shown_harmlessly() {
         "{done:#?}"
     );
     assert!(!done.stderr.contains('\u{1b}') && done.stderr.contains("not UTF-8: \u{fffd}"), "{done:#?}");
+}
+
+/// The component environment is looked up, never followed, and no text is read where there is none.
+#[test]
+fn what_a_logger_call_carries_is_not_trusted() {
+    let fails = |defect: &str, log: &str| {
+        run(defect).fails(1, &format!("fmi2DoStep of bad (bad.fmu) at t = 0.2 s returned fmi2Error{log}"));
+    };
+    let said = |texts: &[&str]| {
+        texts.iter().map(|text| format!("\n  [fmi2OK, logAll] {text}")).collect::<Vec<_>>().concat()
+    };
+    fails(
+        "logs-to-others",
+        &said(&["to 1", "to the instance", "beside it", "to the end", "to NULL", "to what was released"]),
+    );
+    let texts = said(&["file:///a%20small%20shop is 100% sure", "%s, %5.1s, %-40s, 7"]);
+    let formatted = "abc|  2.50|7   |00ff|z|3|-4|   é|%|1|0.2|(null)";
+    let done = run("logs-nonsense");
+    assert!(
+        done.code == 1 && done.stderr.contains("\n  [fmi2OK] (a message at an address that cannot be read)"),
+        "{done:#?}"
+    );
+    assert!(done.stderr.contains(&texts) && done.stderr.ends_with(&format!("{formatted}\n")), "{done:#?}");
+    let threads: Vec<_> = (92..100).map(|k| format!("from a thread, {k}")).collect();
+    if cfg!(unix) {
+        fails("logs-from-a-thread", &said(&threads.iter().map(String::as_str).collect::<Vec<_>>()));
+    }
+    let both = workshop("logs-after-its-end", &[]);
+    both.write("system.toml", SYSTEM.replace("good.fmu", "bad.fmu"));
+    both.punctual(["run", "system.toml"]).success();
 }
 
 /// The isolated run keeps the row of each communication point before the crash.
@@ -157,4 +191,152 @@ fn nothing_is_left_behind() {
     assert_eq!(workshop.punctual(["run", "system.toml", "--isolate"]).code, 1);
     assert_eq!(workshop.punctual(["validate", "bad.fmu"]).code, 1);
     assert_eq!(std::fs::read_dir(workshop.path("tmp")).expect("a folder").count(), 0);
+}
+
+/// The description of an FMU without outputs that are numbers: y is a local variable.
+fn without_outputs(defect: &str) -> String {
+    let unknown = "<Unknown index=\"1\" dependencies=\"2\" dependenciesKind=\"dependent\"/>";
+    description(
+        defect,
+        &[
+            ("valueReference=\"0\" causality=\"output\">", "valueReference=\"0\">"),
+            (unknown, ""),
+            (unknown, ""),
+        ],
+    )
+}
+
+const ALONE: &str = "[experiment]\nstop_time = 1.0\nstep = 0.1\n[[component]]\nname = \"one\"\nfmu = \"one.fmu\"\nstart = { u = 0.0 }\n";
+
+/// Of an FMU that refuses this before the run begins too, as the standard lets it.
+#[test]
+fn local_variables_are_recorded_and_connected() {
+    let workshop = Workshop::new();
+    let library = misbehaving::library(&[]);
+    misbehaving::write(&workshop, "one.fmu", without_outputs("not-in-initialisation"), &library);
+    misbehaving::write(&workshop, "two.fmu", description("none", &[]), &library);
+    workshop.write("system.toml", ALONE);
+    let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
+    let notes = "note: one has no outputs that are numbers: its local variable is recorded\n\
+                 note: not recorded, since a row holds numbers: one.s (String)\n";
+    assert_eq!((done.code, done.stderr.as_str()), (0, notes));
+    let steps: Vec<f64> = (0..=10).map(f64::from).collect();
+    assert_eq!(Table::parse(&workshop.text("out/system.csv")).column("one.y"), steps);
+
+    let both = format!(
+        "{ALONE}[[component]]\nname = \"two\"\nfmu = \"two.fmu\"\n[[connection]]\nfrom = \"one.y\"\nto = \"two.u\"\n\
+         [record]\nsignals = [\"one.y\", \"two.u\", \"two.p\", \"one.u\"]\n"
+    );
+    for order in ["gauss-seidel", "jacobi"] {
+        workshop.write(
+            "system.toml",
+            both.replacen("step = 0.1\n", &format!("step = 0.1\norder = \"{order}\"\n"), 1),
+        );
+        let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
+        let note =
+            "note: one.y is no output, so it is not read during the initialisation: two.u gets 0 there\n";
+        assert!(done.code == 0 && done.stderr.contains(note), "{done:#?}");
+        let table = Table::parse(&workshop.text("out/system.csv"));
+        assert_eq!((table.column("one.y"), table.column("two.u")), (steps.clone(), steps.clone()), "{order}");
+        assert_eq!((table.column("two.p"), table.column("one.u")), (vec![1.0; 11], vec![0.0; 11]));
+    }
+    workshop.punctual(["build", "system.toml", "-o", "x.ssp"]).fails(
+        2,
+        "system.toml: connection: one.y has causality local; an .ssp file connects outputs to inputs of the same type only, \
+         though `punctual run` couples them",
+    );
+}
+
+#[test]
+fn a_tolerance_reaches_the_fmu() {
+    let workshop = workshop("shows-tolerance", &[]);
+    for (experiment, component, expected) in
+        [("", "", 0.0), ("tolerance = 1e-5\n", "", 1e-5), ("tolerance = 1e-5\n", "tolerance = 1e-7\n", 1e-7)]
+    {
+        let text = SYSTEM.replacen("step = 0.1\n", &format!("step = 0.1\n{experiment}"), 1);
+        workshop
+            .write("system.toml", text.replacen("\"bad.fmu\"\n", &format!("\"bad.fmu\"\n{component}"), 1));
+        workshop.punctual(["run", "system.toml", "--out", "out"]).success();
+        assert_eq!(Table::parse(&workshop.text("out/system.csv")).column("bad.y")[10], expected);
+    }
+    workshop.write("system.toml", SYSTEM.replacen("step = 0.1\n", "step = 0.1\ntolerance = -1\n", 1));
+    workshop
+        .punctual(["run", "system.toml"])
+        .fails(2, "system.toml: experiment.tolerance: is -1; must be finite and > 0, such as 1e-6");
+}
+
+/// No C identifier: a finding of `validate`, and the FMU runs.
+#[test]
+fn a_library_may_have_any_file_name() {
+    let workshop = Workshop::new();
+    workshop.write("system.toml", ALONE);
+    let name = |name: &str| {
+        description("none", &[("modelIdentifier=\"misbehaving\"", &format!("modelIdentifier=\"{name}\""))])
+    };
+    for odd in ["mis-behaving", "2 behaviours", "Ähnlich.1"] {
+        misbehaving::write_at(&workshop, "one.fmu", name(odd), &format!("{PLATFORM}/{odd}"));
+        workshop.punctual(["run", "system.toml"]).success();
+        let done = workshop.punctual(["validate", "one.fmu"]);
+        let is_told =
+            done.stdout.contains("[interface.identifier]") && done.stdout.contains("1 error, no warnings");
+        assert!(done.code == 1 && is_told && done.stderr.is_empty(), "{done:#?}");
+    }
+    for none in ["", " ", "../misbehaving", "a/b", "C:x"] {
+        misbehaving::write(&workshop, "one.fmu", name(none), &misbehaving::library(&[]));
+        let message = format!(
+            "one (one.fmu): modelIdentifier is {none:?}, which names no file, so there is no library"
+        );
+        workshop.punctual(["run", "system.toml"]).fails(1, &message);
+    }
+    misbehaving::write_at(&workshop, "one.fmu", description("none", &[]), &format!("{PLATFORM}/other"));
+    let suffix = std::env::consts::DLL_SUFFIX;
+    let message = format!(
+        "one (one.fmu): holds no binaries/{PLATFORM}/misbehaving{suffix}, the library that its modelIdentifier names; in that \
+         folder is other{suffix}"
+    );
+    workshop.punctual(["run", "system.toml"]).fails(1, &message);
+}
+
+/// What is out of scope is said so; nothing is wrong with the file.
+#[test]
+fn other_interfaces_and_versions_are_out_of_scope() {
+    let workshop = Workshop::new();
+    workshop.write("system.toml", ALONE);
+    let only = "it offers ModelExchange only, and this program runs co-simulation; export it for that";
+    let interface =
+        "<CoSimulation modelIdentifier=\"misbehaving\" canHandleVariableCommunicationStepSize=\"true\"/>";
+    let exchange = description("none", &[(interface, "<ModelExchange modelIdentifier=\"misbehaving\"/>")]);
+    misbehaving::write(&workshop, "one.fmu", exchange, &misbehaving::library(&[]));
+    workshop.punctual(["run", "system.toml"]).fails(1, &format!("one (one.fmu): cannot be run here: {only}"));
+    let done = workshop.punctual(["validate", "one.fmu"]);
+    let expected =
+        (0, "one.fmu: no errors, no warnings\n", format!("note: not examined: the trial: {only}\n"));
+    assert_eq!((done.code, done.stdout.as_str(), done.stderr), expected);
+
+    for version in ["1.0", "4.0", "one"] {
+        let other = description("none", &[("fmiVersion=\"2.0\"", &format!("fmiVersion=\"{version}\""))]);
+        misbehaving::write(&workshop, "one.fmu", other, &misbehaving::library(&[]));
+        let message = format!(
+            "one.fmu: cannot be run here: it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as \
+             one of these"
+        );
+        for command in ["validate", "inspect"] {
+            workshop.punctual([command, "one.fmu"]).fails(1, &message);
+        }
+    }
+}
+
+/// Tools and people archive the folder where its content is meant.
+#[test]
+fn a_folder_around_everything_is_told() {
+    let workshop = Workshop::new();
+    let mut archive = punctual_modeldescription::Archive::new();
+    archive.add("my model/modelDescription.xml", description("none", &[])).expect("an entry");
+    archive.add("my model/resources/x.txt", "x").expect("an entry");
+    workshop.write("one.fmu", archive.to_bytes().expect("an archive"));
+    let message = "modelDescription.xml: is not at the top of the archive, but in my model/: an FMU holds what is in that \
+                   folder, without the folder; archive it anew from inside";
+    workshop.punctual(["inspect", "one.fmu"]).fails(1, &format!("one.fmu: {message}"));
+    let done = workshop.punctual(["validate", "one.fmu"]);
+    assert!(done.code == 1 && done.stdout.contains(message), "{done:#?}");
 }

@@ -123,7 +123,7 @@ fn each_wiring_defect_is_told_with_its_field() {
         (connection("plant", "filter.x"), "connection[0].from: \"plant\" is not of the form component.variable"),
         (connection("plant.z", "filter.x"), "connection[0].from: plant (p) has no variable \"z\""),
         (connection("plant.y.x", "filter.x"), "has no variable \"y.x\"; did you mean x?"),
-        (connection("plant.u", "filter.x"), "connection[0].from: plant.u has causality input; must be output"),
+        (connection("plant.u", "filter.x"), "connection[0].from: plant.u has causality input; must be output or local or calculatedParameter"),
         (connection("plant.x", "filter.u"), "connection[0].to: filter.u has causality output; must be input"),
         (connection("plant.x", "filter.rearm"), "plant.x is Real, but filter.rearm is Boolean; types must be equal"),
         (
@@ -146,7 +146,10 @@ fn each_wiring_defect_is_told_with_its_field() {
             "connect_by_name = [{ components = [\"filter\", \"plant\"] }, { components = [\"plant\", \"filter\"] }]".into(),
             "connect_by_name[1]: input filter.x is already connected by name to plant.x",
         ),
-        ("record = { signals = [\"gain.i\"] }".into(), "record.signals[0]: gain.i is neither an output nor"),
+        (
+            "record = { signals = [\"gain.i\", \"gain.i\"] }".into(),
+            "record.signals[1]: gain.i is named twice",
+        ),
         ("record = { signals = [\"plant.text\"] }".into(), "record.signals[0]: plant.text is String"),
         ("plot = [{ kind = \"time\", signals = [\"filter.x\"] }]".into(), "plot[0].signals[0]: filter.x is not recorded"),
     ];
