@@ -287,8 +287,8 @@ impl<P: Participant> Simulation<P> {
             });
         }
         // The simulation at its start, with notes that hold for every run: first those of the components.
-        let remarks = members.iter().filter_map(|member| remark(&member.participant));
-        let mut standing: Vec<String> = remarks.collect();
+        let mut standing: Vec<String> =
+            members.iter().filter_map(|member| remark(&member.participant)).collect();
         let warnings = standing.len();
         if system.experiment().order == Order::GaussSeidel {
             standing.extend(notes);

@@ -54,7 +54,7 @@ const ROUND_OFF: f64 = 1e-2;
 /// exact; and how many intervals in a row that are so much shorter, alike to that part, are the new usual ones.
 const JITTER: f64 = 0.05;
 const HEADROOM: f64 = 0.02;
-const SHORTER: f64 = 0.9;
+const QUICKER: f64 = 0.9;
 const ALIKE: u32 = 8;
 /// What a plant may do beside the model in the next hold, in units of what it was seen to do in those before.
 const GUSTS: f64 = 1.5;
@@ -652,7 +652,7 @@ impl AssuredFilter {
         let Some([last, held]) = sample else { return self.period };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-        let is_usual = passed < SHORTER * held && alike + 1 >= ALIKE && is_like(passed, interval);
+        let is_usual = passed < QUICKER * held && alike + 1 >= ALIKE && is_like(passed, interval);
         match standing {
             _ if is_same => held,
             Standing::Undecided => self.period,
