@@ -107,7 +107,11 @@ pub(super) fn find(
     let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let soonest = if has_deadline { filter.soonest(t, x0, AssuredFilter::LONGEST) } else { None };
+    let soonest = match configured {
+        _ if !has_deadline => None,
+        Ok(_) => filter.soonest(t, x0, AssuredFilter::LONGEST),
+        Err(_) => filter.soonest_later(t, x0, AssuredFilter::LONGEST),
+    };
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
     // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
     let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());
@@ -143,7 +147,7 @@ pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Stri
     let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
     let Some(filter) = filter else { return Ok(None) };
     let (t, x0) = (c.experiment.start_time, &c.measured(x0)[..]);
-    let line = match filter.soonest(t, x0, AssuredFilter::LONGEST) {
+    let line = match filter.soonest_later(t, x0, AssuredFilter::LONGEST) {
         Some((factor, _)) => {
             let soonest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
             let named: Vec<_> = soonest.map(|(name, at)| format!("{name} {} s", number(at))).collect();

@@ -530,3 +530,51 @@ expression = "(x - 10)^2 + (y - 0.1)^2 - 1"
     let planned = checked("bounds = { v = [-3.0, 3.0], omega = [-2.0, 2.0] }");
     assert!(planned.code == 0 && planned.stdout.contains("guaranteed"), "{planned:#?}");
 }
+
+/// Rocks: the place of each, and its radius.
+const FOREST: [(f64, f64, f64); 25] = [
+    (16.275, -9.524, 0.838),
+    (12.059, -10.404, 0.841),
+    (51.734, 7.211, 1.059),
+    (15.54, 0.88, 0.766),
+    (45.623, -7.358, 0.786),
+    (36.603, 5.565, 1.113),
+    (49.763, -9.919, 0.964),
+    (38.928, 0.143, 0.707),
+    (28.627, -9.856, 1.161),
+    (49.005, 1.143, 0.78),
+    (35.143, -1.655, 0.697),
+    (19.866, 7.502, 0.626),
+    (6.409, 3.032, 0.768),
+    (55.859, -7.306, 0.848),
+    (33.044, 9.704, 0.661),
+    (7.204, -6.507, 1.059),
+    (36.002, -6.302, 0.799),
+    (40.259, 9.502, 1.173),
+    (25.342, 10.639, 0.972),
+    (22.862, -5.032, 0.658),
+    (55.051, -1.825, 0.725),
+    (10.358, 0.702, 1.064),
+    (16.036, 8.873, 0.685),
+    (6.666, 10.273, 0.939),
+    (54.497, 11.083, 1.001),
+];
+
+/// A way through is found for each of the deadlines: what is missing is told to the search by its size, and not by what a long
+/// piece of the way leaves open.
+#[test]
+fn a_forest_is_promised_at_later_deadlines_too() {
+    let workshop = Workshop::new();
+    let rocks: String =
+        (0..).zip(FOREST).map(|(i, (x, y, r))| disc(&format!("o{i}"), "obstacle", [x, y], r, "")).collect();
+    for deadline in [24.0, 25.0, 26.2] {
+        let goal = disc("goal", "disc", [60.0, 0.0], 2.0, &format!("deadline = {deadline:?}"));
+        let text = format!(
+            "kind = \"filter\"\nplant.model = \"unicycle\"\nbounds = {{ a = [-3.0, 3.0], omega = [-1.5, 1.5] }}\nx0 = {{ v = 2.0 }}\n\
+             experiment = {{ stop_time = 0.1, step_size = 0.02 }}\n{goal}{rocks}"
+        );
+        workshop.write("forest.toml", text);
+        let run = workshop.punctual(["run", "forest.toml"]);
+        assert!(!format!("{}{}", run.stdout, run.stderr).contains("refused"), "{deadline} s: {run:#?}");
+    }
+}

@@ -40,8 +40,9 @@ const BISECTIONS: u32 = 3;
 /// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
 /// it again at the next, and the input jump between the two.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
-/// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too.
-const SHORTER: [f64; 3] = [0.9, 0.8, 0.6];
+/// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
+/// makes a refusal longer by as much as the first search.
+const SHORTER: [f64; 1] = [0.8];
 /// The most points of a plan's way at which it is looked for its arrival, about.
 const MOST_POINTS: f64 = 4000.0;
 /// How much later than a plan arrives the deadline is that it keeps.
@@ -1123,6 +1124,16 @@ impl AssuredFilter {
     /// twentieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
     /// deadlines, nor where one would come after the end of its barrier.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+        self.least(t, x, longest, true)
+    }
+
+    /// The same where [none is found](Self::foresee) for the deadlines themselves, which is not tried again.
+    pub fn soonest_later(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+        self.least(t, x, longest, false)
+    }
+
+    /// [`Self::soonest`]; whether there may be a plan for the deadlines themselves.
+    fn least(&self, t: f64, x: &[f64], longest: f64, may_be: bool) -> Option<(f64, Witness)> {
         let x = &self.rows.state(x)[..];
         let find = |factor: f64, shorter: &[f64]| {
             let promises = self.promises(t, x, |_| factor);
@@ -1130,7 +1141,8 @@ impl AssuredFilter {
                 self.first(promises, (t, self.period), x, &[], shorter).ok()?;
             Some((factor * self.arrival(&promises, &plan, t, x), plan.witness))
         };
-        least_factor(self.longest(longest, |_| true), find(1.0, &SHORTER), |factor| find(factor, &[]))
+        let found = if may_be { find(1.0, &SHORTER) } else { None };
+        least_factor(self.longest(longest, |_| true), found, |factor| find(factor, &[]))
     }
 
     /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
@@ -1244,12 +1256,13 @@ impl AssuredFilter {
             found = search(&promises);
         }
         if let Err(Failure::Broken { .. } | Failure::Unsteady) = found
+            && self.horizon.is_none()
             && !self.is_ruled_out(&promises, at.0, x)
         {
             // What keeps an earlier deadline keeps a later one, though another search may find it.
             let mut earlier =
                 shorter.iter().filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok());
-            found = earlier.find(|plan| !plan.is_finite()).map_or(found, Ok);
+            found = earlier.next().map_or(found, Ok);
         }
         let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
         let old = &self.commitment.plan;
