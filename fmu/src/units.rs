@@ -100,8 +100,9 @@ fn dimension(base: &BaseUnit) -> [i32; 7] {
 const TEMPERATURES: [(&str, f64, f64); 2] = [("degC", 1.0, 273.15), ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0)];
 
 /// What tools write for a sign, in the order in which it is replaced.
-const SIGNS: [(&str, &str); 22] = [
+const SIGNS: [(&str, &str); 23] = [
     ("**", "^"),
+    ("\u{25}", "percent"),
     ("\u{b2}", "2"),
     ("\u{b3}", "3"),
     ("\u{b9}", "1"),
@@ -126,7 +127,7 @@ const SIGNS: [(&str, &str); 22] = [
 ];
 
 /// What tools write for a unit.
-const WORDS: [(&str, &str); 40] = [
+const WORDS: [(&str, &str); 39] = [
     ("sec", "s"),
     ("second", "s"),
     ("seconds", "s"),
@@ -150,8 +151,7 @@ const WORDS: [(&str, &str); 40] = [
     ("r", "rev"),
     ("turn", "rev"),
     ("RPM", "rpm"),
-    ("percent", "%"),
-    ("pct", "%"),
+    ("pct", "percent"),
     ("kelvin", "K"),
     ("Kelvin", "K"),
     ("celsius", "degC"),
@@ -228,7 +228,7 @@ impl Reader<'_> {
     }
 
     fn symbol(&mut self) -> Option<BaseUnit> {
-        let end = self.rest.find(|c: char| !c.is_ascii_alphabetic() && c != '%').unwrap_or(self.rest.len());
+        let end = self.rest.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(self.rest.len());
         let (symbol, rest) = self.rest.split_at(end);
         self.rest = rest;
         if symbol.is_empty() {

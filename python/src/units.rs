@@ -19,6 +19,7 @@ fn said(unit: &Unit) -> Said<'_> {
 /// The factor and offset that make a value in the unit `given` one in `taken`, or `None` where they cannot be compared. Raises
 /// `ValueError` with the reason where they do not fit.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "what comes from Python is owned")]
 pub(crate) fn fit_units(given: Unit, taken: Unit) -> PyResult<Option<(f64, f64)>> {
     match fit(&said(&given), &said(&taken)).map_err(PyValueError::new_err)? {
         Fit::Same => Ok(Some((1.0, 0.0))),

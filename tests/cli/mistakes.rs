@@ -172,7 +172,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "unit = \"m/s2\"",
         "unit = \"m/s^2\"",
-        "plant.states[2].unit: is \"m/s^2\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, %, ppm, t, \
+        "plant.states[2].unit: is \"m/s^2\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, percent, ppm, t, \
          atm, mmHg, psi, hp, kn, mph, nmi, mi, yd, ft, in, lb, lbf and, also with a prefix as in km, of m, s, A, K, mol, \
          rad, Hz, N, Pa, J, W, C, V, Ohm, S, F, H, T, Wb, lm, lx, g, l, L, bar, Wh, Ah, cal, or \"1\"",
     ),

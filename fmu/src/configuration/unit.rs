@@ -157,7 +157,7 @@ const SYMBOLS: [(&str, f64, bool, [i32; 8]); 52] = [
     ("deg", PI / 180.0, false, [0, 0, 0, 0, 0, 0, 0, 1]),
     ("rev", TAU, false, [0, 0, 0, 0, 0, 0, 0, 1]),
     ("rpm", TAU / 60.0, false, [0, 0, -1, 0, 0, 0, 0, 1]),
-    ("%", 1e-2, false, [0; 8]),
+    ("percent", 1e-2, false, [0; 8]),
     ("ppm", 1e-6, false, [0; 8]),
     ("g", 1e-3, true, [1, 0, 0, 0, 0, 0, 0, 0]),
     ("t", 1e3, false, [1, 0, 0, 0, 0, 0, 0, 0]),
@@ -260,7 +260,7 @@ mod tests {
             ("cm2", 1e-4),
             ("m/ms2", 1e6),
             ("N", 1.0),
-            ("%", 1e-2),
+            ("percent", 1e-2),
         ] {
             let base = base_unit(name).expect(name);
             assert!((base.factor / wanted - 1.0).abs() < 1e-9, "{name}: {}", base.factor);

@@ -54,12 +54,12 @@ fn defects() {
         (
             "unit = \"m\"\ndeadline",
             "unit = \"mile\"\ndeadline",
-            "barrier[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, %, ppm, t, atm, mmHg, psi, hp, kn, mph, nmi, mi, yd, ft, in, lb, lbf and, also with a prefix as in km, of m, s, A, K, mol, rad, Hz, N, Pa, J, W, C, V, Ohm, S, F, H, T, Wb, lm, lx, g, l, L, bar, Wh, Ah, cal, or \"1\"",
+            "barrier[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, percent, ppm, t, atm, mmHg, psi, hp, kn, mph, nmi, mi, yd, ft, in, lb, lbf and, also with a prefix as in km, of m, s, A, K, mol, rad, Hz, N, Pa, J, W, C, V, Ohm, S, F, H, T, Wb, lm, lx, g, l, L, bar, Wh, Ah, cal, or \"1\"",
         ),
         (
             "unit = \"m/s3\"",
             "unit = \"mile\"",
-            "plant.inputs[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, %, ppm, t, atm, mmHg, psi, hp, kn, mph, nmi, mi, yd, ft, in, lb, lbf and, also with a prefix as in km, of m, s, A, K, mol, rad, Hz, N, Pa, J, W, C, V, Ohm, S, F, H, T, Wb, lm, lx, g, l, L, bar, Wh, Ah, cal, or \"1\"",
+            "plant.inputs[0].unit: is \"mile\", must be like \"kg.m2/s\", made of kg, cd, min, h, d, deg, rev, rpm, percent, ppm, t, atm, mmHg, psi, hp, kn, mph, nmi, mi, yd, ft, in, lb, lbf and, also with a prefix as in km, of m, s, A, K, mol, rad, Hz, N, Pa, J, W, C, V, Ohm, S, F, H, T, Wb, lm, lx, g, l, L, bar, Wh, Ah, cal, or \"1\"",
         ),
         (
             "start = 60.0, min",
