@@ -265,7 +265,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         let is_refused = is_refused(&outcome.recording);
         notes.extend(check::known(&filter, is_refused).map_err(|e| e.in_file(path))?);
     }
-    let notes = output::grouped(notes.into_iter());
+    let notes = output::grouped(notes);
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {

@@ -254,7 +254,7 @@ fn packages_and_campaigns_convert_too() {
         fmi_rs::zip::get_zip_contents(workshop.path("s.ssp").to_str().expect("UTF-8")).expect("an archive");
     assert!(entries.iter().any(|entry| entry == "SystemStructure.ssd"));
     let folder = workshop.path("ssp");
-    fmi_rs::zip::extract_zip_archive(&workshop.path("s.ssp"), &folder).expect("an archive");
+    fmi_rs::zip::extract_zip_archive(workshop.path("s.ssp"), &folder).expect("an archive");
     let ssd = workshop.text("ssp/SystemStructure.ssd");
     // SSP converts units unless it is told not to; the transformation is the whole conversion.
     assert_eq!(
