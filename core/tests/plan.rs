@@ -526,7 +526,7 @@ fn the_flag_falls_before_a_drift_leaves_a_set() {
     let mut fallen = 0;
     for seed in 1..=24_u64 {
         let random = &mut seeded(seed);
-        let (speed, angle) = (random.between(0.2, 0.6), random.between(0.0, 6.28));
+        let (speed, angle) = (random.between(0.2, 0.6), random.between(0.0, std::f64::consts::TAU));
         for wind in [[0.0; 2], [speed * angle.cos(), speed * angle.sin()]] {
             let step = &mut |_: &mut Random| PERIOD;
             let outcome = judged(seed, &mut seeded(seed + 77), &mut Course { step, is_told: true, wind });
