@@ -386,7 +386,7 @@ derivatives = { v = "a", z = "15 - v" }"#;
     workshop.write("gap.toml", expressions("v = 20.0, z = 100.0", 0.1, car, gap).replace("300.0", "20.0"));
     let text = workshop.punctual(["check", "gap.toml"]).success();
     // Half of the 4 m/s2, over 90 m.
-    let wanted = "  rate             0.149071 1/s at the start, chosen at every sample\n";
+    let wanted = "  rate             0.1491 1/s at the start, chosen at every sample\n";
     assert!(text.contains(wanted), "{text}");
     let glucose = r#"states = [{ name = "G" }, { name = "X" }, { name = "I" }]
 inputs = [{ name = "u", min = 0.0, max = 10.0 }]

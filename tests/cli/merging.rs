@@ -73,10 +73,10 @@ fn two_systems_become_one() {
         format!("both.fmu: unicycle_filter for {OTHER} (there.fmu), {PLATFORM} (here.fmu), guid {{GUID}}\n");
     assert_eq!(without_guids(&done.success()), told);
     let (here, there) = (entries(&workshop, "here.fmu"), entries(&workshop, "there.fmu"));
-    assert_eq!((here.len(), there.len()), (5, 5));
+    assert_eq!((here.len(), there.len()), (6, 6));
     let mut union = here.clone();
     union.extend(there);
-    assert_eq!(union.len(), 6);
+    assert_eq!(union.len(), 7);
     assert!(entries(&workshop, "both.fmu") == union, "not the entries of both");
     // The product is sound for other commands, and no temporary file is left.
     assert_eq!(workshop.punctual(["validate", "both.fmu"]).success(), "both.fmu: no errors, no warnings\n");

@@ -54,7 +54,7 @@ fn workshop() -> Workshop {
 
 fn run(workshop: &Workshop, text: &str) -> Done {
     workshop.write("s.toml", text);
-    workshop.punctual(["run", "s.toml", "--out", "."])
+    workshop.punctual(["run", "s.toml", "--out", ".", "--require", "nothing"])
 }
 
 fn recorded(workshop: &Workshop, text: &str) -> (Table, String) {
