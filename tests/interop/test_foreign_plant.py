@@ -45,7 +45,7 @@ def folder(tmp_path_factory):
         punctual("build", EXAMPLES / f"unicycle-{part}.toml", "-o", folder / f"unicycle-{part}.fmu")
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", EXAMPLES / "UnicycleInPython.py"]
     subprocess.run([*build, "-d", folder, "--no-external-tool"], check=True)
-    punctual("run", "unicycle.toml", "--out", "out", cwd=folder)
+    punctual("run", "unicycle.toml", "--require", "nothing", "--out", "out", cwd=folder)
     return folder
 
 
@@ -78,7 +78,7 @@ def test_in_punctual_run_too(folder, monkeypatch):
     # The interpreter in the FMU finds its modules (pythonfmu) as this one does.
     monkeypatch.setenv("LD_PRELOAD", str(libpython()))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(p for p in sys.path if p))
-    done = punctual("run", "foreign.toml", "--out", "out", cwd=folder)
+    done = punctual("run", "foreign.toml", "--require", "nothing", "--out", "out", cwd=folder)
     monkeypatch.undo()
     assert "closes a loop" not in done.stderr
     rows, own = (records(folder / "out" / f"{name}.csv") for name in ["foreign", "unicycle"])

@@ -65,7 +65,7 @@ def folder(tmp_path_factory):
         punctual("build", f"{name}.toml", "-o", f"{name}.fmu", cwd=folder)
     (folder / "system.toml").write_text(SYSTEM)
     punctual("build", "system.toml", "-o", "system.ssp", cwd=folder)
-    punctual("run", "system.toml", "--out", "out", cwd=folder)
+    punctual("run", "system.toml", "--require", "nothing", "--out", "out", cwd=folder)
     return folder
 
 
