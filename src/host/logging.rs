@@ -325,9 +325,15 @@ fn whole(bytes: &[u8], most: usize) -> String {
 mod tests {
     use super::*;
 
+    /// One of two instances, neither of which was called: a message that names neither is nobody's.
+    fn one_of_two() -> (Logging, Logging) {
+        CALLED.set(None);
+        (Logging::new(), Logging::new())
+    }
+
     #[test]
     fn formats_and_tolerates_null_and_strange_statuses() {
-        let logging = Logging::new();
+        let (logging, _other) = one_of_two();
         let environment = logging.desk.callbacks.environment;
         let null = std::ptr::null();
         let (instance, category, format) = (c"i".as_ptr(), c"logError".as_ptr(), c"%s is %d".as_ptr());
@@ -381,7 +387,7 @@ mod tests {
 
     #[test]
     fn messages_of_the_other_version_are_kept_alike() {
-        let logging = Logging::new();
+        let (logging, _other) = one_of_two();
         let (environment, callback) = logging.plain();
         let (callback, null) = (callback.expect("a callback"), std::ptr::null());
         // SAFETY: the environment lives; texts are literals.
@@ -474,8 +480,7 @@ mod tests {
 
     #[test]
     fn a_message_is_that_of_the_instance_named_or_called() {
-        // Other tests of this process have instances too, so that no one is the only one.
-        let (one, other) = (Logging::new(), Logging::new());
+        let (one, other) = one_of_two();
         let say = |environment: *mut c_void| {
             // SAFETY: of the environment nothing is asked; the text is a literal.
             unsafe {

@@ -178,8 +178,10 @@ pub struct Description {
 /// What there is to say of a description of FMI 1.0, or of a version that is not known here.
 pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
     let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
-    let is_known = version.is_empty() || ["2.", "3."].iter().any(|head| version.starts_with(head));
-    (!is_known).then(|| {
+    // What is no version at all is a mistake in the file.
+    let is_version = version.split('.').all(|part| part.parse::<u32>().is_ok());
+    let is_known = ["2.", "3."].iter().any(|head| version.starts_with(head));
+    (is_version && !is_known).then(|| {
         format!(
             "it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as one of these"
         )
