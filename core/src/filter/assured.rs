@@ -1,11 +1,14 @@
 //! A filter whose promise has a witness: decided at the first sample, kept within the bounds whatever u_ref is
 //! (`docs/theory.md#witness`).
 
+mod choice;
+
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use self::choice::{Chosen, Way, Wish};
 use super::deviation::Deviation;
 use super::integrator::insert;
 use super::slot::BarrierSlot;
@@ -32,14 +35,6 @@ const ROOM: f64 = 0.05;
 const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
 /// Margin of the rows behind which plans are, in units of theirs.
 const AMPLE: f64 = 2.0;
-/// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
-const COMFORTABLE: f64 = 0.5;
-/// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
-const FIRST: f64 = 0.125;
-const BISECTIONS: u32 = 3;
-/// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
-/// it again at the next, and the input jump between the two.
-const GIVEN_BACK: f64 = 1.0 / 32.0;
 /// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
 /// makes a refusal longer by as much as the first search.
 const SHORTER: [f64; 1] = [0.8];
@@ -68,14 +63,15 @@ const SHORTEST_INTEGRATED: f64 = 0.125;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Driver {
-    /// u_ref, with a comfortable plan behind it.
+    /// u_ref, with a comfortable plan behind it: the one at hand, that moved in time, or another.
     Reference,
     /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
     #[default]
     Rows,
-    /// The rows, as near to u_ref as a comfortable plan allows.
+    /// As near to u_ref as its bounds, or the rows and a comfortable plan, allow.
     Eased,
-    /// A compromise: the last input towards the rows' answer that has a plan behind it.
+    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, with a plan
+    /// behind it.
     Between,
     /// The plan: nothing else keeps the promise.
     Plan,
@@ -176,6 +172,8 @@ pub struct Commitment {
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     share: f64,
+    /// What is comfortable, and when a plan is next sought behind u_ref.
+    way: Way,
     /// The time in s at which a plan that ends is next tried to be prolonged.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     prolong_at: f64,
@@ -349,6 +347,7 @@ struct Piece {
 }
 
 impl Piece {
+    const WISH: Self = Self { rows: 0.0, wish: 1.0 };
     const ROWS: Self = Self { rows: 1.0, wish: 0.0 };
     const PLAN: Self = Self { rows: 0.0, wish: 0.0 };
 }
@@ -426,6 +425,11 @@ impl Rows {
         moves[..du_ref.len()].copy_from_slice(du_ref);
         if let Self::Integrated(own) = self {
             moves[own.of.input] *= own.moves(hold, u_ref[own.of.input]);
+        }
+        // Beyond its bounds it moves nothing.
+        let (wish, wanted) = self.wanted(hold, u_ref);
+        for (moves, (wish, wanted)) in moves.iter_mut().zip(wish.iter().zip(&wanted)) {
+            *moves = if wish == wanted { *moves } else { 0.0 };
         }
         moves
     }
@@ -675,7 +679,7 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, lost, share, prolong_at, sample, interval, .. } =
+        let Commitment { standing, promises, plan, lost, share, way, prolong_at, sample, interval, .. } =
             commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
@@ -690,6 +694,9 @@ impl AssuredFilter {
             }
             if !(0.0..=1.0).contains(share) {
                 return refuse("share", "is no part, must be 0 to 1");
+            }
+            if way.is_flawed() {
+                return refuse("way", "is none of a filter, or not finite");
             }
             if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
                 return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
@@ -1222,6 +1229,7 @@ impl AssuredFilter {
             Ok((factor, First { promises, plan, is_old })) => {
                 (self.next.promises, self.next.plan) = (promises, plan);
                 self.next.deviation = Deviation::from(t, x);
+                self.next.way = Way::beside(&self.next.plan.witness);
                 self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
                 self.end(Standing::Assured, None);
                 self.postpone(t, hold, factor);
@@ -1425,8 +1433,8 @@ impl AssuredFilter {
         self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
     }
 
-    /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
-    /// does, else the plan's own. `is_regular` tells whether the plan is one for this sample.
+    /// Chooses the input, `u` of the rows at first, and remembers what is behind it. `is_regular` tells whether the plan is one for
+    /// this sample.
     fn choose(
         &mut self,
         t: f64,
@@ -1436,83 +1444,28 @@ impl AssuredFilter {
         u: &mut [f64],
         is_regular: bool,
     ) -> Driver {
-        let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
-        let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
-        let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
         self.prolong(t, hold, x, u);
-        let (plan, share) = (&self.next.plan, self.commitment.share);
-        // Gentle, and with the margin that the rows aim at.
-        let comfortable = |witness: &Witness| {
-            let margin = |at: &Tightest| {
-                let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
-                self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
-            };
-            witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
+        let (wish, wanted) = self.rows.wanted(hold, u_ref);
+        let mut way = self.next.way.clone();
+        let wish = Wish {
+            wish: &wish[..u.len()],
+            wanted: &wanted[..u.len()],
+            rows: u,
+            reached: self.next.promises.iter().flatten().all(|promise| promise.from <= t),
         };
-        // Between the plan's own input and the rows' answer: `share` of the way from that.
-        let behind = |planner: &Planner<'_>, kept: &Witness, u: &[f64], share: f64| {
-            let own = kept.inputs[0].1;
-            let input: [f64; MAX_INPUTS] = core::array::from_fn(|i| {
-                if i < u.len() { own[i] + (1.0 - share) * (u[i] - own[i]) } else { 0.0 }
-            });
-            planner.behind(plan, t, x, &input[..u.len()]).ok()
-        };
-        let mixed = |share: f64| (Piece { rows: 1.0 - share, wish: 0.0 }, share);
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            let planner = &planner.irregular(!is_regular);
-            let passes = reached && wanted == wish;
-            if passes
-                && let Ok(witness) = planner.behind(plan, t, x, wanted)
-                && comfortable(&witness)
-            {
-                return Ok((Driver::Reference, (Piece { rows: 0.0, wish: 1.0 }, 0.0), witness));
-            }
-            // From the plan's own input a little further back to the rows, if a plan is behind that.
-            let mut tail = None;
-            if share > GIVEN_BACK {
-                let kept = planner.tail(plan, t, x)?;
-                if let Some(witness) = behind(planner, &kept, u, share - GIVEN_BACK) {
-                    return Ok((Driver::Between, mixed(share - GIVEN_BACK), witness));
-                }
-                tail = Some(kept);
-            }
-            wanted.copy_from_slice(u);
-            if let Ok(witness) = planner.behind(plan, t, x, wanted) {
-                if !passes || !comfortable(&witness) || u == wish {
-                    return Ok((Driver::Rows, (Piece::ROWS, 0.0), witness));
-                }
-                // As near to u_ref as is comfortable, so that the input does not jump between the two.
-                let (wish, witness) =
-                    towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
-                let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
-                return Ok((driver, (Piece { rows: 1.0 - wish, wish }, 0.0), witness));
-            }
-            // Towards the answer of the rows: as near as can be at first, then as near as last, or a little less.
-            let kept = match tail {
-                Some(tail) => tail,
-                None => planner.tail(plan, t, x)?,
-            };
-            let shares = [0.0, 1.0, 4.0, 12.0].map(|more| share + more * GIVEN_BACK);
-            let near = shares.into_iter().filter(|s| share > GIVEN_BACK && *s < 1.0);
-            let found = near.into_iter().find_map(|s| Some((s, behind(planner, &kept, u, s)?)));
-            let (share, witness) = match found {
-                Some(found) => found,
-                None if share > GIVEN_BACK => (1.0, kept),
-                None => {
-                    let own = kept.inputs[0].1;
-                    let (rows, witness) =
-                        towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
-                    (1.0 - rows, witness)
-                }
-            };
-            let driver = if share < 1.0 { Driver::Between } else { Driver::Plan };
-            Ok((driver, mixed(share), witness))
+            self.chosen(&planner.irregular(!is_regular), (t, x), wish, &mut way)
         });
         let failure = match found {
-            Ok((driver, (piece, share), witness)) => {
+            Ok(Chosen { driver, piece, share, witness, plan }) => {
                 self.piece = piece;
+                self.note(&mut way, share);
+                self.next.way = way;
                 (self.next.share, self.next.lost) = (share, None);
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
+                if let Some(plan) = plan {
+                    self.next.plan = plan;
+                }
                 self.next.plan.witness = witness;
                 return driver;
             }
@@ -1571,29 +1524,6 @@ impl AssuredFilter {
             Err(_) => Driver::Rows,
         }
     }
-}
-
-/// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
-/// witness, and that; 0 for `from`, whose witness is `kept`.
-fn towards(
-    from: &[f64],
-    to: &[f64],
-    mut kept: Witness,
-    behind: impl Fn(&[f64]) -> Option<Witness>,
-) -> (f64, Witness) {
-    let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
-    for _ in 0..=BISECTIONS {
-        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
-            *input = from + part * (to - from);
-        }
-        match behind(&input[..from.len()]) {
-            Some(witness) => (low, kept) = (part, witness),
-            None if low == 0.0 => break,
-            None => high = part,
-        }
-        part = 0.5 * (low + high);
-    }
-    (low, kept)
 }
 
 impl Looked {

@@ -415,13 +415,7 @@ impl<'a> Walk<'a> {
         let mut input = [0.0; MAX_INPUTS];
         input[..u.len()].copy_from_slice(u);
         if !self.witness.inputs.is_empty() {
-            for (i, u) in u.iter().enumerate() {
-                let (min, max) = (self.model.bounds.min[i], self.model.bounds.max[i]);
-                let part = (u - (max + min) / 2.0).abs() / ((max - min) / 2.0);
-                if part.is_finite() {
-                    self.witness.effort = self.witness.effort.max(part);
-                }
-            }
+            self.witness.effort = self.witness.effort.max(self.model.bounds.part(u));
         }
         self.witness.inputs.push((end, input));
         Ok(())

@@ -1,5 +1,7 @@
 //! Which trials are made, in which order, and what is kept between samples.
 
+mod renewal;
+
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,6 +14,8 @@ use super::{Integral, Plan, Policy, Requirement};
 use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
+
+pub use renewal::Sought;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
@@ -290,6 +294,7 @@ impl<'a> Planner<'a> {
                 x,
                 size: self.size,
                 rests: horizon.is_none(),
+                quick: false,
             };
             let begin = |inputs: Vec<Vec<f64>>| Descent::from(search.run(inputs));
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
@@ -760,7 +765,13 @@ impl<'a> Planner<'a> {
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.
-    fn guesses(&self, model: &Model<'_>, guide: &Guide, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
+    fn guesses(
+        &self,
+        model: &Model<'_>,
+        guide: &Guide,
+        x: &[f64],
+        times: &[f64],
+    ) -> impl Iterator<Item = Vec<Vec<f64>>> {
         let nu = model.inputs();
         let mut sides: Vec<Vec<f64>> = vec![vec![0.0; nu]];
         if nu <= 2 {
@@ -784,7 +795,7 @@ impl<'a> Planner<'a> {
             }
         }
         let (holds, last) = (times.len() - 1, self.last(times[0]));
-        let run = |side: &[f64], [size, part]: [f64; 2]| {
+        let run = move |side: &[f64], [size, part]: [f64; 2]| {
             let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
             let mut inputs = Vec::with_capacity(holds + 1);
             for k in 0..holds {
@@ -808,10 +819,8 @@ impl<'a> Planner<'a> {
             inputs.push(guide.rest(model));
             inputs
         };
-        let mut guesses = vec![run(&sides[0], GUESSES[0])];
-        for guess in GUESSES {
-            guesses.extend(sides[1..].iter().map(|side| run(side, guess)));
-        }
-        guesses
+        let others = sides.len() - 1;
+        let sizes = GUESSES.into_iter().flat_map(move |guess| (1..=others).map(move |side| (side, guess)));
+        core::iter::once((0, GUESSES[0])).chain(sizes).map(move |(side, guess)| run(&sides[side], guess))
     }
 }
