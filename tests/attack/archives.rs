@@ -114,7 +114,14 @@ fn archives_with_edits() {
             }
         }
         std::fs::write(&path, archive).expect("a writable folder");
-        let report = validate(&path, None, None).expect("a report");
+        let report = match validate(&path, None, None) {
+            Ok(report) => report,
+            Err(refusal) => {
+                // Another version is out of scope, and nothing is said of what else there is.
+                assert!(refusal.to_string().contains("x.fmu: it is of FMI "), "{refusal}");
+                return 0;
+            }
+        };
         let errors = report.count(Severity::Error);
         assert!(report.findings.iter().all(|f| !f.to_string().is_empty()));
         match Fmu::open(&path) {

@@ -250,9 +250,9 @@ def test_what_is_not_promised_is_said():
     own = punctual.Filter(assured(2.0))
     step = own.step(0.0, [0.0, 0.0, 1.0, 0.0])
     assert step.assurance is punctual.Assurance.REFUSED and not step.barriers["goal"].guaranteed
-    assert own.plan is None and own.refusal.startswith("by the nearest way tried, goal is not met at 2.0")
+    assert own.plan is None and own.refusal.startswith("by the nearest way tried, goal is not met at 2 s")
     assert punctual.Filter(FILTER).step(0.0, [0.0, 0.0, 1.0, 0.0]).assurance is None
-    with pytest.raises(punctual.Error, match='assurance: is "on", must be "off": actuation_delay: is not 0'):
+    with pytest.raises(punctual.Error, match='assurance: is "on", must be "off": actuation_delay is 0.01, must be 0 for a plan'):
         punctual.Filter(assured(8.0) | {"actuation_delay": 0.01})
 
 

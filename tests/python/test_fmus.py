@@ -117,12 +117,16 @@ def test_the_command_line_is_there(tmp_path):
         punctual.run_cli("--none")
 
 
-DECLARED = {"actuation_delay": STEP, "measurement_errors": {"v": 0.01}}
+DECLARED = {
+    "actuation_delay": {"actuation_delay": STEP},
+    "measurement_errors": {"measurement_errors": {"v": 0.01}},
+    "disturbance": {"barrier": [barrier | {"disturbance": 0.01} for barrier in ASSURED["barrier"]]},
+}
 
 
-@pytest.mark.parametrize("keys", [["actuation_delay"], ["measurement_errors"], [*DECLARED]])
+@pytest.mark.parametrize("keys", [["actuation_delay"], ["measurement_errors"], ["measurement_errors", "disturbance"]])
 def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, tmp_path):
-    lost = ASSURED | {key: DECLARED[key] for key in keys}
+    lost = ASSURED | {name: value for key in keys for name, value in DECLARED[key].items()}
     filter_fmu, plant_fmu = tmp_path / "filter.fmu", punctual.build(PLANT, tmp_path / "plant.fmu")
     made = {
         "Filter": lambda: punctual.Filter(lost),

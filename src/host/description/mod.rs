@@ -178,10 +178,10 @@ pub struct Description {
 /// What there is to say of a description of FMI 1.0, or of a version that is not known here.
 pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
     let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
-    // What is no version at all is a mistake in the file.
-    let is_version = version.split('.').all(|part| part.parse::<u32>().is_ok());
-    let is_known = ["2.", "3."].iter().any(|head| version.starts_with(head));
-    (is_version && !is_known).then(|| {
+    // What is no version at all, such as "3", is a mistake in the file.
+    let (head, tail) = version.split_once('.')?;
+    let is_version = head.parse::<u32>().is_ok() && tail.starts_with(|c: char| c.is_ascii_digit());
+    (is_version && !["2", "3"].contains(&head)).then(|| {
         format!(
             "it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as one of these"
         )
