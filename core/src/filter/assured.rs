@@ -21,9 +21,7 @@ use crate::convergence::FixedTimeState;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{
-    Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Tightest, Witness, slopes,
-};
+use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Witness, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -276,8 +274,9 @@ impl From<f64> for Pace {
 ///
 /// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier that
 /// [can be](Self::promised) is promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on
-/// by its rows. Once promised, every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a
-/// compromise, or where nothing else keeps the promise the next input of the plan itself.
+/// by its rows. Once promised, every input has a verified plan behind it. It is u_ref wherever a plan is found behind that; else a
+/// compromise, once every set has been reached with the answer of the rows; or where nothing else keeps the promise the next input
+/// of the plan itself.
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
 /// differ, and by half as much again a set might be left before the next sample, the promise is withdrawn for that sample. A sample
@@ -1454,7 +1453,7 @@ impl AssuredFilter {
             reached: self.next.promises.iter().flatten().all(|promise| promise.from <= t),
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            self.chosen(&planner.irregular(!is_regular), (t, x), wish, &mut way)
+            self.chosen(&planner.irregular(!is_regular).hurried(), (t, x), wish, &mut way)
         });
         let failure = match found {
             Ok(Chosen { driver, piece, share, witness, plan }) => {

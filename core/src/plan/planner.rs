@@ -43,6 +43,8 @@ const WARY: f64 = 4.0;
 const NEARLY: f64 = -100.0;
 /// Margin of a limit of an integral in the search, as a part of the way to it at the start.
 const ROOM: f64 = 1e-3;
+/// The most pieces of a walk between samples, if it is more so many times those of the plan at hand.
+const HURRIED: [u32; 2] = [1000, 4];
 /// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
 const TIGHTENED: u32 = 4;
 const TIGHTENING: u32 = 4;
@@ -132,6 +134,8 @@ pub struct Planner<'a> {
     size: f64,
     /// Whether samples come as those before did.
     regular: bool,
+    /// Whether a trial may not take much longer than the plan at hand.
+    hurried: bool,
     integral: Option<Integral>,
     policies: &'a [Policy],
     /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
@@ -159,6 +163,7 @@ impl<'a> Planner<'a> {
             usual: period,
             size,
             regular: true,
+            hurried: false,
             integral: None,
             policies: &[],
             horizon: None,
@@ -170,6 +175,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn irregular(self, irregular: bool) -> Self {
         Self { regular: !irregular, ..self }
+    }
+
+    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at hand.
+    #[must_use]
+    pub fn hurried(self) -> Self {
+        Self { hurried: true, ..self }
     }
 
     /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of
@@ -635,6 +646,9 @@ impl<'a> Planner<'a> {
         follows: bool,
     ) -> Result<Witness, Failure> {
         let mut walk = self.begin(plan, strictness, grid, (t, x))?;
+        if self.hurried && strictness >= 1.0 {
+            walk.most_pieces = HURRIED[0].max(HURRIED[1].saturating_mul(plan.witness.pieces));
+        }
         if let Some(u) = first {
             walk.hold_until(u, t + self.period)?;
         }

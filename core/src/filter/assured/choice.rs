@@ -3,7 +3,6 @@
 use super::{AMPLE, AssuredFilter, Driver, Piece};
 use crate::MAX_INPUTS;
 use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
-use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
@@ -152,8 +151,9 @@ impl AssuredFilter {
             witness.effort <= comfort && (!reached || witness.tightest.is_none_or(has_margin))
         };
         let behind = |plan: &Plan, u: &[f64]| planner.behind(plan, t, x, u).ok();
+        let passed = if wanted == wish { Driver::Reference } else { Driver::Eased };
         if is_wish && passes {
-            let driver = if wanted == wish { Driver::Reference } else { Driver::Eased };
+            let driver = passed;
             let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
             if let Some(witness) = behind(plan, wanted).filter(comfortable) {
                 return Ok(chosen(witness, None));
@@ -192,11 +192,18 @@ impl AssuredFilter {
             let part = 1.0 - share;
             let piece =
                 if to_rows { Piece { rows: part, wish: 0.0 } } else { Piece { rows: 0.0, wish: part } };
-            let driver = if share < 1.0 { Driver::Between } else { Driver::Plan };
+            let driver = match share {
+                0.0 if to_rows => Driver::Rows,
+                0.0 => passed,
+                1.0 => Driver::Plan,
+                _ => Driver::Between,
+            };
             Chosen { driver, piece, share, witness, plan }
         };
         let between = |share: f64| -> [f64; MAX_INPUTS] {
-            let part = |i: usize| own[i] + (1.0 - share) * (far[i] - own[i]);
+            // All of it is itself, to the last bit.
+            let part =
+                |i: usize| if share == 0.0 { far[i] } else { own[i] + (1.0 - share) * (far[i] - own[i]) };
             core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
         };
         let most = kept.effort.max(comfort);

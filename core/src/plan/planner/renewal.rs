@@ -23,6 +23,9 @@ const LEFT: f64 = 0.8;
 /// The parts of the time until the last deadline for which a guess holds the input that is wanted.
 const WANTED: [f64; 2] = [0.35, 0.1];
 
+/// Writes an input at a time in s and a state.
+type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
+
 /// A search for a plan behind an input that is spread over samples: which guess it is at, and how far that has come.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -136,7 +139,7 @@ impl Planner<'_> {
         let sketch = paced.model(paced.resolved(x, hold, RESOLVED[0])?);
         let (reference, brake) = (plan.reference.as_ref()?, plan.brake.as_ref()?);
         let (mut at, mut u, last) = (x.to_vec(), vec![0.0; paced.dims[1]], paced.last(t));
-        let mut led = |law: &dyn Fn(f64, &[f64], &mut [f64])| {
+        let mut led = |law: Law<'_>| {
             let mut inputs: Vec<Vec<f64>> = Vec::with_capacity(times.len());
             for hold in times.windows(2) {
                 law(hold[0], &at, &mut u);
