@@ -185,7 +185,18 @@ impl AssuredFilter {
             return Ok(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, witness));
         }
         // From the plan's own input: as near as can be at first, then as near as last, or a little more or less.
-        let kept = planner.tail(plan, t, x)?;
+        let kept = match planner.tail(plan, t, x) {
+            Ok(kept) => kept,
+            // The plant is not where the plan was: whatever else there is keeps the promise.
+            Err(failure) => {
+                let wished = is_wish.then_some((passed, Piece::WISH, wanted));
+                let others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, rows)]);
+                let mut others =
+                    others.filter_map(|(driver, piece, u)| Some((driver, piece, behind(plan, u)?)));
+                let (driver, piece, witness) = others.next().ok_or(failure)?;
+                return Ok(Chosen { driver, piece, share: 0.0, witness, plan: None });
+            }
+        };
         let (own, to_rows) = (kept.inputs[0].1, reached || !is_wish);
         let far = if to_rows { rows } else { wanted };
         let mixed = |share: f64, witness, plan| {
