@@ -155,10 +155,12 @@ impl AssuredFilter {
         if is_wish && passes {
             let driver = passed;
             let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
-            if let Some(witness) = behind(plan, wanted).filter(comfortable) {
+            let near = behind(plan, wanted);
+            let is_near = near.is_some();
+            if let Some(witness) = near.filter(comfortable) {
                 return Ok(chosen(witness, None));
             }
-            if !reached {
+            if !reached && !is_near {
                 let found = planner.moved(plan, t, x, wanted).ok().filter(|plan| comfortable(&plan.witness));
                 let found = found.or_else(|| self.sought(planner, (t, x), wanted, way, comfort));
                 if let Some(plan) = found {
