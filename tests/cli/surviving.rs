@@ -324,6 +324,12 @@ fn other_interfaces_and_versions_are_out_of_scope() {
             workshop.punctual([command, "one.fmu"]).fails(1, &message);
         }
     }
+    // What is no version is a mistake in the file.
+    let other = description("none", &[("fmiVersion=\"2.0\"", "fmiVersion=\"one\"")]);
+    misbehaving::write(&workshop, "one.fmu", other, &misbehaving::library(&[]));
+    let done = workshop.punctual(["validate", "one.fmu"]);
+    let finding = "fmiModelDescription: fmiVersion is \"one\"; must be \"2.0\"\n";
+    assert!(done.code == 1 && done.stdout.contains(finding), "{done:#?}");
 }
 
 /// Tools and people archive the folder where its content is meant.
