@@ -17,9 +17,10 @@ pub(super) struct Deviation {
     since: f64,
     /// Where the model has led from there until the last sample.
     pub(super) state: Vec<f64>,
-    /// The rate of each state beside the model over the last stretch, in its unit per s, ≥ 0.
+    /// The rate of each state beside the model over the last stretch, in its unit per s.
     last: Vec<f64>,
-    /// The largest of these that were seen twice in a row: a plant that was carried away once is not for ever.
+    /// The largest size of these that was seen twice in a row in the same direction: a plant that was carried away once, or there
+    /// and back, is not for ever.
     rates: Vec<f64>,
 }
 
@@ -36,9 +37,11 @@ impl Deviation {
         let Some(x) = x.filter(|_| stretch >= STRETCH * period) else { return };
         for (((rate, last), state), x) in self.rates.iter_mut().zip(&mut self.last).zip(&self.state).zip(x) {
             // A model that leads nowhere tells nothing.
-            let now = (x - state).abs() / stretch;
+            let now = (x - state) / stretch;
             let now = if now.is_finite() { now } else { 0.0 };
-            *rate = rate.max(last.min(now));
+            if now * *last > 0.0 {
+                *rate = rate.max(last.abs().min(now.abs()));
+            }
             *last = now;
         }
         self.since = t;
@@ -55,7 +58,8 @@ impl Deviation {
     /// Whether it is one of a plant with so many states.
     pub(super) fn fits(&self, states: usize) -> bool {
         let Self { since, state, last, rates } = self;
-        let are_rates = |rates: &[f64]| rates.len() == states && rates.iter().all(|rate| *rate >= 0.0);
-        since.is_finite() && state.len() == states && are_rates(last) && are_rates(rates)
+        let are_rates = |rates: &[f64]| rates.len() == states && rates.iter().all(|rate| rate.is_finite());
+        let are_sizes = rates.iter().all(|rate| *rate >= 0.0);
+        since.is_finite() && state.len() == states && are_rates(last) && are_rates(rates) && are_sizes
     }
 }
