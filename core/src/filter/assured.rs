@@ -21,7 +21,7 @@ use crate::convergence::FixedTimeState;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Witness, slopes};
+use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Sought, Witness, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -167,6 +167,8 @@ pub struct Commitment {
     /// Where the plan was lost: when, in s, and when another one is next searched for.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     lost: Option<[f64; 2]>,
+    /// The search for another one.
+    regained: Sought,
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     share: f64,
@@ -678,7 +680,7 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, lost, share, way, prolong_at, sample, interval, .. } =
+        let Commitment { standing, promises, plan, lost, regained, share, way, prolong_at, sample, interval, .. } =
             commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
@@ -694,7 +696,7 @@ impl AssuredFilter {
             if !(0.0..=1.0).contains(share) {
                 return refuse("share", "is no part, must be 0 to 1");
             }
-            if way.is_flawed() {
+            if way.is_flawed() || regained.is_flawed() {
                 return refuse("way", "is none of a filter, or not finite");
             }
             if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
@@ -1141,14 +1143,21 @@ impl AssuredFilter {
     /// [`Self::soonest`]; whether there may be a plan for the deadlines themselves.
     fn least(&self, t: f64, x: &[f64], longest: f64, may_be: bool) -> Option<(f64, Witness)> {
         let x = &self.rows.state(x)[..];
+        let promised = |factor: f64| self.promises(t, x, |_| factor);
+        let arrived = |factor: f64, First { promises, plan, .. }: First| {
+            (factor * self.arrival(&promises, &plan, t, x), plan.witness)
+        };
         let find = |factor: f64, shorter: &[f64]| {
-            let promises = self.promises(t, x, |_| factor);
-            let First { promises, plan, .. } =
-                self.first(promises, (t, self.period), x, &[], shorter).ok()?;
-            Some((factor * self.arrival(&promises, &plan, t, x), plan.witness))
+            let found = self.first(promised(factor), (t, self.period), x, &[], shorter).ok()?;
+            Some(arrived(factor, found))
+        };
+        let sooner = |factor: f64, (before, plan): &(f64, Witness)| {
+            let found =
+                self.beside(promised(factor), (t, self.period), x, &[], plan, factor / before).ok()?;
+            Some(arrived(factor, found))
         };
         let found = if may_be { find(1.0, &SHORTER) } else { None };
-        least_factor(self.longest(longest, |_| true), found, |factor| find(factor, &[]))
+        least_factor(self.longest(longest, |_| true), found, |factor| find(factor, &[]), sooner)
     }
 
     /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
@@ -1218,10 +1227,16 @@ impl AssuredFilter {
         let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter().slots.iter().any(yields) {
-            let later = least_factor(self.longest(Self::LONGEST, yields), None, |factor| {
-                let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
-                search(promises, &[]).ok().map(|first| (factor, first))
-            });
+            let promised =
+                |factor: f64| self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+            let later = |factor: f64| {
+                search(promised(factor), &[]).ok().map(|first| (factor, first))
+            };
+            let sooner = |factor: f64, (before, first): &(f64, First)| {
+                let (promises, plan) = (promised(factor), &first.plan.witness);
+                self.beside(promises, (t, hold), x, u, plan, factor / before).ok().map(|first| (factor, first))
+            };
+            let later = least_factor(self.longest(Self::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
         }
         match found {
@@ -1288,6 +1303,25 @@ impl AssuredFilter {
             }
             _ => Err(failure),
         }
+    }
+
+    /// A plan for `promises` beside one for others, whose deadlines are these by `factor`; only near that one it is sought.
+    fn beside(
+        &self,
+        mut promises: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+        plan: &Witness,
+        factor: f64,
+    ) -> Result<First, Failure> {
+        if self.is_ruled_out(&promises, at.0, x) {
+            return Err(Failure::Nothing);
+        }
+        promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+        let search = |planner: &Planner<'_>| planner.beside(plan, factor).search(at.0, x);
+        let plan = self.planned(&promises, at, u, search)?;
+        Ok(First { promises, plan, is_old: false })
     }
 
     /// Two promises that no state keeps at a time at which both are in force.
@@ -1460,7 +1494,7 @@ impl AssuredFilter {
                 self.piece = piece;
                 self.note(&mut way, share);
                 self.next.way = way;
-                (self.next.share, self.next.lost) = (share, None);
+                (self.next.share, self.next.lost, self.next.regained) = (share, None, Sought::default());
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
                 if let Some(plan) = plan {
                     self.next.plan = plan;
@@ -1470,22 +1504,31 @@ impl AssuredFilter {
             }
             Err(failure) => failure,
         };
+        // A plan that ends at rest is sought by a few steps a sample, where samples come as they are to.
+        let is_spread = is_regular && !self.next.plan.is_finite();
+        let (mut regained, mut goes_on) = (self.next.regained.clone(), false);
         let found = match self.commitment.lost {
             Some([_, next]) if t < next => Err(failure),
             _ => {
                 // One that is lost is found again without its reserve.
                 let mut promises = self.next.promises.clone();
                 promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
-                self.planned(&promises, (t, hold), u, |planner| {
-                    planner.beyond(&self.next.plan.witness).search(t, x)
+                self.planned(&promises, (t, hold), u, |planner| match is_spread {
+                    true => planner.hurried().regained(&self.next.plan, t, x, &mut regained).map_err(|left| {
+                        goes_on = left;
+                        failure
+                    }),
+                    false => planner.beyond(&self.next.plan.witness).search(t, x),
                 })
             }
         };
+        self.next.regained = regained;
         match found {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.prolong_at = self.next_prolonging(t, plan.witness.until);
-                (self.next.plan, self.next.share, self.next.lost) = (plan, 1.0, None);
+                (self.next.plan, self.next.share) = (plan, 1.0);
+                (self.next.lost, self.next.regained) = (None, Sought::default());
                 self.piece = Piece::PLAN;
                 Driver::Plan
             }
@@ -1503,7 +1546,8 @@ impl AssuredFilter {
                 // Ever more seldom, since a search is long.
                 if lost.is_none_or(|[_, next]| t >= next) {
                     let since = lost.map_or(t, |[since, _]| since);
-                    self.next.lost = Some([since, t + (t - since).max(hold).max(self.period)]);
+                    let pause = if goes_on { 0.0 } else { (t - since).max(hold).max(self.period) };
+                    self.next.lost = Some([since, t + pause]);
                 }
                 self.come_near(t, hold, x, u)
             }
@@ -1573,11 +1617,13 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
 }
 
 /// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
-/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one.
+/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one. `sooner` finds
+/// something beside what was found.
 fn least_factor<T>(
     longest: f64,
     mut found: Option<(f64, T)>,
     find: impl Fn(f64) -> Option<(f64, T)>,
+    sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
     const FINE: f64 = 1.05;
     const LEAST: f64 = 1e-3;
@@ -1585,13 +1631,13 @@ fn least_factor<T>(
     // Twice as long until there is one, or half as long until there is none.
     let longest = longest.min(MOST);
     let (mut low, mut high) = (1.0, 1.0);
-    if let Some((factor, _)) = &found {
-        high = factor.min(1.0);
+    if let Some(found) = &mut found {
+        high = found.0.min(1.0);
         while high > LEAST
-            && let Some(sooner) = find(0.5 * high)
+            && let Some(half) = sooner(0.5 * high, found)
         {
-            high = sooner.0.min(0.5 * high);
-            found = Some(sooner);
+            high = half.0.min(0.5 * high);
+            *found = half;
         }
         low = 0.5 * high;
     }
@@ -1599,15 +1645,15 @@ fn least_factor<T>(
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let (mut high, mut found) = found?;
-    while high > FINE * low {
-        let middle = elementary::sqrt(low * high);
-        match find(middle) {
-            Some(sooner) => (high, found) = sooner,
+    let mut found = found?;
+    while found.0 > FINE * low {
+        let middle = elementary::sqrt(low * found.0);
+        match sooner(middle, &found) {
+            Some(nearer) => found = nearer,
             None => low = middle,
         }
     }
-    Some((high, found))
+    Some(found)
 }
 
 /// Whether two intervals of a clock that is measured are meant to be the same.

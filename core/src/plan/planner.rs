@@ -31,6 +31,8 @@ const LONGER: [usize; 2] = [40, 320];
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
+/// The same for guesses beside a plan that was found.
+const BESIDE: &[(usize, u32)] = &[(3, 2), (1, 6)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
@@ -141,6 +143,8 @@ pub struct Planner<'a> {
     /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
     horizon: Option<f64>,
     before: Option<&'a Witness>,
+    /// A plan for other deadlines with which alone a search begins, and how many times as long these are.
+    beside: Option<(&'a Witness, f64)>,
 }
 
 impl<'a> Planner<'a> {
@@ -168,6 +172,7 @@ impl<'a> Planner<'a> {
             policies: &[],
             horizon: None,
             before: None,
+            beside: None,
         }
     }
 
@@ -213,6 +218,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn beyond(self, before: &'a Witness) -> Self {
         Self { before: Some(before), ..self }
+    }
+
+    /// The same planner for deadlines that are `factor` times as long as those of `plan`, with which alone a search begins.
+    #[must_use]
+    pub fn beside(self, plan: &'a Witness, factor: f64) -> Self {
+        Self { beside: Some((plan, factor)), ..self }
     }
 
     /// The time in s between the samples at which the inputs of a new plan change: a multiple of the period.
@@ -314,6 +325,13 @@ impl<'a> Planner<'a> {
                 inputs.push(guide.rest(&sketch));
                 if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &ROUNDS, &ending) {
                     return Ok(plan);
+                }
+            }
+            if let Some((plan, factor)) = self.beside {
+                let guesses = self.stretched(&sketch, plan, factor, &guide, &times).map(begin);
+                match self.descend(&search, guesses.into(), BESIDE, &ending) {
+                    Ok(plan) => return Ok(plan),
+                    Err(_) => continue,
                 }
             }
             let lead = || {
@@ -776,6 +794,30 @@ impl<'a> Planner<'a> {
         let mut inputs: Vec<Vec<f64>> = times.windows(2).map(led).collect();
         inputs.push(aim.input.clone());
         [inputs, vec![aim.input.clone(); times.len()]]
+    }
+
+    /// Guesses that go the way of `plan` in `factor` times the time: with its inputs, with those of rates that are so much larger, and
+    /// of accelerations.
+    fn stretched(
+        &self,
+        model: &Model<'_>,
+        plan: &Witness,
+        factor: f64,
+        guide: &Guide,
+        times: &[f64],
+    ) -> [Vec<Vec<f64>>; 3] {
+        let (rest, begin) = (guide.rest(model), times[0]);
+        let at = |t: f64| begin + (t - begin) / factor;
+        [1.0, factor, factor * factor].map(|smaller| {
+            let held = |hold: &[f64]| {
+                let mean = plan.mean(at(hold[0]), at(hold[1]));
+                let mut u: Vec<f64> =
+                    rest.iter().zip(mean).map(|(rest, mean)| rest + (mean - rest) / smaller).collect();
+                model.clamp(&mut u);
+                u
+            };
+            times.windows(2).map(held).chain([rest.clone()]).collect()
+        })
     }
 
     /// First guesses: the plant stopped at once, and after inputs to either side.

@@ -120,6 +120,20 @@ impl Planner<'_> {
         found.map_err(|descent| sought.next(descent.as_ref().map(|(descent, times)| (descent, &times[..]))))
     }
 
+    /// A plan from `x` at `t`, by the next few steps of such a search: where `plan` is one no more.
+    ///
+    /// # Errors
+    ///
+    /// Whether the search goes on, where these steps lead to no plan.
+    pub fn regained(&self, plan: &Plan, t: f64, x: &[f64], sought: &mut Sought) -> Result<Plan, bool> {
+        let rest = plan.brake.as_ref().map(|brake| brake.input.clone()).unwrap_or_default();
+        match self.step_on(plan, (t, x), &rest, sought) {
+            Some(Ok(plan)) => Ok(plan),
+            Some(Err((descent, times))) => Err(sought.next(Some((&descent, &times)))),
+            None => Err(sought.next(None)),
+        }
+    }
+
     /// Steps of that search from `x` at `t`: a plan, or how far it has come on which grid. `None` where there is no search.
     fn step_on(
         &self,
