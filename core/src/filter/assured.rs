@@ -21,7 +21,9 @@ use crate::convergence::FixedTimeState;
 use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
-use crate::plan::{Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Sought, Witness, slopes};
+use crate::plan::{
+    Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Sought, Witness, slopes,
+};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -680,8 +682,19 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, lost, regained, share, way, prolong_at, sample, interval, .. } =
-            commitment;
+        let Commitment {
+            standing,
+            promises,
+            plan,
+            lost,
+            regained,
+            share,
+            way,
+            prolong_at,
+            sample,
+            interval,
+            ..
+        } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -1227,14 +1240,13 @@ impl AssuredFilter {
         let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter().slots.iter().any(yields) {
-            let promised =
-                |factor: f64| self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
-            let later = |factor: f64| {
-                search(promised(factor), &[]).ok().map(|first| (factor, first))
-            };
+            let promised = |factor: f64| self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+            let later = |factor: f64| search(promised(factor), &[]).ok().map(|first| (factor, first));
             let sooner = |factor: f64, (before, first): &(f64, First)| {
                 let (promises, plan) = (promised(factor), &first.plan.witness);
-                self.beside(promises, (t, hold), x, u, plan, factor / before).ok().map(|first| (factor, first))
+                self.beside(promises, (t, hold), x, u, plan, factor / before)
+                    .ok()
+                    .map(|first| (factor, first))
             };
             let later = least_factor(self.longest(Self::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
@@ -1487,7 +1499,9 @@ impl AssuredFilter {
             reached: self.next.promises.iter().flatten().all(|promise| promise.from <= t),
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            self.chosen(&planner.irregular(!is_regular).hurried(), (t, x), wish, &mut way)
+            let (planner, reached) = (planner.irregular(!is_regular).hurried(), wish.reached);
+            let chosen = self.chosen(&planner, (t, x), wish, &mut way)?;
+            Ok(self.smoothed(&planner, (t, x), chosen, reached))
         });
         let failure = match found {
             Ok(Chosen { driver, piece, share, witness, plan }) => {
@@ -1514,10 +1528,12 @@ impl AssuredFilter {
                 let mut promises = self.next.promises.clone();
                 promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
                 self.planned(&promises, (t, hold), u, |planner| match is_spread {
-                    true => planner.hurried().regained(&self.next.plan, t, x, &mut regained).map_err(|left| {
-                        goes_on = left;
-                        failure
-                    }),
+                    true => {
+                        planner.hurried().regained(&self.next.plan, t, x, &mut regained).map_err(|left| {
+                            goes_on = left;
+                            failure
+                        })
+                    }
                     false => planner.beyond(&self.next.plan.witness).search(t, x),
                 })
             }

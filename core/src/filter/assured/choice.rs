@@ -1,6 +1,6 @@
 //! The input of a sample: u_ref where a plan stands behind it, else as near to it as one does.
 
-use super::{AMPLE, AssuredFilter, Driver, Piece};
+use super::{AMPLE, AssuredFilter, Driver, Piece, Standing};
 use crate::MAX_INPUTS;
 use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
 use crate::scalar::all_finite;
@@ -13,6 +13,8 @@ const EASE: f64 = 2.0;
 const EAGER: f64 = 1.5;
 /// The largest input of another plan for which the one that drives gives way to u_ref, in units of that of the one that drives.
 const GENTLER: f64 = 0.9;
+/// The change of an input from one sample to the next that is no jump, as a part of the width of its bounds.
+const SMOOTH: f64 = 0.15;
 /// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
 const FIRST: f64 = 0.125;
 const BISECTIONS: u32 = 3;
@@ -276,6 +278,34 @@ impl AssuredFilter {
                 None
             }
             Err(true) => None,
+        }
+    }
+
+    /// `chosen` as it is, or where its input jumps from the last one, one on the way between the two that has a plan behind it.
+    pub(super) fn smoothed(
+        &self,
+        planner: &Planner<'_>,
+        (t, x): (f64, &[f64]),
+        chosen: Chosen,
+        reached: bool,
+    ) -> Chosen {
+        let Chosen { driver, witness, .. } = &chosen;
+        let (to, last) = (witness.inputs[0].1, &self.filter().state.input);
+        let far = self.bounds.apart(&last[..], &to[..]);
+        if *driver == Driver::Reference || self.commitment.standing != Standing::Assured || far <= SMOOTH {
+            return chosen;
+        }
+        let smooth: [f64; MAX_INPUTS] = core::array::from_fn(|i| last[i] + SMOOTH / far * (to[i] - last[i]));
+        let smooth = &smooth[..self.rows.dims()[1]];
+        let plan = chosen.plan.as_ref().unwrap_or(&self.next.plan);
+        let (driver, piece) = (Driver::Between, Piece::PLAN);
+        if let Ok(witness) = planner.behind(plan, t, x, smooth) {
+            return Chosen { driver, piece, witness, ..chosen };
+        }
+        let renewed = || planner.renewed(plan, t, x, smooth, &mut Sought::default()).ok();
+        match (!reached).then(renewed).flatten() {
+            Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
+            None => chosen,
         }
     }
 

@@ -15,9 +15,9 @@ use crate::scalar::all_finite;
 /// The holds of the grid until the last deadline and after it.
 const HOLDS: [usize; 2] = [20, 10];
 /// The quadratic programs of a sample, between two checks.
-const PROGRAMS: [u32; 2] = [2, 2];
+const PROGRAMS: [u32; 2] = [2, 1];
 /// The samples for which a guess is followed.
-const FOLLOWED: u32 = 4;
+const FOLLOWED: u32 = 5;
 /// What is left of a violation after a sample where it is worth another.
 const LEFT: f64 = 0.8;
 /// The parts of the time until the last deadline for which a guess holds the input that is wanted.
