@@ -80,12 +80,7 @@ fn run(workshop: &Workshop, stem: &str) -> Table {
 
 /// The system `stem` with the plug-in of `examples/plugin`, and with the expressions of `examples/models`. The edits `of_both` are
 /// made in both filters, `of_expressions` in that of expressions.
-fn both(
-    source: &str,
-    stem: &str,
-    of_both: &[(&str, &str)],
-    of_expressions: &[(&str, &str)],
-) -> [Table; 2] {
+fn both(source: &str, stem: &str, of_both: &[(&str, &str)], of_expressions: &[(&str, &str)]) -> [Table; 2] {
     let (plugin, expressions) = (Workshop::with_library(), Workshop::with_library());
     example(&plugin, source, source.split('.').next().expect("a stem"));
     for (workshop, folder) in [(&plugin, "plugin"), (&expressions, "models")] {

@@ -1145,23 +1145,38 @@ impl AssuredFilter {
     /// twentieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
     /// deadlines, nor where one would come after the end of its barrier.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        self.least(t, x, longest, true)
+        self.appraise(t, x, longest).1
+    }
+
+    /// What [`Self::foresee`] says of the deadlines themselves, and [`Self::soonest`], with one search for both.
+    pub fn appraise(
+        &self,
+        t: f64,
+        x: &[f64],
+        longest: f64,
+    ) -> (Result<Witness, Failure>, Option<(f64, Witness)>) {
+        let state = &self.rows.state(x)[..];
+        let promises = self.promises(t, state, |_| 1.0);
+        match self.first(promises, (t, self.period), state, &[], &SHORTER) {
+            Ok(first) => (Ok(first.plan.witness.clone()), self.least(t, x, longest, Some(first))),
+            Err(failure) => (Err(failure), self.least(t, x, longest, None)),
+        }
     }
 
     /// The same where [none is found](Self::foresee) for the deadlines themselves, which is not tried again.
     pub fn soonest_later(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        self.least(t, x, longest, false)
+        self.least(t, x, longest, None)
     }
 
-    /// [`Self::soonest`]; whether there may be a plan for the deadlines themselves.
-    fn least(&self, t: f64, x: &[f64], longest: f64, may_be: bool) -> Option<(f64, Witness)> {
+    /// [`Self::soonest`], where `first` was found for the deadlines themselves.
+    fn least(&self, t: f64, x: &[f64], longest: f64, first: Option<First>) -> Option<(f64, Witness)> {
         let x = &self.rows.state(x)[..];
         let promised = |factor: f64| self.promises(t, x, |_| factor);
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
             (factor * self.arrival(&promises, &plan, t, x), plan.witness)
         };
-        let find = |factor: f64, shorter: &[f64]| {
-            let found = self.first(promised(factor), (t, self.period), x, &[], shorter).ok()?;
+        let find = |factor: f64| {
+            let found = self.first(promised(factor), (t, self.period), x, &[], &[]).ok()?;
             Some(arrived(factor, found))
         };
         let sooner = |factor: f64, (before, plan): &(f64, Witness)| {
@@ -1169,8 +1184,8 @@ impl AssuredFilter {
                 self.beside(promised(factor), (t, self.period), x, &[], plan, factor / before).ok()?;
             Some(arrived(factor, found))
         };
-        let found = if may_be { find(1.0, &SHORTER) } else { None };
-        least_factor(self.longest(longest, |_| true), found, |factor| find(factor, &[]), sooner)
+        let found = first.map(|first| arrived(1.0, first));
+        least_factor(self.longest(longest, |_| true), found, find, sooner)
     }
 
     /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
@@ -1644,29 +1659,19 @@ fn least_factor<T>(
     const FINE: f64 = 1.05;
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
-    // Twice as long until there is one, or half as long until there is none.
+    // Twice as long until there is one; then by half sooner, and by ever less where none is found.
     let longest = longest.min(MOST);
-    let (mut low, mut high) = (1.0, 1.0);
-    if let Some(found) = &mut found {
-        high = found.0.min(1.0);
-        while high > LEAST
-            && let Some(half) = sooner(0.5 * high, found)
-        {
-            high = half.0.min(0.5 * high);
-            *found = half;
-        }
-        low = 0.5 * high;
-    }
+    let (mut low, mut high) = (0.0, 1.0);
     while found.is_none() && high < longest {
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let mut found = found?;
-    while found.0 > FINE * low {
-        let middle = elementary::sqrt(low * found.0);
-        match sooner(middle, &found) {
+    let (mut found, mut part) = (found?, 0.5);
+    while FINE * part < 1.0 && found.0 > LEAST {
+        let factor = part * found.0;
+        match if factor > low { sooner(factor, &found) } else { None } {
             Some(nearer) => found = nearer,
-            None => low = middle,
+            None => part = elementary::sqrt(part),
         }
     }
     Some(found)

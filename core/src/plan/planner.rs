@@ -32,7 +32,8 @@ const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
 /// The same for guesses beside a plan that was found.
-const BESIDE: &[(usize, u32)] = &[(3, 2), (1, 6)];
+const BESIDE_GRIDS: usize = 2;
+const BESIDE: &[(usize, u32)] = &[(3, 3), (2, 12)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
@@ -264,7 +265,8 @@ impl<'a> Planner<'a> {
         let is_dated = self.last(t) > t || horizon.is_some();
         let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
         let slow = Some((SLOW, UNDATED)).filter(|_| is_dated && horizon.is_none());
-        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer);
+        let most = if self.beside.is_some() { BESIDE_GRIDS } else { usize::MAX };
+        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer).take(most);
         for ((part, holds), undated) in grids {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
