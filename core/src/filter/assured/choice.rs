@@ -7,6 +7,8 @@ use crate::scalar::all_finite;
 
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
+/// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow.
+const FAR: f64 = 0.5;
 /// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder.
 const EASE: f64 = 2.0;
 /// And in units of the largest u_ref so far.
@@ -150,7 +152,15 @@ impl AssuredFilter {
                 self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
             };
             let has_margin = |at: Tightest| at.slack >= margin(&at);
-            witness.effort <= comfort && (!reached || witness.tightest.is_none_or(has_margin))
+            let is_far = |at: Tightest| {
+                let h = self.filter().report().barriers[at.barrier].h;
+                at.slack >= (FAR * h).max(margin(&at))
+            };
+            match reached {
+                true if witness.effort > comfort => witness.tightest.is_none_or(is_far),
+                true => witness.tightest.is_none_or(has_margin),
+                false => witness.effort <= comfort,
+            }
         };
         let behind = |plan: &Plan, u: &[f64]| planner.behind(plan, t, x, u).ok();
         let passed = if wanted == wish { Driver::Reference } else { Driver::Eased };
