@@ -317,6 +317,8 @@ pub struct AssuredFilter {
     bounds: Bounds,
     period: f64,
     horizon: Option<f64>,
+    /// The most quadratic programs of a search at a sample after the first.
+    programs: u32,
     policies: Vec<Policy>,
     /// Pairs of barriers whose sets have no state in common.
     apart: Vec<[usize; 2]>,
@@ -457,6 +459,8 @@ impl Rows {
 impl AssuredFilter {
     /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
     pub const LONGEST: f64 = 16.0;
+    /// The default of [`Self::search_budget`].
+    pub const PROGRAMS: u32 = 3;
 
     /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0; or [`Pace`] says more.
     ///
@@ -495,6 +499,7 @@ impl AssuredFilter {
             bounds,
             period,
             horizon,
+            programs: Self::PROGRAMS,
             policies: Vec::new(),
             apart: Vec::new(),
             expected: None,
@@ -553,6 +558,20 @@ impl AssuredFilter {
     pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
         self.policies.push(Box::new(policy));
         self
+    }
+
+    /// Sets the most quadratic programs, > 0, of a search for a plan at one sample; it goes on at the next. A lost plan and one
+    /// behind u_ref are sought so. The first sample's search goes on to its end, as that of a sample that comes at another time
+    /// than was said, and that of a plan with a [horizon](Pace::horizon).
+    ///
+    /// # Errors
+    ///
+    /// No program at all.
+    pub fn search_budget(self, programs: u32) -> Result<Self, Error> {
+        match programs {
+            0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
+            _ => Ok(Self { programs, ..self }),
+        }
     }
 
     /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
@@ -1514,7 +1533,7 @@ impl AssuredFilter {
             reached: self.next.promises.iter().flatten().all(|promise| promise.from <= t),
         };
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            let (planner, reached) = (planner.irregular(!is_regular).hurried(), wish.reached);
+            let (planner, reached) = (planner.irregular(!is_regular).hurried(self.programs), wish.reached);
             let chosen = self.chosen(&planner, (t, x), wish, &mut way)?;
             Ok(self.smoothed(&planner, (t, x), chosen, reached))
         });
@@ -1543,12 +1562,13 @@ impl AssuredFilter {
                 let mut promises = self.next.promises.clone();
                 promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
                 self.planned(&promises, (t, hold), u, |planner| match is_spread {
-                    true => {
-                        planner.hurried().regained(&self.next.plan, t, x, &mut regained).map_err(|left| {
+                    true => planner
+                        .hurried(self.programs)
+                        .regained(&self.next.plan, t, x, &mut regained)
+                        .map_err(|left| {
                             goes_on = left;
                             failure
-                        })
-                    }
+                        }),
                     false => planner.beyond(&self.next.plan.witness).search(t, x),
                 })
             }

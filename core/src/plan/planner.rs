@@ -137,8 +137,10 @@ pub struct Planner<'a> {
     size: f64,
     /// Whether samples come as those before did.
     regular: bool,
-    /// Whether a trial may not take much longer than the plan at hand.
+    /// Whether a trial may not take much longer than the plan at hand, and the quadratic programs of a search that goes on at the
+    /// next sample.
     hurried: bool,
+    programs: u32,
     integral: Option<Integral>,
     policies: &'a [Policy],
     /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
@@ -169,6 +171,7 @@ impl<'a> Planner<'a> {
             size,
             regular: true,
             hurried: false,
+            programs: u32::MAX,
             integral: None,
             policies: &[],
             horizon: None,
@@ -183,10 +186,11 @@ impl<'a> Planner<'a> {
         Self { regular: !irregular, ..self }
     }
 
-    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at hand.
+    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at
+    /// hand, and a search goes on at the next sample after so many quadratic programs.
     #[must_use]
-    pub fn hurried(self) -> Self {
-        Self { hurried: true, ..self }
+    pub fn hurried(self, programs: u32) -> Self {
+        Self { hurried: true, programs, ..self }
     }
 
     /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of

@@ -14,10 +14,8 @@ use crate::scalar::all_finite;
 
 /// The holds of the grid until the last deadline and after it.
 const HOLDS: [usize; 2] = [20, 10];
-/// The quadratic programs of a sample, between two checks.
-const PROGRAMS: [u32; 2] = [2, 1];
-/// The samples for which a guess is followed.
-const FOLLOWED: u32 = 5;
+/// The quadratic programs for which a guess is followed.
+const FOLLOWED: u32 = 15;
 /// What is left of a violation after a sample where it is worth another.
 const LEFT: f64 = 0.8;
 /// The parts of the time until the last deadline for which a guess holds the input that is wanted.
@@ -30,7 +28,7 @@ type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sought {
-    /// The number of the guess, and of the samples for which it was followed.
+    /// The number of the guess, and of the quadratic programs for which it was followed.
     guess: u32,
     followed: u32,
     /// The end of each hold in s and its input, and how much is violated with them.
@@ -51,11 +49,12 @@ impl Sought {
     }
 
     /// Goes on after a sample with `descent` on the grid `times`, or to the next guess. Whether there is one.
-    fn next(&mut self, descent: Option<(&Descent, &[f64])>) -> bool {
-        self.followed += 1;
+    fn next(&mut self, programs: u32, descent: Option<(&Descent, &[f64])>) -> bool {
+        let is_first = self.followed == 0;
+        self.followed = self.followed.saturating_add(programs);
         if let Some((Descent { best, .. }, times)) = descent
             && self.followed < FOLLOWED
-            && best.violation < if self.followed > 1 { LEFT * self.violation } else { f64::INFINITY }
+            && best.violation < if is_first { f64::INFINITY } else { LEFT * self.violation }
         {
             self.violation = best.violation;
             let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
@@ -117,7 +116,9 @@ impl Planner<'_> {
             Some(Err(descent)) => Err(Some(descent)),
             None => Err(None),
         };
-        found.map_err(|descent| sought.next(descent.as_ref().map(|(descent, times)| (descent, &times[..]))))
+        found.map_err(|descent| {
+            sought.next(self.programs, descent.as_ref().map(|(descent, times)| (descent, &times[..])))
+        })
     }
 
     /// A plan from `x` at `t`, by the next few steps of such a search: where `plan` is one no more.
@@ -129,8 +130,8 @@ impl Planner<'_> {
         let rest = plan.brake.as_ref().map(|brake| brake.input.clone()).unwrap_or_default();
         match self.step_on(plan, (t, x), &rest, sought) {
             Some(Ok(plan)) => Ok(plan),
-            Some(Err((descent, times))) => Err(sought.next(Some((&descent, &times)))),
-            None => Err(sought.next(None)),
+            Some(Err((descent, times))) => Err(sought.next(self.programs, Some((&descent, &times)))),
+            None => Err(sought.next(self.programs, None)),
         }
     }
 
@@ -192,7 +193,8 @@ impl Planner<'_> {
             quick: true,
         };
         let mut descent = Descent::from(search.run(inputs));
-        for iterations in PROGRAMS {
+        // Half of them, a check, and the others.
+        for iterations in [self.programs.div_ceil(2), self.programs / 2] {
             search.improve(&mut descent, iterations);
             if descent.best.violation > WORTH {
                 continue;
