@@ -1940,8 +1940,8 @@ fn at_the_edge_the_input_does_not_chatter() {
         last = u;
         x = Vehicle::PointMass.move_by(x, u, PERIOD);
     }
-    // It comes to rest, once; it moved 14 times as far while the wish was followed to the margin of plans.
-    assert!(moved < 2.0 * BOUND, "{moved}");
+    // From the wish to a hard stop, and to rest, once; it moved ten times as far while the wish was followed to the margin of plans.
+    assert!(moved < 3.0 * BOUND, "{moved}");
 }
 
 /// On the way, a wish that never lets go is followed as far as a plan allows. The input slides there, and does not jump between

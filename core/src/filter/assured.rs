@@ -344,17 +344,22 @@ struct First {
 }
 
 /// How an input moves with its sample, as long as the piece of the filter is the same: with `rows` times the answer of the rows
-/// and `wish` times u_ref. The rest, that of a plan, is held.
+/// and `wish` times u_ref. The rest, that of a plan, is held, and so is each input that is `held`.
 #[derive(Clone, Copy)]
 struct Piece {
     rows: f64,
     wish: f64,
+    held: [bool; MAX_INPUTS],
 }
 
 impl Piece {
-    const WISH: Self = Self { rows: 0.0, wish: 1.0 };
-    const ROWS: Self = Self { rows: 1.0, wish: 0.0 };
-    const PLAN: Self = Self { rows: 0.0, wish: 0.0 };
+    const WISH: Self = Self::mixed(0.0, 1.0);
+    const ROWS: Self = Self::mixed(1.0, 0.0);
+    const PLAN: Self = Self::mixed(0.0, 0.0);
+
+    const fn mixed(rows: f64, wish: f64) -> Self {
+        Self { rows, wish, held: [false; MAX_INPUTS] }
+    }
 }
 
 /// The filter inside, whose rows are asked first.
@@ -863,10 +868,10 @@ impl AssuredFilter {
             Rows::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
             Rows::Integrated(own) => own.differentiate_rate(t, hold, x, u_ref, direction, out),
         }?;
-        let Piece { rows, wish } = self.piece;
-        if unknown.is_none() && rows != 1.0 {
+        let Piece { rows, wish, held } = self.piece;
+        if unknown.is_none() && (rows != 1.0 || held.contains(&true)) {
             let wished = self.rows.moves(hold, u_ref, direction.u);
-            let du = core::array::from_fn(|i| rows * out.u[i] + wish * wished[i]);
+            let du = core::array::from_fn(|i| if held[i] { 0.0 } else { rows * out.u[i] + wish * wished[i] });
             let x = &self.rows.state(x)[..];
             let dx = &self.rows.direction(direction.x)[..];
             if let Err(unknown) = self.rows.filter().carry(t, (x, dx), (&u[..inputs], du), out) {
@@ -1161,7 +1166,7 @@ impl AssuredFilter {
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
-    /// twentieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
+    /// fiftieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
     /// deadlines, nor where one would come after the end of its barrier.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
         self.appraise(t, x, longest).1
@@ -1192,19 +1197,20 @@ impl AssuredFilter {
         let x = &self.rows.state(x)[..];
         let promised = |factor: f64| self.promises(t, x, |_| factor);
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
-            (factor * self.arrival(&promises, &plan, t, x), plan.witness)
+            (factor * self.arrival(&promises, &plan, t, x), plan)
         };
         let find = |factor: f64| {
             let found = self.first(promised(factor), (t, self.period), x, &[], &[]).ok()?;
             Some(arrived(factor, found))
         };
-        let sooner = |factor: f64, (before, plan): &(f64, Witness)| {
+        let sooner = |factor: f64, (before, plan): &(f64, Plan)| {
             let found =
                 self.beside(promised(factor), (t, self.period), x, &[], plan, factor / before).ok()?;
             Some(arrived(factor, found))
         };
         let found = first.map(|first| arrived(1.0, first));
-        least_factor(self.longest(longest, |_| true), found, find, sooner)
+        let (factor, plan) = least_factor(self.longest(longest, |_| true), found, find, sooner)?;
+        Some((factor, plan.witness))
     }
 
     /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
@@ -1277,7 +1283,7 @@ impl AssuredFilter {
             let promised = |factor: f64| self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
             let later = |factor: f64| search(promised(factor), &[]).ok().map(|first| (factor, first));
             let sooner = |factor: f64, (before, first): &(f64, First)| {
-                let (promises, plan) = (promised(factor), &first.plan.witness);
+                let (promises, plan) = (promised(factor), &first.plan);
                 self.beside(promises, (t, hold), x, u, plan, factor / before)
                     .ok()
                     .map(|first| (factor, first))
@@ -1358,7 +1364,7 @@ impl AssuredFilter {
         at: (f64, f64),
         x: &[f64],
         u: &[f64],
-        plan: &Witness,
+        plan: &Plan,
         factor: f64,
     ) -> Result<First, Failure> {
         if self.is_ruled_out(&promises, at.0, x) {
@@ -1667,7 +1673,7 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
     h
 }
 
-/// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
+/// The least factor for which `find` finds something, to a fiftieth, and that; `None` beyond `longest`. `found` is what it
 /// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one. `sooner` finds
 /// something beside what was found.
 fn least_factor<T>(
@@ -1676,7 +1682,7 @@ fn least_factor<T>(
     find: impl Fn(f64) -> Option<(f64, T)>,
     sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
-    const FINE: f64 = 1.05;
+    const FINE: f64 = 1.02;
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
     // Twice as long until there is one; then by half sooner, and by ever less where none is found.

@@ -33,7 +33,7 @@ const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
 /// The same for guesses beside a plan that was found.
 const BESIDE_GRIDS: usize = 2;
-const BESIDE: &[(usize, u32)] = &[(3, 3), (2, 12)];
+const BESIDE: &[(usize, u32)] = &[(3, 4), (2, 20)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
@@ -147,7 +147,7 @@ pub struct Planner<'a> {
     horizon: Option<f64>,
     before: Option<&'a Witness>,
     /// A plan for other deadlines with which alone a search begins, and how many times as long these are.
-    beside: Option<(&'a Witness, f64)>,
+    beside: Option<(&'a Plan, f64)>,
 }
 
 impl<'a> Planner<'a> {
@@ -227,7 +227,7 @@ impl<'a> Planner<'a> {
 
     /// The same planner for deadlines that are `factor` times as long as those of `plan`, with which alone a search begins.
     #[must_use]
-    pub fn beside(self, plan: &'a Witness, factor: f64) -> Self {
+    pub fn beside(self, plan: &'a Plan, factor: f64) -> Self {
         Self { beside: Some((plan, factor)), ..self }
     }
 
@@ -807,12 +807,24 @@ impl<'a> Planner<'a> {
     fn stretched(
         &self,
         model: &Model<'_>,
-        plan: &Witness,
+        plan: &Plan,
         factor: f64,
         guide: &Guide,
         times: &[f64],
     ) -> [Vec<Vec<f64>>; 3] {
         let (rest, begin) = (guide.rest(model), times[0]);
+        // Without the feedback of its walk, where it has a reference.
+        let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
+        let inputs = match &plan.reference {
+            Some(reference) => reference.times[1..]
+                .iter()
+                .copied()
+                .zip(reference.inputs.iter().map(padded))
+                .chain([(f64::INFINITY, padded(&rest))])
+                .collect(),
+            None => plan.witness.inputs.clone(),
+        };
+        let plan = Witness { inputs, ..Witness::default() };
         let at = |t: f64| begin + (t - begin) / factor;
         [1.0, factor, factor * factor].map(|smaller| {
             let held = |hold: &[f64]| {

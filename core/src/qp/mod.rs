@@ -148,15 +148,6 @@ impl Bounds {
         parts.fold(0.0, f64::max)
     }
 
-    /// The largest component of the way between two inputs, as a part of the width of its bounds; 0 where none has both.
-    pub fn apart(&self, a: &[f64], b: &[f64]) -> f64 {
-        let parts = a.iter().zip(b).zip(self.min.iter().zip(&self.max)).map(|((a, b), (min, max))| {
-            let part = (a - b).abs() / (max - min);
-            if part.is_finite() { part } else { 0.0 }
-        });
-        parts.fold(0.0, f64::max)
-    }
-
     /// [`Self::contain`], unrolled.
     #[inline(always)]
     pub(crate) fn contain_all<const M: usize>(&self, u: &[f64; M]) -> bool {

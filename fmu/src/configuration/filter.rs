@@ -249,7 +249,7 @@ pub(super) static SECTION: Section = Section {
             Key::new(
                 "search_budget",
                 Count(1, MOST_PROGRAMS),
-                Some("3"),
+                Some("3 where plans are followed"),
                 "the most quadratic programs of a search for a plan at one step after the first; it goes on at the next step, while \
                  the plan at hand drives. More find a way for u_ref, or a lost plan again, in fewer steps, each of which may \
                  take longer: about 0.3 ms each for a vehicle, the time growing with states, inputs and barriers",

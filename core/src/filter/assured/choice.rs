@@ -186,7 +186,7 @@ impl AssuredFilter {
         {
             let chosen = |driver, wish, witness| Chosen {
                 driver,
-                piece: Piece { rows: 1.0 - wish, wish },
+                piece: Piece::mixed(1.0 - wish, wish),
                 share: 0.0,
                 witness,
                 plan: None,
@@ -215,8 +215,7 @@ impl AssuredFilter {
         let far = if to_rows { rows } else { wanted };
         let mixed = |share: f64, witness, plan| {
             let part = 1.0 - share;
-            let piece =
-                if to_rows { Piece { rows: part, wish: 0.0 } } else { Piece { rows: 0.0, wish: part } };
+            let piece = if to_rows { Piece::mixed(part, 0.0) } else { Piece::mixed(0.0, part) };
             let driver = match share {
                 0.0 if to_rows => Driver::Rows,
                 0.0 => passed,
@@ -299,16 +298,20 @@ impl AssuredFilter {
         chosen: Chosen,
         reached: bool,
     ) -> Chosen {
-        let Chosen { driver, witness, .. } = &chosen;
-        let (to, last) = (witness.inputs[0].1, &self.filter().state.input);
-        let far = self.bounds.apart(&last[..], &to[..]);
-        if *driver == Driver::Reference || self.commitment.standing != Standing::Assured || far <= SMOOTH {
+        let Chosen { driver, mut piece, ref witness, .. } = chosen;
+        let (mut u, last, inputs) = (witness.inputs[0].1, &self.filter().state.input, self.rows.dims()[1]);
+        for (i, (u, last)) in u.iter_mut().zip(last).enumerate().take(inputs) {
+            let most = SMOOTH * (self.bounds.max[i] - self.bounds.min[i]);
+            let smooth = u.max(last - most).min(last + most);
+            (piece.held[i], *u) = (smooth != *u, smooth);
+        }
+        let is_smooth = !piece.held.contains(&true);
+        if driver == Driver::Reference || self.commitment.standing != Standing::Assured || is_smooth {
             return chosen;
         }
-        let smooth: [f64; MAX_INPUTS] = core::array::from_fn(|i| last[i] + SMOOTH / far * (to[i] - last[i]));
-        let smooth = &smooth[..self.rows.dims()[1]];
+        let smooth = &u[..inputs];
         let plan = chosen.plan.as_ref().unwrap_or(&self.next.plan);
-        let (driver, piece) = (Driver::Between, Piece::PLAN);
+        let driver = Driver::Between;
         if let Ok(witness) = planner.behind(plan, t, x, smooth) {
             return Chosen { driver, piece, witness, ..chosen };
         }
