@@ -316,7 +316,9 @@ impl AssuredFilter {
             return Chosen { driver, piece, witness, ..chosen };
         }
         let renewed = || planner.renewed(plan, t, x, smooth, &mut Sought::default()).ok();
-        match (!reached).then(renewed).flatten() {
+        // Where u_ref has just passed, one behind it is sought first.
+        let may_renew = !reached && self.commitment.share > GIVEN_BACK;
+        match may_renew.then(renewed).flatten() {
             Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
             None => chosen,
         }
