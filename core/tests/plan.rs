@@ -219,7 +219,6 @@ fn the_soonest_deadline_is_taken_and_kept() {
                 // 20 m there and to a stop take 4.5 s at 4 m/s2; the disc's edge is nearer.
                 deadline = goal.time_left;
                 assert!((3.0..5.5).contains(&deadline), "{deadline}");
-                assert!(goal.on_course, "{goal:?}");
             }
             assert!((goal.time_left - (deadline - t).max(0.0)).abs() < 1e-9, "{t}: {goal:?}");
             x = Vehicle::PointMass.move_by(x, u, PERIOD);
@@ -461,6 +460,73 @@ fn judged(seed: u64, random: &mut Random, course: &mut Course<'_>) -> Outcome {
     outcome
 }
 
+/// Drives to the goal, beyond the bounds of the inputs where it is far.
+fn eager(vehicle: Vehicle, x: [f64; 4], [gain, brake, fastest]: [f64; 3]) -> [f64; 2] {
+    let [dx, dy] = [GOAL.0[0] - x[0], GOAL.0[1] - x[1]];
+    let far = dx.hypot(dy);
+    let speed = (gain * far).min(fastest);
+    match vehicle {
+        Vehicle::PointMass => {
+            [brake * (speed * dx / far.max(1e-9) - x[2]), brake * (speed * dy / far.max(1e-9) - x[3])]
+        }
+        Vehicle::Unicycle => {
+            let turn = dy.atan2(dx) - x[2];
+            let turn = turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+            [brake * (speed * turn.cos().max(0.0) - x[3]), if far < 0.7 { 0.0 } else { 2.0 * turn }]
+        }
+    }
+}
+
+/// A controller that keeps every promise by itself is left alone, however much quicker than the first plan it is, and also where its
+/// input is beyond the bounds. Until arrival no more than 4 % of the steps are changed, and it arrives within 2 % of its own time.
+#[test]
+fn a_controller_that_is_safe_by_itself_is_left_alone() {
+    let (deadline, bounds, seconds) = (12.0, [3.0, 1.2], 13.0);
+    let (mut runs, mut changed, mut before) = (0, 0, 0);
+    for seed in 1..=24_u64 {
+        let random = &mut seeded(seed);
+        let vehicle = if seed.is_multiple_of(2) { Vehicle::PointMass } else { Vehicle::Unicycle };
+        let start = [random.between(-3.0, 3.0), random.between(-9.0, 3.0), 0.5, random.between(0.0, 2.0)];
+        let gains = [random.between(0.5, 1.2), random.between(1.2, 2.5), random.between(3.0, 8.0)];
+        let drive = |filter: Option<&mut AssuredFilter>| {
+            let (mut x, mut arrival, mut nearest, mut changes, mut filter) =
+                (start, None, f64::INFINITY, 0, filter);
+            for k in 0..(seconds / PERIOD) as u32 {
+                let t = f64::from(k) * PERIOD;
+                let u_ref = eager(vehicle, x, gains);
+                let within = [0, 1].map(|i| u_ref[i].clamp(-bounds[i], bounds[i]));
+                let mut u = within;
+                if let Some(filter) = filter.as_deref_mut() {
+                    let assurance = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+                    assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
+                }
+                changes += u32::from(arrival.is_none() && u != within);
+                for part in 1..=10 {
+                    x = vehicle.move_by(x, u, PERIOD / 10.0);
+                    let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
+                    nearest = nearest.min(distance(OBSTACLE.0) - OBSTACLE.1);
+                    let t = t + PERIOD / 10.0 * f64::from(part);
+                    let inside = GOAL.1 - distance(GOAL.0);
+                    arrival = if inside < 0.0 { None } else { arrival.or(Some(t)) };
+                    nearest = if t < deadline { nearest } else { nearest.min(inside) };
+                }
+            }
+            (arrival, nearest, changes)
+        };
+        let (Some(alone), 0.1.., _) = drive(None) else { continue };
+        let (arrival, nearest, changes) = drive(Some(&mut vehicle.assured(deadline, bounds)));
+        assert!(
+            nearest >= 0.0 && arrival.is_some_and(|t| t <= 1.02 * alone),
+            "{seed}: {alone} {arrival:?} {nearest}"
+        );
+        runs += 1;
+        changed += changes;
+        before += (alone / PERIOD) as u32;
+    }
+    println!("{runs} runs that are safe by themselves: {changed} of {before} steps until arrival changed");
+    assert!(runs >= 8 && changed * 25 <= before, "{runs} runs, {changed} of {before} changed");
+}
+
 fn seeded(seed: u64) -> Random {
     Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed))
 }
@@ -593,12 +659,13 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
 /// change.
 #[test]
 fn a_plan_of_another_period_ends_as_irregular() {
-    let mut seen = 0;
+    let (mut seen, vehicle) = (0, Vehicle::Unicycle);
+    let soonest =
+        vehicle.assured(6.0, [6.0, 2.0]).soonest(0.0, &[0.0, 0.0, -0.4, 1.0], 1.0).expect("a plan").0;
     for seed in 1..=12_u64 {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
-        let vehicle = Vehicle::Unicycle;
         // So tight that the plan drives.
-        let deadline = random.between(4.5, 6.0);
+        let deadline = 6.0 * soonest * random.between(1.0, 1.05);
         let mut filter = vehicle.assured(deadline, [6.0, 2.0]);
         let (mut t, mut x, mut u) = (0.0, [0.0, 0.0, -0.4, 1.0], [0.0; 2]);
         let other = random.between(0.3, 2.7) * PERIOD;
@@ -936,7 +1003,8 @@ fn derivatives_are_those_of_the_piece_in_force() {
                     let by = (high[i] - low[i]) / (2.0 * STEP);
                     (found[i] - by).abs() <= ALLOWED * (1.0 + by.abs())
                 };
-                if before != driver || after != driver || bend > 1e-3 * STEP {
+                let at_bound = u_ref.iter().zip(bounds).any(|(u, bound)| (u.abs() - bound).abs() <= STEP);
+                if before != driver || after != driver || bend > 1e-3 * STEP || at_bound {
                     // Another piece begins within the step.
                     elsewhere += 1;
                 } else if (0..3).all(is_near) {
@@ -1872,12 +1940,12 @@ fn at_the_edge_the_input_does_not_chatter() {
         last = u;
         x = Vehicle::PointMass.move_by(x, u, PERIOD);
     }
-    // It comes to rest, once; it moved 14 times as far while the wish was followed to the margin of plans.
-    assert!(moved < 2.0 * BOUND, "{moved}");
+    // From the wish to a hard stop, and to rest, once; it moved ten times as far while the wish was followed to the margin of plans.
+    assert!(moved < 3.0 * BOUND, "{moved}");
 }
 
-/// On the way, a wish that never lets go is followed as far as a plan allows. The input slides there, and does not jump between
-/// the wish and the plan: three times as often it did.
+/// On the way, a wish that never lets go is followed as far as a plan allows. The input slides there, and jumps seldom by more than
+/// 30 % of its range between the wish and the plan; all its changes together are no more than ten times the range.
 #[test]
 fn on_the_way_the_input_does_not_jump_to_and_fro() {
     const PERIOD: f64 = 0.01;
@@ -1894,17 +1962,20 @@ fn on_the_way_the_input_does_not_jump_to_and_fro() {
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
-    let (mut x, mut u, mut last, mut jumps) = ([0.0, 0.0, -2.0, 3.0], [0.0; 2], [0.0; 2], 0);
+    let (mut x, mut u, mut last) = ([0.0, 0.0, -2.0, 3.0], [0.0; 2], [0.0; 2]);
+    let (mut jumps, mut variation) = (0, 0.0);
     for k in 0..(15.0 / PERIOD) as usize {
         let t = k as f64 * PERIOD;
         let wish = [0.5 * (6.0 - x[3]), 0.2];
         let assurance = *filter.step(t, &x, &wish, &mut u).expect("right dimensions");
         assert!(assurance.is_assured(), "at {t}: {assurance:?}");
-        jumps += u32::from((u[0] - last[0]).abs() > 0.3);
+        let change = (u[0] - last[0]).abs() / (2.0 * BOUND);
+        jumps += u32::from(change > 0.3);
+        variation += change;
         last = u;
         x = Vehicle::Unicycle.move_by(x, u, PERIOD);
     }
-    assert!(jumps < 50, "{jumps} jumps");
+    assert!(jumps <= 5 && variation <= 10.0, "{jumps} jumps, {variation}");
 }
 
 /// What is small beside the way of one hold: on a way 3 m to either side of the first axis, things at a place, so far beside it

@@ -13,7 +13,9 @@ use serde::Serialize;
 
 use super::check;
 use crate::codes;
-use crate::coupling::{self, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System};
+use crate::coupling::{
+    self, Interference, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System,
+};
 use crate::error::Error;
 use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
@@ -102,6 +104,7 @@ struct Report {
     wall_time: f64,
     steps_per_second: f64,
     promises: Vec<Promise>,
+    interference: Vec<Interference>,
     signals: Vec<SignalReport>,
     files: Vec<String>,
     notes: Vec<String>,
@@ -377,6 +380,7 @@ fn summary(
         wall_time: outcome.statistics.wall_time.as_secs_f64(),
         steps_per_second: outcome.statistics.steps_per_second(),
         promises: outcome.promises,
+        interference: outcome.interference,
         signals: (0..recording.columns().len()).map(signal).collect(),
         files,
         notes,
@@ -416,7 +420,8 @@ fn text(report: &Report, signals: bool) -> String {
             Kept::Kept | Kept::Broken => output::verdict(&sentence, verdict == Kept::Kept),
             Kept::Open | Kept::NothingPromised => sentence,
         };
-        text += &format!("\n\n{}{sentence}", promises_text(&report.promises));
+        let changed: String = report.interference.iter().map(|of| of.text() + "\n").collect();
+        text += &format!("\n\n{}{changed}{sentence}", promises_text(&report.promises));
     }
     text
 }

@@ -103,15 +103,13 @@ pub(super) fn find(
             .tightest
             .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
     };
-    let configured = filter.foresee(t, x0, 1.0);
+    let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
+    let (configured, soonest) = match has_deadline {
+        true => filter.appraise(t, x0, AssuredFilter::LONGEST),
+        false => (filter.foresee(t, x0, 1.0), None),
+    };
     let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
-    let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let soonest = match configured {
-        _ if !has_deadline => None,
-        Ok(_) => filter.soonest(t, x0, AssuredFilter::LONGEST),
-        Err(_) => filter.soonest_later(t, x0, AssuredFilter::LONGEST),
-    };
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
     // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
     let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());

@@ -23,6 +23,7 @@ use punctual_fmu::configuration::Configuration;
 use punctual_fmu::text::number;
 
 use super::grid::Grid;
+use super::interference::{self, Interference};
 use super::layout::{Choice, Layout, Recorder};
 use super::model::{Model, Reader};
 use super::network::{self, Network};
@@ -116,6 +117,8 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// The name of each slot.
     names: Vec<String>,
     promises: Vec<Watched>,
+    /// How much filters change what is wanted.
+    interference: Vec<interference::Watched>,
     /// Whether each slot has been reported as not finite.
     reported: Vec<bool>,
     notes: Vec<String>,
@@ -152,6 +155,8 @@ pub struct Outcome {
     pub statistics: Statistics,
     /// The promises of the filters, in the order of the components.
     pub promises: Vec<Promise>,
+    /// How much each filter changed what was wanted.
+    pub interference: Vec<Interference>,
     /// Notes for the user: signals read late, values that are not finite, warnings.
     pub notes: Vec<String>,
     /// The FMI call that ended the run before its stop time, if one did. The rows until then are kept.
@@ -251,6 +256,8 @@ impl<P: Participant> Simulation<P> {
         let mut read = recorded.clone();
         let of_plans = |ports: &promises::Ports| ports.plans.into_iter().flatten();
         read.extend(watched.iter().flat_map(|p| p.fields.into_iter().chain([p.status]).chain(of_plans(p))));
+        let interference = interference::ports(system, descriptions, &links);
+        read.extend(interference.iter().flat_map(interference::Ports::all));
         let mut layout = Layout::default();
         let mut groups = Vec::new();
         for (component, description) in descriptions.iter().enumerate() {
@@ -308,6 +315,10 @@ impl<P: Participant> Simulation<P> {
             values: vec![0.0; layout.ports.len()],
             reported: vec![false; layout.ports.len()],
             promises: watched.iter().filter_map(|ports| Watched::new(&layout, ports)).collect(),
+            interference: interference
+                .iter()
+                .filter_map(|ports| interference::Watched::new(&layout, ports))
+                .collect(),
             names: layout.names,
             notes: standing,
             warnings,
@@ -427,7 +438,15 @@ impl<P: Participant> Simulation<P> {
         self.notes.extend(self.promises.iter().filter_map(Watched::note));
         let statistics = Statistics { steps, final_time: self.grid.time(steps), wall_time };
         let promises = self.promises.iter().map(Watched::promise).collect();
-        Ok(Outcome { recording, statistics, promises, notes: self.notes.clone(), failure: ran.err() })
+        let interference = self.interference.iter().map(interference::Watched::interference).collect();
+        Ok(Outcome {
+            recording,
+            statistics,
+            promises,
+            interference,
+            notes: self.notes.clone(),
+            failure: ran.err(),
+        })
     }
 
     fn run_gauss_seidel(&mut self, recorder: &mut Recorder<'_>) -> Result<(), Error> {
@@ -531,6 +550,7 @@ impl<P: Participant> Simulation<P> {
             });
             self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
+        self.interference.iter_mut().for_each(interference::Watched::reset);
         // Set start values, and go to initialization mode.
         let used = std::mem::replace(&mut self.used, true);
         for member in &mut self.members {
@@ -580,6 +600,7 @@ impl<P: Participant> Simulation<P> {
     fn take(&mut self, recorder: &mut Recorder<'_>, k: u64, time: f64) {
         recorder.row(k, time, &self.values);
         self.promises.iter_mut().for_each(|watched| watched.see(time, &self.values));
+        self.interference.iter_mut().for_each(|watched| watched.see(&self.values));
     }
 
     fn read_states(&mut self, c: usize, time: f64) -> Result<(), Error> {

@@ -299,7 +299,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
 }
 
 /// Whether the FMU is a filter.
-fn is_filter(description: &Description) -> bool {
+pub(super) fn is_filter(description: &Description) -> bool {
     let promises = description.variables.iter().any(|v| v.name.ends_with(".unmet_steps"));
     promises && description.index_of("status").is_some()
 }

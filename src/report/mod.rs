@@ -132,6 +132,9 @@ fn head(file: &str, parts: &[Part<'_>], outcome: &Outcome, notes: &[String]) -> 
         }
         Some(verdict) => html += &verdicts(parts, outcome, verdict),
     }
+    for of in &outcome.interference {
+        let _ = writeln!(html, "<p>{}</p>", escape(&of.text()));
+    }
     html += &peaks(parts, &outcome.recording);
     let notes: String = notes.iter().map(|note| format!("<li>{}</li>\n", escape(note))).collect();
     if !notes.is_empty() {

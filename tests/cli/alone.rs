@@ -31,6 +31,34 @@ centre = [5.0, 7.0]
 radius = 2.0
 "#;
 
+/// A wall that is to be kept, and a controller that drives at it, or away from it.
+#[test]
+fn a_run_says_how_much_of_u_ref_was_changed() {
+    let workshop = Workshop::new();
+    let file = "kind = \"filter\"\nx0 = { x = 0.0 }\nu_ref = { u = \"WANTED\" }\n\
+                experiment = { stop_time = 3.0, step_size = 0.02 }\n\
+                [plant]\nstates = [{ name = \"x\" }]\ninputs = [{ name = \"u\", min = -2.0, max = 2.0 }]\n\
+                derivatives = { x = \"u\" }\n[[barrier]]\nname = \"wall\"\nexpression = \"1 - x\"\n";
+    let told = |wanted: &str, json: &[&str]| {
+        workshop.write("my.toml", file.replace("WANTED", wanted));
+        workshop.punctual(["run", "my.toml"].into_iter().chain(json.iter().copied())).success()
+    };
+    let away = told("-0.5", &[]);
+    assert!(away.contains("\nfilter left u_ref as it is at all 151 samples.\nEvery promise"), "{away}");
+    // Twice as much as it may have, of bounds that are 4 apart: 1 of them is a quarter.
+    let report: Value = serde_json::from_str(&told("1.0", &["--json"])).expect("JSON");
+    let of = &report["interference"][0];
+    let [samples, changed] = ["samples", "changed"].map(|key| of[key].as_u64().expect("a number"));
+    let [mean, most] = ["mean", "most"].map(|key| of[key].as_f64().expect("a number"));
+    // It is at the wall after 1 s, and stays there.
+    assert!(samples == 151 && changed > 75 && changed < 140, "{of}");
+    assert!(mean > 0.1 && mean <= most && most <= 0.25 + 1e-9, "{of}");
+    assert_eq!(of["filter"], "filter");
+    let towards = told("1.0", &[]);
+    let shown = format!("\nfilter changed u_ref at {changed} of 151 samples (");
+    assert!(towards.contains(&shown) && towards.contains(" % of the bounds in the mean and "), "{towards}");
+}
+
 #[test]
 fn a_new_file_is_checked_and_run_and_keeps_its_promise() {
     for model in ["unicycle", "expressions"] {

@@ -1,11 +1,14 @@
 //! A filter whose promise has a witness: decided at the first sample, kept within the bounds whatever u_ref is
 //! (`docs/theory.md#witness`).
 
+mod choice;
+
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use self::choice::{Chosen, Way, Wish};
 use super::deviation::Deviation;
 use super::integrator::insert;
 use super::slot::BarrierSlot;
@@ -19,7 +22,7 @@ use crate::elementary;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{Direction, Predict};
 use crate::plan::{
-    Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Tightest, Witness, slopes,
+    Failure, Integral, Limit, ON_TIME, Plan, Planner, Policy, Requirement, Sought, Witness, slopes,
 };
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
@@ -32,14 +35,6 @@ const ROOM: f64 = 0.05;
 const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
 /// Margin of the rows behind which plans are, in units of theirs.
 const AMPLE: f64 = 2.0;
-/// Largest input behind which u_ref passes unchanged where every set has been reached, as a part of its bounds.
-const COMFORTABLE: f64 = 0.5;
-/// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
-const FIRST: f64 = 0.125;
-const BISECTIONS: u32 = 3;
-/// The part of an input that goes back from the plan to the rows at each sample: all of it at once would have the plan take
-/// it again at the next, and the input jump between the two.
-const GIVEN_BACK: f64 = 1.0 / 32.0;
 /// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
 /// makes a refusal longer by as much as the first search.
 const SHORTER: [f64; 1] = [0.8];
@@ -68,14 +63,15 @@ const SHORTEST_INTEGRATED: f64 = 0.125;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Driver {
-    /// u_ref, with a comfortable plan behind it.
+    /// u_ref, with a comfortable plan behind it: the one at hand, that moved in time, or another.
     Reference,
     /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
     #[default]
     Rows,
-    /// The rows, as near to u_ref as a comfortable plan allows.
+    /// As near to u_ref as its bounds, or the rows and a comfortable plan, allow.
     Eased,
-    /// A compromise: the last input towards the rows' answer that has a plan behind it.
+    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, with a plan
+    /// behind it.
     Between,
     /// The plan: nothing else keeps the promise.
     Plan,
@@ -173,9 +169,13 @@ pub struct Commitment {
     /// Where the plan was lost: when, in s, and when another one is next searched for.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     lost: Option<[f64; 2]>,
+    /// The search for another one.
+    regained: Sought,
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     share: f64,
+    /// What is comfortable, and when a plan is next sought behind u_ref.
+    way: Way,
     /// The time in s at which a plan that ends is next tried to be prolonged.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     prolong_at: f64,
@@ -278,8 +278,9 @@ impl From<f64> for Pace {
 ///
 /// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier that
 /// [can be](Self::promised) is promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on
-/// by its rows. Once promised, every input has a verified plan behind it. It is u_ref, or the answer of the rows, or a
-/// compromise, or where nothing else keeps the promise the next input of the plan itself.
+/// by its rows. Once promised, every input has a verified plan behind it. It is u_ref wherever a plan is found behind that; else a
+/// compromise, once every set has been reached with the answer of the rows; or where nothing else keeps the promise the next input
+/// of the plan itself.
 ///
 /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
 /// differ, and by half as much again a set might be left before the next sample, the promise is withdrawn for that sample. A sample
@@ -316,6 +317,8 @@ pub struct AssuredFilter {
     bounds: Bounds,
     period: f64,
     horizon: Option<f64>,
+    /// The most quadratic programs of a search at a sample after the first.
+    programs: u32,
     policies: Vec<Policy>,
     /// Pairs of barriers whose sets have no state in common.
     apart: Vec<[usize; 2]>,
@@ -341,16 +344,22 @@ struct First {
 }
 
 /// How an input moves with its sample, as long as the piece of the filter is the same: with `rows` times the answer of the rows
-/// and `wish` times u_ref. The rest, that of a plan, is held.
+/// and `wish` times u_ref. The rest, that of a plan, is held, and so is each input that is `held`.
 #[derive(Clone, Copy)]
 struct Piece {
     rows: f64,
     wish: f64,
+    held: [bool; MAX_INPUTS],
 }
 
 impl Piece {
-    const ROWS: Self = Self { rows: 1.0, wish: 0.0 };
-    const PLAN: Self = Self { rows: 0.0, wish: 0.0 };
+    const WISH: Self = Self::mixed(0.0, 1.0);
+    const ROWS: Self = Self::mixed(1.0, 0.0);
+    const PLAN: Self = Self::mixed(0.0, 0.0);
+
+    const fn mixed(rows: f64, wish: f64) -> Self {
+        Self { rows, wish, held: [false; MAX_INPUTS] }
+    }
 }
 
 /// The filter inside, whose rows are asked first.
@@ -427,6 +436,11 @@ impl Rows {
         if let Self::Integrated(own) = self {
             moves[own.of.input] *= own.moves(hold, u_ref[own.of.input]);
         }
+        // Beyond its bounds it moves nothing.
+        let (wish, wanted) = self.wanted(hold, u_ref);
+        for (moves, (wish, wanted)) in moves.iter_mut().zip(wish.iter().zip(&wanted)) {
+            *moves = if wish == wanted { *moves } else { 0.0 };
+        }
         moves
     }
 
@@ -450,6 +464,8 @@ impl Rows {
 impl AssuredFilter {
     /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
     pub const LONGEST: f64 = 16.0;
+    /// The default of [`Self::search_budget`].
+    pub const PROGRAMS: u32 = 3;
 
     /// Puts plans behind `filter`, whose inputs are held for `period` s, finite, > 0; or [`Pace`] says more.
     ///
@@ -488,6 +504,7 @@ impl AssuredFilter {
             bounds,
             period,
             horizon,
+            programs: Self::PROGRAMS,
             policies: Vec::new(),
             apart: Vec::new(),
             expected: None,
@@ -546,6 +563,20 @@ impl AssuredFilter {
     pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
         self.policies.push(Box::new(policy));
         self
+    }
+
+    /// Sets the most quadratic programs, > 0, of a search for a plan at one sample; it goes on at the next. A lost plan and one
+    /// behind u_ref are sought so. The first sample's search goes on to its end, as that of a sample that comes at another time
+    /// than was said, and that of a plan with a [horizon](Pace::horizon).
+    ///
+    /// # Errors
+    ///
+    /// No program at all.
+    pub fn search_budget(self, programs: u32) -> Result<Self, Error> {
+        match programs {
+            0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
+            _ => Ok(Self { programs, ..self }),
+        }
     }
 
     /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
@@ -675,8 +706,19 @@ impl AssuredFilter {
     ///
     /// A state or a commitment of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState, commitment: &Commitment) -> Result<(), Error> {
-        let Commitment { standing, promises, plan, lost, share, prolong_at, sample, interval, .. } =
-            commitment;
+        let Commitment {
+            standing,
+            promises,
+            plan,
+            lost,
+            regained,
+            share,
+            way,
+            prolong_at,
+            sample,
+            interval,
+            ..
+        } = commitment;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *standing != Standing::Undecided {
             length("promises", promises.len(), self.filter().slots.len())?;
@@ -690,6 +732,9 @@ impl AssuredFilter {
             }
             if !(0.0..=1.0).contains(share) {
                 return refuse("share", "is no part, must be 0 to 1");
+            }
+            if way.is_flawed() || regained.is_flawed() {
+                return refuse("way", "is none of a filter, or not finite");
             }
             if prolong_at.is_nan() || plan.is_finite() && self.horizon.is_none() {
                 return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
@@ -823,10 +868,10 @@ impl AssuredFilter {
             Rows::Plain(filter) => filter.differentiate(t, x, u_ref, direction, out),
             Rows::Integrated(own) => own.differentiate_rate(t, hold, x, u_ref, direction, out),
         }?;
-        let Piece { rows, wish } = self.piece;
-        if unknown.is_none() && rows != 1.0 {
+        let Piece { rows, wish, held } = self.piece;
+        if unknown.is_none() && (rows != 1.0 || held.contains(&true)) {
             let wished = self.rows.moves(hold, u_ref, direction.u);
-            let du = core::array::from_fn(|i| rows * out.u[i] + wish * wished[i]);
+            let du = core::array::from_fn(|i| if held[i] { 0.0 } else { rows * out.u[i] + wish * wished[i] });
             let x = &self.rows.state(x)[..];
             let dx = &self.rows.direction(direction.x)[..];
             if let Err(unknown) = self.rows.filter().carry(t, (x, dx), (&u[..inputs], du), out) {
@@ -1121,28 +1166,51 @@ impl AssuredFilter {
     }
 
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
-    /// twentieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
+    /// fiftieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
     /// deadlines, nor where one would come after the end of its barrier.
     pub fn soonest(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        self.least(t, x, longest, true)
+        self.appraise(t, x, longest).1
+    }
+
+    /// What [`Self::foresee`] says of the deadlines themselves, and [`Self::soonest`], with one search for both.
+    pub fn appraise(
+        &self,
+        t: f64,
+        x: &[f64],
+        longest: f64,
+    ) -> (Result<Witness, Failure>, Option<(f64, Witness)>) {
+        let state = &self.rows.state(x)[..];
+        let promises = self.promises(t, state, |_| 1.0);
+        match self.first(promises, (t, self.period), state, &[], &SHORTER) {
+            Ok(first) => (Ok(first.plan.witness.clone()), self.least(t, x, longest, Some(first))),
+            Err(failure) => (Err(failure), self.least(t, x, longest, None)),
+        }
     }
 
     /// The same where [none is found](Self::foresee) for the deadlines themselves, which is not tried again.
     pub fn soonest_later(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
-        self.least(t, x, longest, false)
+        self.least(t, x, longest, None)
     }
 
-    /// [`Self::soonest`]; whether there may be a plan for the deadlines themselves.
-    fn least(&self, t: f64, x: &[f64], longest: f64, may_be: bool) -> Option<(f64, Witness)> {
+    /// [`Self::soonest`], where `first` was found for the deadlines themselves.
+    fn least(&self, t: f64, x: &[f64], longest: f64, first: Option<First>) -> Option<(f64, Witness)> {
         let x = &self.rows.state(x)[..];
-        let find = |factor: f64, shorter: &[f64]| {
-            let promises = self.promises(t, x, |_| factor);
-            let First { promises, plan, .. } =
-                self.first(promises, (t, self.period), x, &[], shorter).ok()?;
-            Some((factor * self.arrival(&promises, &plan, t, x), plan.witness))
+        let promised = |factor: f64| self.promises(t, x, |_| factor);
+        let arrived = |factor: f64, First { promises, plan, .. }: First| {
+            (factor * self.arrival(&promises, &plan, t, x), plan)
         };
-        let found = if may_be { find(1.0, &SHORTER) } else { None };
-        least_factor(self.longest(longest, |_| true), found, |factor| find(factor, &[]))
+        let find = |factor: f64| {
+            let found = self.first(promised(factor), (t, self.period), x, &[], &[]).ok()?;
+            Some(arrived(factor, found))
+        };
+        let sooner = |factor: f64, (before, plan): &(f64, Plan)| {
+            let found =
+                self.beside(promised(factor), (t, self.period), x, &[], plan, factor / before).ok()?;
+            Some(arrived(factor, found))
+        };
+        let found = first.map(|first| arrived(1.0, first));
+        let (factor, plan) = least_factor(self.longest(longest, |_| true), found, find, sooner)?;
+        Some((factor, plan.witness))
     }
 
     /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
@@ -1212,16 +1280,22 @@ impl AssuredFilter {
         let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
         if found.is_err() && self.filter().slots.iter().any(yields) {
-            let later = least_factor(self.longest(Self::LONGEST, yields), None, |factor| {
-                let promises = self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
-                search(promises, &[]).ok().map(|first| (factor, first))
-            });
+            let promised = |factor: f64| self.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+            let later = |factor: f64| search(promised(factor), &[]).ok().map(|first| (factor, first));
+            let sooner = |factor: f64, (before, first): &(f64, First)| {
+                let (promises, plan) = (promised(factor), &first.plan);
+                self.beside(promises, (t, hold), x, u, plan, factor / before)
+                    .ok()
+                    .map(|first| (factor, first))
+            };
+            let later = least_factor(self.longest(Self::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
         }
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
                 (self.next.promises, self.next.plan) = (promises, plan);
                 self.next.deviation = Deviation::from(t, x);
+                self.next.way = Way::beside(&self.next.plan.witness);
                 self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
                 self.end(Standing::Assured, None);
                 self.postpone(t, hold, factor);
@@ -1281,6 +1355,25 @@ impl AssuredFilter {
             }
             _ => Err(failure),
         }
+    }
+
+    /// A plan for `promises` beside one for others, whose deadlines are these by `factor`; only near that one it is sought.
+    fn beside(
+        &self,
+        mut promises: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+        plan: &Plan,
+        factor: f64,
+    ) -> Result<First, Failure> {
+        if self.is_ruled_out(&promises, at.0, x) {
+            return Err(Failure::Nothing);
+        }
+        promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+        let search = |planner: &Planner<'_>| planner.beside(plan, factor).search(at.0, x);
+        let plan = self.planned(&promises, at, u, search)?;
+        Ok(First { promises, plan, is_old: false })
     }
 
     /// Two promises that no state keeps at a time at which both are in force.
@@ -1425,8 +1518,8 @@ impl AssuredFilter {
         self.next.prolong_at = self.next_prolonging(t, self.next.plan.witness.until);
     }
 
-    /// Chooses the input: u_ref or the answer `u` of the rows where a plan stands behind it, else as far towards that as one
-    /// does, else the plan's own. `is_regular` tells whether the plan is one for this sample.
+    /// Chooses the input, `u` of the rows at first, and remembers what is behind it. `is_regular` tells whether the plan is one for
+    /// this sample.
     fn choose(
         &mut self,
         t: f64,
@@ -1436,104 +1529,63 @@ impl AssuredFilter {
         u: &mut [f64],
         is_regular: bool,
     ) -> Driver {
-        let reached = self.next.promises.iter().flatten().all(|promise| promise.from <= t);
-        let (wish, mut wanted) = self.rows.wanted(hold, u_ref);
-        let (wish, wanted) = (&wish[..u.len()], &mut wanted[..u.len()]);
         self.prolong(t, hold, x, u);
-        let (plan, share) = (&self.next.plan, self.commitment.share);
-        // Gentle, and with the margin that the rows aim at.
-        let comfortable = |witness: &Witness| {
-            let margin = |at: &Tightest| {
-                let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
-                self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
-            };
-            witness.effort <= COMFORTABLE && witness.tightest.is_none_or(|at| at.slack >= margin(&at))
+        let (wish, wanted) = self.rows.wanted(hold, u_ref);
+        let mut way = self.next.way.clone();
+        let wish = Wish {
+            wish: &wish[..u.len()],
+            wanted: &wanted[..u.len()],
+            rows: u,
+            reached: self.next.promises.iter().flatten().all(|promise| promise.from <= t),
         };
-        // Between the plan's own input and the rows' answer: `share` of the way from that.
-        let behind = |planner: &Planner<'_>, kept: &Witness, u: &[f64], share: f64| {
-            let own = kept.inputs[0].1;
-            let input: [f64; MAX_INPUTS] = core::array::from_fn(|i| {
-                if i < u.len() { own[i] + (1.0 - share) * (u[i] - own[i]) } else { 0.0 }
-            });
-            planner.behind(plan, t, x, &input[..u.len()]).ok()
-        };
-        let mixed = |share: f64| (Piece { rows: 1.0 - share, wish: 0.0 }, share);
         let found = self.planned(&self.next.promises, (t, hold), u, |planner| {
-            let planner = &planner.irregular(!is_regular);
-            let passes = reached && wanted == wish;
-            if passes
-                && let Ok(witness) = planner.behind(plan, t, x, wanted)
-                && comfortable(&witness)
-            {
-                return Ok((Driver::Reference, (Piece { rows: 0.0, wish: 1.0 }, 0.0), witness));
-            }
-            // From the plan's own input a little further back to the rows, if a plan is behind that.
-            let mut tail = None;
-            if share > GIVEN_BACK {
-                let kept = planner.tail(plan, t, x)?;
-                if let Some(witness) = behind(planner, &kept, u, share - GIVEN_BACK) {
-                    return Ok((Driver::Between, mixed(share - GIVEN_BACK), witness));
-                }
-                tail = Some(kept);
-            }
-            wanted.copy_from_slice(u);
-            if let Ok(witness) = planner.behind(plan, t, x, wanted) {
-                if !passes || !comfortable(&witness) || u == wish {
-                    return Ok((Driver::Rows, (Piece::ROWS, 0.0), witness));
-                }
-                // As near to u_ref as is comfortable, so that the input does not jump between the two.
-                let (wish, witness) =
-                    towards(u, wish, witness, |u| planner.behind(plan, t, x, u).ok().filter(comfortable));
-                let driver = if wish > 0.0 { Driver::Eased } else { Driver::Rows };
-                return Ok((driver, (Piece { rows: 1.0 - wish, wish }, 0.0), witness));
-            }
-            // Towards the answer of the rows: as near as can be at first, then as near as last, or a little less.
-            let kept = match tail {
-                Some(tail) => tail,
-                None => planner.tail(plan, t, x)?,
-            };
-            let shares = [0.0, 1.0, 4.0, 12.0].map(|more| share + more * GIVEN_BACK);
-            let near = shares.into_iter().filter(|s| share > GIVEN_BACK && *s < 1.0);
-            let found = near.into_iter().find_map(|s| Some((s, behind(planner, &kept, u, s)?)));
-            let (share, witness) = match found {
-                Some(found) => found,
-                None if share > GIVEN_BACK => (1.0, kept),
-                None => {
-                    let own = kept.inputs[0].1;
-                    let (rows, witness) =
-                        towards(&own[..u.len()], u, kept, |u| planner.behind(plan, t, x, u).ok());
-                    (1.0 - rows, witness)
-                }
-            };
-            let driver = if share < 1.0 { Driver::Between } else { Driver::Plan };
-            Ok((driver, mixed(share), witness))
+            let (planner, reached) = (planner.irregular(!is_regular).hurried(self.programs), wish.reached);
+            let chosen = self.chosen(&planner, (t, x), wish, &mut way)?;
+            Ok(self.smoothed(&planner, (t, x), chosen, reached))
         });
         let failure = match found {
-            Ok((driver, (piece, share), witness)) => {
+            Ok(Chosen { driver, piece, share, witness, plan }) => {
                 self.piece = piece;
-                (self.next.share, self.next.lost) = (share, None);
+                self.note(&mut way, share);
+                self.next.way = way;
+                (self.next.share, self.next.lost, self.next.regained) = (share, None, Sought::default());
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
+                if let Some(plan) = plan {
+                    self.next.plan = plan;
+                }
                 self.next.plan.witness = witness;
                 return driver;
             }
             Err(failure) => failure,
         };
+        // A plan that ends at rest is sought by a few steps a sample, where samples come as they are to.
+        let is_spread = is_regular && !self.next.plan.is_finite();
+        let (mut regained, mut goes_on) = (self.next.regained.clone(), false);
         let found = match self.commitment.lost {
             Some([_, next]) if t < next => Err(failure),
             _ => {
                 // One that is lost is found again without its reserve.
                 let mut promises = self.next.promises.clone();
                 promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
-                self.planned(&promises, (t, hold), u, |planner| {
-                    planner.beyond(&self.next.plan.witness).search(t, x)
+                self.planned(&promises, (t, hold), u, |planner| match is_spread {
+                    true => planner
+                        .hurried(self.programs)
+                        .regained(&self.next.plan, t, x, &mut regained)
+                        .map_err(|left| {
+                            goes_on = left;
+                            failure
+                        }),
+                    false => planner.beyond(&self.next.plan.witness).search(t, x),
                 })
             }
         };
+        self.next.regained = regained;
         match found {
             Ok(plan) => {
                 u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
                 self.next.prolong_at = self.next_prolonging(t, plan.witness.until);
-                (self.next.plan, self.next.share, self.next.lost) = (plan, 1.0, None);
+                (self.next.plan, self.next.share) = (plan, 1.0);
+                (self.next.lost, self.next.regained) = (None, Sought::default());
                 self.piece = Piece::PLAN;
                 Driver::Plan
             }
@@ -1551,7 +1603,8 @@ impl AssuredFilter {
                 // Ever more seldom, since a search is long.
                 if lost.is_none_or(|[_, next]| t >= next) {
                     let since = lost.map_or(t, |[since, _]| since);
-                    self.next.lost = Some([since, t + (t - since).max(hold).max(self.period)]);
+                    let pause = if goes_on { 0.0 } else { (t - since).max(hold).max(self.period) };
+                    self.next.lost = Some([since, t + pause]);
                 }
                 self.come_near(t, hold, x, u)
             }
@@ -1571,29 +1624,6 @@ impl AssuredFilter {
             Err(_) => Driver::Rows,
         }
     }
-}
-
-/// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
-/// witness, and that; 0 for `from`, whose witness is `kept`.
-fn towards(
-    from: &[f64],
-    to: &[f64],
-    mut kept: Witness,
-    behind: impl Fn(&[f64]) -> Option<Witness>,
-) -> (f64, Witness) {
-    let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
-    for _ in 0..=BISECTIONS {
-        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
-            *input = from + part * (to - from);
-        }
-        match behind(&input[..from.len()]) {
-            Some(witness) => (low, kept) = (part, witness),
-            None if low == 0.0 => break,
-            None => high = part,
-        }
-        part = 0.5 * (low + high);
-    }
-    (low, kept)
 }
 
 impl Looked {
@@ -1643,42 +1673,34 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
     h
 }
 
-/// The least factor for which `find` finds something, to a twentieth, and that; `None` beyond `longest`. `found` is what it
-/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one.
+/// The least factor for which `find` finds something, to a fiftieth, and that; `None` beyond `longest`. `found` is what it
+/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one. `sooner` finds
+/// something beside what was found.
 fn least_factor<T>(
     longest: f64,
     mut found: Option<(f64, T)>,
     find: impl Fn(f64) -> Option<(f64, T)>,
+    sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
-    const FINE: f64 = 1.05;
+    const FINE: f64 = 1.02;
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
-    // Twice as long until there is one, or half as long until there is none.
+    // Twice as long until there is one; then by half sooner, and by ever less where none is found.
     let longest = longest.min(MOST);
-    let (mut low, mut high) = (1.0, 1.0);
-    if let Some((factor, _)) = &found {
-        high = factor.min(1.0);
-        while high > LEAST
-            && let Some(sooner) = find(0.5 * high)
-        {
-            high = sooner.0.min(0.5 * high);
-            found = Some(sooner);
-        }
-        low = 0.5 * high;
-    }
+    let (mut low, mut high) = (0.0, 1.0);
     while found.is_none() && high < longest {
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let (mut high, mut found) = found?;
-    while high > FINE * low {
-        let middle = elementary::sqrt(low * high);
-        match find(middle) {
-            Some(sooner) => (high, found) = sooner,
-            None => low = middle,
+    let (mut found, mut part) = (found?, 0.5);
+    while FINE * part < 1.0 && found.0 > LEAST {
+        let factor = part * found.0;
+        match if factor > low { sooner(factor, &found) } else { None } {
+            Some(nearer) => found = nearer,
+            None => part = elementary::sqrt(part),
         }
     }
-    Some((high, found))
+    Some(found)
 }
 
 /// Whether two intervals of a clock that is measured are meant to be the same.

@@ -105,6 +105,8 @@ pub struct Witness {
     pub effort: f64,
     /// Whether its holds end at samples in the period of the first.
     pub(crate) is_even: bool,
+    /// The pieces of its walk.
+    pub(super) pieces: u32,
 }
 
 impl Witness {
@@ -224,6 +226,8 @@ pub(super) struct Walk<'a> {
     /// The courses beside those of the states.
     beside: Vec<Course>,
     pieces: u32,
+    /// The most of them.
+    pub(super) most_pieces: u32,
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
     growth: f64,
@@ -315,6 +319,7 @@ impl<'a> Walk<'a> {
             rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
             beside: vec![[0.0; COURSE]; x.len()],
             pieces: 0,
+            most_pieces: MOST_PIECES,
             longest: f64::INFINITY,
             growth: LONGER,
             aside: Aside::new(x),
@@ -415,13 +420,7 @@ impl<'a> Walk<'a> {
         let mut input = [0.0; MAX_INPUTS];
         input[..u.len()].copy_from_slice(u);
         if !self.witness.inputs.is_empty() {
-            for (i, u) in u.iter().enumerate() {
-                let (min, max) = (self.model.bounds.min[i], self.model.bounds.max[i]);
-                let part = (u - (max + min) / 2.0).abs() / ((max - min) / 2.0);
-                if part.is_finite() {
-                    self.witness.effort = self.witness.effort.max(part);
-                }
-            }
+            self.witness.effort = self.witness.effort.max(self.model.bounds.part(u));
         }
         self.witness.inputs.push((end, input));
         Ok(())
@@ -475,7 +474,8 @@ impl<'a> Walk<'a> {
     /// Moves on by a piece, to `node` at most.
     fn advance(&mut self, u: &[f64], node: f64) -> Result<(), Failure> {
         self.pieces += 1;
-        if self.pieces > MOST_PIECES {
+        self.witness.pieces = self.pieces;
+        if self.pieces > self.most_pieces {
             return Err(Failure::TooLong);
         }
         self.model.plant.path(&self.x, u, &mut self.path);
@@ -654,6 +654,11 @@ impl<'a> Walk<'a> {
             if enclosed >= needed || halvings == 0 {
                 return bound.min(least).min(enclosed);
             }
+        }
+        // A half is as much work as a piece.
+        self.pieces += 1;
+        if self.pieces > self.most_pieces {
+            return f64::NEG_INFINITY;
         }
         let half = 0.5 * dt;
         let enclosed = |path: &[Course]| path.iter().map(|c| course::over(c, half)).collect::<Vec<_>>();

@@ -161,6 +161,47 @@ impl Reference {
             && gains.iter().all(|gain| is_of(&gain.0, inputs * states))
     }
 
+    /// The same reference, followed `by` s sooner.
+    pub(super) fn sooner(&self, by: f64) -> Self {
+        Self { times: self.times.iter().map(|t| t - by).collect(), ..self.clone() }
+    }
+
+    /// The time at which it comes nearest to `x`: each state measured by its span.
+    pub(super) fn nearest(&self, x: &[f64]) -> f64 {
+        let span = |i: usize| {
+            let (low, high) = self
+                .states
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[i]), high.max(x[i])));
+            high - low
+        };
+        let spans: Vec<f64> = (0..x.len()).map(span).collect();
+        let largest = spans.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
+        let weights: Vec<f64> = spans.iter().map(|s| 1.0 / s.max(0.01 * largest)).collect();
+        let mut best = (f64::INFINITY, self.times.first().copied().unwrap_or(0.0));
+        for (ends, times) in self.states.windows(2).zip(self.times.windows(2)) {
+            let (mut along, mut square) = (0.0, 0.0);
+            for (i, w) in weights.iter().enumerate() {
+                let (way, off) = ((ends[1][i] - ends[0][i]) * w, (x[i] - ends[0][i]) * w);
+                along += way * off;
+                square += way * way;
+            }
+            let part = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
+            let apart: f64 = weights
+                .iter()
+                .enumerate()
+                .map(|(i, w)| {
+                    let d = (x[i] - ends[0][i] - part * (ends[1][i] - ends[0][i])) * w;
+                    d * d
+                })
+                .sum();
+            if apart < best.0 {
+                best = (apart, times[0] + part * (times[1] - times[0]));
+            }
+        }
+        best.1
+    }
+
     /// The number of the first hold that ends more than `slack` s after `t`, if one is left.
     pub(super) fn hold_at(&self, t: f64, slack: f64) -> Option<usize> {
         let ends = self.times.get(1..)?;

@@ -31,7 +31,7 @@ pub use check::{Failure, Tightest, Witness};
 pub use integral::Integral;
 pub(crate) use integral::Limit;
 pub(crate) use model::slopes;
-pub use planner::Planner;
+pub use planner::{Planner, Sought};
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

@@ -1,5 +1,7 @@
 //! Which trials are made, in which order, and what is kept between samples.
 
+mod renewal;
+
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -12,6 +14,8 @@ use super::{Integral, Plan, Policy, Requirement};
 use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
+
+pub use renewal::Sought;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
@@ -27,6 +31,9 @@ const LONGER: [usize; 2] = [40, 320];
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
+/// The same for guesses beside a plan that was found.
+const BESIDE_GRIDS: usize = 2;
+const BESIDE: &[(usize, u32)] = &[(3, 4), (2, 20)];
 /// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
@@ -39,6 +46,8 @@ const WARY: f64 = 4.0;
 const NEARLY: f64 = -100.0;
 /// Margin of a limit of an integral in the search, as a part of the way to it at the start.
 const ROOM: f64 = 1e-3;
+/// The most pieces of a walk between samples, if it is more so many times those of the plan at hand.
+const HURRIED: [u32; 2] = [1000, 4];
 /// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
 const TIGHTENED: u32 = 4;
 const TIGHTENING: u32 = 4;
@@ -128,11 +137,17 @@ pub struct Planner<'a> {
     size: f64,
     /// Whether samples come as those before did.
     regular: bool,
+    /// Whether a trial may not take much longer than the plan at hand, and the quadratic programs of a search that goes on at the
+    /// next sample.
+    hurried: bool,
+    programs: u32,
     integral: Option<Integral>,
     policies: &'a [Policy],
     /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
     horizon: Option<f64>,
     before: Option<&'a Witness>,
+    /// A plan for other deadlines with which alone a search begins, and how many times as long these are.
+    beside: Option<(&'a Plan, f64)>,
 }
 
 impl<'a> Planner<'a> {
@@ -155,10 +170,13 @@ impl<'a> Planner<'a> {
             usual: period,
             size,
             regular: true,
+            hurried: false,
+            programs: u32::MAX,
             integral: None,
             policies: &[],
             horizon: None,
             before: None,
+            beside: None,
         }
     }
 
@@ -166,6 +184,13 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn irregular(self, irregular: bool) -> Self {
         Self { regular: !irregular, ..self }
+    }
+
+    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at
+    /// hand, and a search goes on at the next sample after so many quadratic programs.
+    #[must_use]
+    pub fn hurried(self, programs: u32) -> Self {
+        Self { hurried: true, programs, ..self }
     }
 
     /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of
@@ -198,6 +223,12 @@ impl<'a> Planner<'a> {
     #[must_use]
     pub fn beyond(self, before: &'a Witness) -> Self {
         Self { before: Some(before), ..self }
+    }
+
+    /// The same planner for deadlines that are `factor` times as long as those of `plan`, with which alone a search begins.
+    #[must_use]
+    pub fn beside(self, plan: &'a Plan, factor: f64) -> Self {
+        Self { beside: Some((plan, factor)), ..self }
     }
 
     /// The time in s between the samples at which the inputs of a new plan change: a multiple of the period.
@@ -238,7 +269,8 @@ impl<'a> Planner<'a> {
         let is_dated = self.last(t) > t || horizon.is_some();
         let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
         let slow = Some((SLOW, UNDATED)).filter(|_| is_dated && horizon.is_none());
-        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer);
+        let most = if self.beside.is_some() { BESIDE_GRIDS } else { usize::MAX };
+        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer).take(most);
         for ((part, holds), undated) in grids {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
@@ -290,6 +322,7 @@ impl<'a> Planner<'a> {
                 x,
                 size: self.size,
                 rests: horizon.is_none(),
+                quick: false,
             };
             let begin = |inputs: Vec<Vec<f64>>| Descent::from(search.run(inputs));
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
@@ -298,6 +331,13 @@ impl<'a> Planner<'a> {
                 inputs.push(guide.rest(&sketch));
                 if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &ROUNDS, &ending) {
                     return Ok(plan);
+                }
+            }
+            if let Some((plan, factor)) = self.beside {
+                let guesses = self.stretched(&sketch, plan, factor, &guide, &times).map(begin);
+                match self.descend(&search, guesses.into(), BESIDE, &ending) {
+                    Ok(plan) => return Ok(plan),
+                    Err(_) => continue,
                 }
             }
             let lead = || {
@@ -630,6 +670,9 @@ impl<'a> Planner<'a> {
         follows: bool,
     ) -> Result<Witness, Failure> {
         let mut walk = self.begin(plan, strictness, grid, (t, x))?;
+        if self.hurried && strictness >= 1.0 {
+            walk.most_pieces = HURRIED[0].max(HURRIED[1].saturating_mul(plan.witness.pieces));
+        }
         if let Some(u) = first {
             walk.hold_until(u, t + self.period)?;
         }
@@ -759,8 +802,50 @@ impl<'a> Planner<'a> {
         [inputs, vec![aim.input.clone(); times.len()]]
     }
 
+    /// Guesses that go the way of `plan` in `factor` times the time: with its inputs, with those of rates that are so much larger, and
+    /// of accelerations.
+    fn stretched(
+        &self,
+        model: &Model<'_>,
+        plan: &Plan,
+        factor: f64,
+        guide: &Guide,
+        times: &[f64],
+    ) -> [Vec<Vec<f64>>; 3] {
+        let (rest, begin) = (guide.rest(model), times[0]);
+        // Without the feedback of its walk, where it has a reference.
+        let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
+        let inputs = match &plan.reference {
+            Some(reference) => reference.times[1..]
+                .iter()
+                .copied()
+                .zip(reference.inputs.iter().map(padded))
+                .chain([(f64::INFINITY, padded(&rest))])
+                .collect(),
+            None => plan.witness.inputs.clone(),
+        };
+        let plan = Witness { inputs, ..Witness::default() };
+        let at = |t: f64| begin + (t - begin) / factor;
+        [1.0, factor, factor * factor].map(|smaller| {
+            let held = |hold: &[f64]| {
+                let mean = plan.mean(at(hold[0]), at(hold[1]));
+                let mut u: Vec<f64> =
+                    rest.iter().zip(mean).map(|(rest, mean)| rest + (mean - rest) / smaller).collect();
+                model.clamp(&mut u);
+                u
+            };
+            times.windows(2).map(held).chain([rest.clone()]).collect()
+        })
+    }
+
     /// First guesses: the plant stopped at once, and after inputs to either side.
-    fn guesses(&self, model: &Model<'_>, guide: &Guide, x: &[f64], times: &[f64]) -> Vec<Vec<Vec<f64>>> {
+    fn guesses(
+        &self,
+        model: &Model<'_>,
+        guide: &Guide,
+        x: &[f64],
+        times: &[f64],
+    ) -> impl Iterator<Item = Vec<Vec<f64>>> {
         let nu = model.inputs();
         let mut sides: Vec<Vec<f64>> = vec![vec![0.0; nu]];
         if nu <= 2 {
@@ -784,7 +869,7 @@ impl<'a> Planner<'a> {
             }
         }
         let (holds, last) = (times.len() - 1, self.last(times[0]));
-        let run = |side: &[f64], [size, part]: [f64; 2]| {
+        let run = move |side: &[f64], [size, part]: [f64; 2]| {
             let (mut x, mut u) = (x.to_vec(), vec![0.0; nu]);
             let mut inputs = Vec::with_capacity(holds + 1);
             for k in 0..holds {
@@ -808,10 +893,8 @@ impl<'a> Planner<'a> {
             inputs.push(guide.rest(model));
             inputs
         };
-        let mut guesses = vec![run(&sides[0], GUESSES[0])];
-        for guess in GUESSES {
-            guesses.extend(sides[1..].iter().map(|side| run(side, guess)));
-        }
-        guesses
+        let others = sides.len() - 1;
+        let sizes = GUESSES.into_iter().flat_map(move |guess| (1..=others).map(move |side| (side, guess)));
+        core::iter::once((0, GUESSES[0])).chain(sizes).map(move |(side, guess)| run(&sides[side], guess))
     }
 }

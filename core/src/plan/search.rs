@@ -52,6 +52,8 @@ pub(super) struct Search<'a> {
     pub(super) size: f64,
     /// Whether the plant has to rest at the end.
     pub(super) rests: bool,
+    /// Whether its programs are solved without refinement: faster, and to fewer digits.
+    pub(super) quick: bool,
 }
 
 /// Inputs on the grid, one more for the rest at the end, and where they lead.
@@ -393,6 +395,7 @@ impl Search<'_> {
         let settings = DefaultSettings {
             verbose: false,
             max_iter: 60,
+            iterative_refinement_enable: !self.quick,
             tol_gap_abs: 1e-6,
             tol_gap_rel: 1e-6,
             tol_feas: 1e-6,

@@ -139,6 +139,15 @@ impl Bounds {
         value.max(self.min[i]).min(self.max[i])
     }
 
+    /// The largest component of `u`, as a part of the way from the middle of its bounds to one of them; 0 where none has both.
+    pub fn part(&self, u: &[f64]) -> f64 {
+        let parts = u.iter().zip(self.min.iter().zip(&self.max)).map(|(u, (min, max))| {
+            let part = (u - (max + min) / 2.0).abs() / ((max - min) / 2.0);
+            if part.is_finite() { part } else { 0.0 }
+        });
+        parts.fold(0.0, f64::max)
+    }
+
     /// [`Self::contain`], unrolled.
     #[inline(always)]
     pub(crate) fn contain_all<const M: usize>(&self, u: &[f64; M]) -> bool {

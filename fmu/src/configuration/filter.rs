@@ -14,7 +14,7 @@ use super::barrier::RawBarrier;
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
-    Value::{Flag, Name, Number, NumberByName, PairByName, Table, Tables, TextByName, Word},
+    Value::{Count, Flag, Name, Number, NumberByName, PairByName, Table, Tables, TextByName, Word},
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
@@ -77,6 +77,9 @@ pub(super) enum FilterKind {
     Filter,
 }
 
+/// The largest budget of a search.
+const MOST_PROGRAMS: u64 = 1_000_000;
+
 /// A filter as it stands in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -90,6 +93,7 @@ pub(super) struct RawFilter {
     #[serde(default = "auto")]
     assurance: AssuranceName,
     plan_horizon: Option<f64>,
+    search_budget: Option<u32>,
     #[serde(default)]
     actuation_delay: f64,
     #[serde(default)]
@@ -135,6 +139,10 @@ pub struct FilterConfiguration {
     /// every plan has to end at rest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
+    /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
+    /// [`AssuredFilter::PROGRAMS`](punctual_core::filter::AssuredFilter::PROGRAMS).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub search_budget: Option<u32>,
     /// Why no plan is followed, as the file stands; `None` where plans are.
     #[serde(skip)]
     rows_only: Option<RowsOnly>,
@@ -200,7 +208,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 22] = [
+        static KEYS: [Key; 23] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -237,6 +245,14 @@ pub(super) static SECTION: Section = Section {
                 "where no plan ends at rest, such as of an aeroplane or in a set that moves for ever: how far one has to reach \
                  past the last deadline and the present, to be promised until its end, `assured_until`. It is prolonged before \
                  it ends, if a plan is found",
+            ),
+            Key::new(
+                "search_budget",
+                Count(1, MOST_PROGRAMS),
+                Some("3 where plans are followed"),
+                "the most quadratic programs of a search for a plan at one step after the first; it goes on at the next step, while \
+                 the plan at hand drives. More find a way for u_ref, or a lost plan again, in fewer steps, each of which may \
+                 take longer: about 0.3 ms each for a vehicle, the time growing with states, inputs and barriers",
             ),
             Key::new(
                 "actuation_delay",
@@ -378,6 +394,7 @@ impl FilterConfiguration {
             }),
             assurance: raw.assurance,
             plan_horizon: raw.plan_horizon,
+            search_budget: raw.search_budget,
             rows_only: None,
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
@@ -416,10 +433,12 @@ impl FilterConfiguration {
             configuration.plant.functions::<f64>("policy", policy)?;
         }
         configuration.check_horizon()?;
+        configuration.check_budget()?;
         configuration.rows_only = configuration.rows_only();
         for (key, is_given) in [
             ("policy", configuration.policy.is_some()),
             ("plan_horizon", configuration.plan_horizon.is_some()),
+            ("search_budget", configuration.search_budget.is_some()),
         ] {
             if is_given && !configuration.is_assured() {
                 let message = format!("is for plans, of which there are none: {}", configuration.unassured());
@@ -443,6 +462,17 @@ impl FilterConfiguration {
                 let message = format!("is {horizon} s, must be finite, and at least a step ({step} s)");
                 Err(ConfigurationError::new("plan_horizon", message))
             }
+        }
+    }
+
+    /// Refuses a budget of nothing, or one beyond counting.
+    fn check_budget(&self) -> Result<(), ConfigurationError> {
+        match self.search_budget {
+            Some(programs) if !(1..=MOST_PROGRAMS).contains(&u64::from(programs)) => {
+                let message = format!("is {programs}, must be 1 to {MOST_PROGRAMS}");
+                Err(ConfigurationError::new("search_budget", message))
+            }
+            _ => Ok(()),
         }
     }
 

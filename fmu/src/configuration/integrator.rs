@@ -266,7 +266,8 @@ impl FilterConfiguration {
             }
         }
         .map_err(|e| e.to_string())?;
-        let assured = assured.apart(self.apart());
+        let programs = self.search_budget.unwrap_or(AssuredFilter::PROGRAMS);
+        let assured = assured.apart(self.apart()).search_budget(programs).map_err(|e| e.to_string())?;
         let Some(policy) = &self.policy else { return Ok(assured) };
         let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
         let functions = RefCell::new(functions);

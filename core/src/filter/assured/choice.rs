@@ -1,0 +1,354 @@
+//! The input of a sample: u_ref where a plan stands behind it, else as near to it as one does.
+
+use super::{AMPLE, AssuredFilter, Driver, Piece, Standing};
+use crate::MAX_INPUTS;
+use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
+use crate::scalar::all_finite;
+
+/// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
+const COMFORTABLE: f64 = 0.5;
+/// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow.
+const FAR: f64 = 0.5;
+/// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder.
+const EASE: f64 = 2.0;
+/// And in units of the largest u_ref so far.
+const EAGER: f64 = 1.5;
+/// The largest input of another plan for which the one that drives gives way to u_ref, in units of that of the one that drives.
+const GENTLER: f64 = 0.9;
+/// The change of an input from one sample to the next that is no jump, as a part of the width of its bounds.
+const SMOOTH: f64 = 0.15;
+/// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
+const FIRST: f64 = 0.125;
+const BISECTIONS: u32 = 3;
+/// The part of an input that goes back from the plan at each sample: all of it at once would have the plan take it again at the
+/// next, and the input jump between the two. And that where another plan stands behind all of u_ref.
+const GIVEN_BACK: f64 = 1.0 / 32.0;
+const RETURNED: f64 = 4.0;
+/// The samples after which the plan gives back, where it had to take more.
+const HELD: u32 = 16;
+/// How much more of the plan there is in an input than in the last one, in units of what goes back: the first that is possible.
+const SHARES: [f64; 5] = [-1.0, 0.0, 1.0, 4.0, 12.0];
+/// The least and the most samples after which it is tried again to find a plan behind u_ref, where none was found or the one that
+/// was found was soon lost.
+const PAUSES: [u32; 2] = [8, 128];
+
+/// How u_ref has its way, from sample to sample.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Way {
+    /// The largest input of a plan that is comfortable, as a part of its bounds: by what the first one needs, and u_ref has had since.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    ease: f64,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    eagerness: f64,
+    /// The search for a plan behind u_ref, and the samples until it goes on.
+    sought: Sought,
+    wait: u32,
+    /// The samples of the last pause between trials, and those since that u_ref was let pass in a row.
+    pause: u32,
+    passed: u32,
+    /// The samples until a part of the plan is given back again.
+    held: u32,
+    /// Whether the plan that drives gives way to u_ref, behind all of which another plan was found.
+    returns: bool,
+}
+
+impl Way {
+    /// The first, beside the first plan.
+    pub(super) fn beside(first: &Witness) -> Self {
+        Self { ease: EASE * first.effort, ..Self::default() }
+    }
+
+    /// Whether it is none that a filter had.
+    pub(super) fn is_flawed(&self) -> bool {
+        self.ease.is_nan() || self.eagerness.is_nan() || self.sought.is_flawed()
+    }
+
+    /// Notes that a plan was found, and whether another one drove.
+    fn find(&mut self, drove: bool) {
+        self.sought = Sought::default();
+        if drove {
+            // The plan gives way in as many samples.
+            (self.pause, self.wait) = (self.longer(), (1.0 / (RETURNED * GIVEN_BACK)) as u32);
+            self.returns = true;
+        }
+    }
+
+    /// Notes that the search came to its end and found none.
+    fn give_up(&mut self) {
+        self.sought = Sought::default();
+        self.pause = self.longer();
+        self.wait = self.pause;
+    }
+
+    fn longer(&self) -> u32 {
+        (2 * self.pause).clamp(PAUSES[0], PAUSES[1])
+    }
+
+    /// Notes who had the last sample, and who has this one.
+    fn pass(&mut self, [before, now]: [bool; 2]) {
+        self.wait = self.wait.saturating_sub(1);
+        self.returns &= !now;
+        match [before, now] {
+            [true, true] => {
+                self.passed = self.passed.saturating_add(1);
+                if self.passed > PAUSES[1] {
+                    self.pause = 0;
+                }
+            }
+            // Given back too soon: the next time it takes longer.
+            [true, false] => (self.wait, self.passed) = (self.wait.max(self.pause), 0),
+            _ => self.passed = 0,
+        }
+    }
+}
+
+/// An input that was chosen, and what is behind it.
+pub(super) struct Chosen {
+    pub(super) driver: Driver,
+    pub(super) piece: Piece,
+    /// The part of it that is the plan's own.
+    pub(super) share: f64,
+    pub(super) witness: Witness,
+    /// A new plan, whose witness that is.
+    pub(super) plan: Option<Plan>,
+}
+
+/// What is wished at a sample.
+pub(super) struct Wish<'a> {
+    /// u_ref, and that within its bounds.
+    pub(super) wish: &'a [f64],
+    pub(super) wanted: &'a [f64],
+    /// The answer of the rows.
+    pub(super) rows: &'a [f64],
+    /// Whether every set has been reached.
+    pub(super) reached: bool,
+}
+
+impl AssuredFilter {
+    /// The input from `x` at `t`: u_ref where a comfortable plan stands behind it, be it the one at hand or another; else as far
+    /// towards it from the plan's own as one does. Where every set has been reached the answer of the rows comes in between.
+    ///
+    /// # Errors
+    ///
+    /// What the plan fails at, where it keeps the promises no more.
+    pub(super) fn chosen(
+        &self,
+        planner: &Planner<'_>,
+        (t, x): (f64, &[f64]),
+        Wish { wish, wanted, rows, reached }: Wish<'_>,
+        way: &mut Way,
+    ) -> Result<Chosen, Failure> {
+        let (plan, share) = (&self.next.plan, self.commitment.share);
+        let (is_wish, passes) = (all_finite(wish), share <= GIVEN_BACK);
+        if is_wish && passes {
+            way.eagerness = way.eagerness.max(self.bounds.part(wanted));
+        }
+        let comfort = if reached { COMFORTABLE } else { way.ease.max(EAGER * way.eagerness) };
+        // Gentle, and where every set has been reached with the margin that the rows aim at.
+        let comfortable = |witness: &Witness| {
+            let margin = |at: &Tightest| {
+                let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
+                self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
+            };
+            let has_margin = |at: Tightest| at.slack >= margin(&at);
+            let is_far = |at: Tightest| {
+                let h = self.filter().report().barriers[at.barrier].h;
+                at.slack >= (FAR * h).max(margin(&at))
+            };
+            match reached {
+                true if witness.effort > comfort => witness.tightest.is_none_or(is_far),
+                true => witness.tightest.is_none_or(has_margin),
+                false => witness.effort <= comfort,
+            }
+        };
+        let behind = |plan: &Plan, u: &[f64]| planner.behind(plan, t, x, u).ok();
+        let passed = if wanted == wish { Driver::Reference } else { Driver::Eased };
+        if is_wish && passes {
+            let driver = passed;
+            let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
+            let near = behind(plan, wanted);
+            let is_near = near.is_some();
+            if let Some(witness) = near.filter(comfortable) {
+                return Ok(chosen(witness, None));
+            }
+            if !reached && !is_near {
+                let found = planner.moved(plan, t, x, wanted).ok().filter(|plan| comfortable(&plan.witness));
+                let found = found.or_else(|| self.sought(planner, (t, x), wanted, way, comfort));
+                if let Some(plan) = found {
+                    return Ok(chosen(plan.witness.clone(), Some(plan)));
+                }
+            }
+        }
+        if reached
+            && passes
+            && let Some(witness) = behind(plan, rows)
+        {
+            let chosen = |driver, wish, witness| Chosen {
+                driver,
+                piece: Piece::mixed(1.0 - wish, wish),
+                share: 0.0,
+                witness,
+                plan: None,
+            };
+            if !is_wish || wanted != wish || !comfortable(&witness) || rows == wish {
+                return Ok(chosen(Driver::Rows, 0.0, witness));
+            }
+            // As near to u_ref as is comfortable, so that the input does not jump between the two.
+            let (wish, witness) = towards(rows, wish, witness, |u| behind(plan, u).filter(comfortable));
+            return Ok(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, witness));
+        }
+        // From the plan's own input: as near as can be at first, then as near as last, or a little more or less.
+        let kept = match planner.tail(plan, t, x) {
+            Ok(kept) => kept,
+            // The plant is not where the plan was: whatever else there is keeps the promise.
+            Err(failure) => {
+                let wished = is_wish.then_some((passed, Piece::WISH, wanted));
+                let others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, rows)]);
+                let mut others =
+                    others.filter_map(|(driver, piece, u)| Some((driver, piece, behind(plan, u)?)));
+                let (driver, piece, witness) = others.next().ok_or(failure)?;
+                return Ok(Chosen { driver, piece, share: 0.0, witness, plan: None });
+            }
+        };
+        let (own, to_rows) = (kept.inputs[0].1, reached || !is_wish);
+        let far = if to_rows { rows } else { wanted };
+        let mixed = |share: f64, witness, plan| {
+            let part = 1.0 - share;
+            let piece = if to_rows { Piece::mixed(part, 0.0) } else { Piece::mixed(0.0, part) };
+            let driver = match share {
+                0.0 if to_rows => Driver::Rows,
+                0.0 => passed,
+                1.0 => Driver::Plan,
+                _ => Driver::Between,
+            };
+            Chosen { driver, piece, share, witness, plan }
+        };
+        let between = |share: f64| -> [f64; MAX_INPUTS] {
+            // All of it is itself, to the last bit.
+            let part =
+                |i: usize| if share == 0.0 { far[i] } else { own[i] + (1.0 - share) * (far[i] - own[i]) };
+            core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
+        };
+        let most = kept.effort.max(comfort);
+        let gentle = |witness: &Witness| reached || witness.effort <= most;
+        if passes {
+            let (part, witness) = towards(&own[..far.len()], far, kept, |u| behind(plan, u).filter(gentle));
+            return Ok(mixed(1.0 - part, witness, None));
+        }
+        let returned = (share - RETURNED * GIVEN_BACK).max(0.0);
+        if !to_rows {
+            let comfort = match way.pause > PAUSES[0] {
+                true => comfort.min((GENTLER * kept.effort).max(way.ease)),
+                false => comfort,
+            };
+            if let Some(other) = self.sought(planner, (t, x), wanted, way, comfort) {
+                // At once where the two plans lead apart.
+                let gently =
+                    behind(&other, &between(returned)[..far.len()]).map(|witness| (returned, witness));
+                let (share, witness) = gently.unwrap_or((0.0, other.witness.clone()));
+                return Ok(mixed(share, witness, Some(other)));
+            }
+        }
+        let shares = SHARES.map(|more| share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
+        let first = way.returns.then_some(returned);
+        let shares = shares.skip(usize::from(way.held > 0));
+        let found = first.into_iter().chain(shares).find_map(|share| {
+            let witness = behind(plan, &between(share)[..far.len()]).filter(gentle)?;
+            Some((share, witness))
+        });
+        let (share, witness) = found.unwrap_or((1.0, kept));
+        way.held = if share > self.commitment.share { HELD } else { way.held.saturating_sub(1) };
+        if first.is_some_and(|first| share > first) {
+            (way.returns, way.wait) = (false, way.wait.max(way.pause));
+        }
+        Ok(mixed(share, witness, None))
+    }
+
+    /// A plan behind `u` that needs no more than `comfort` where one is sought at this sample, and is found.
+    fn sought(
+        &self,
+        planner: &Planner<'_>,
+        (t, x): (f64, &[f64]),
+        u: &[f64],
+        way: &mut Way,
+        comfort: f64,
+    ) -> Option<Plan> {
+        if way.wait > 0 {
+            return None;
+        }
+        match planner.renewed(&self.next.plan, t, x, u, &mut way.sought) {
+            Ok(plan) if plan.witness.effort <= comfort => {
+                way.find(self.commitment.share > GIVEN_BACK);
+                Some(plan)
+            }
+            Ok(_) | Err(false) => {
+                way.give_up();
+                None
+            }
+            Err(true) => None,
+        }
+    }
+
+    /// `chosen` as it is, or where its input jumps from the last one, one on the way between the two that has a plan behind it.
+    pub(super) fn smoothed(
+        &self,
+        planner: &Planner<'_>,
+        (t, x): (f64, &[f64]),
+        chosen: Chosen,
+        reached: bool,
+    ) -> Chosen {
+        let Chosen { driver, mut piece, ref witness, .. } = chosen;
+        let (mut u, last, inputs) = (witness.inputs[0].1, &self.filter().state.input, self.rows.dims()[1]);
+        for (i, (u, last)) in u.iter_mut().zip(last).enumerate().take(inputs) {
+            let most = SMOOTH * (self.bounds.max[i] - self.bounds.min[i]);
+            let smooth = u.max(last - most).min(last + most);
+            (piece.held[i], *u) = (smooth != *u, smooth);
+        }
+        let is_smooth = !piece.held.contains(&true);
+        if driver == Driver::Reference || self.commitment.standing != Standing::Assured || is_smooth {
+            return chosen;
+        }
+        let smooth = &u[..inputs];
+        let plan = chosen.plan.as_ref().unwrap_or(&self.next.plan);
+        let driver = Driver::Between;
+        if let Ok(witness) = planner.behind(plan, t, x, smooth) {
+            return Chosen { driver, piece, witness, ..chosen };
+        }
+        let renewed = || planner.renewed(plan, t, x, smooth, &mut Sought::default()).ok();
+        // Where u_ref has just passed, one behind it is sought first.
+        let may_renew = !reached && self.commitment.share > GIVEN_BACK;
+        match may_renew.then(renewed).flatten() {
+            Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
+            None => chosen,
+        }
+    }
+
+    /// Notes in `way` that the plan's own input is the part `share` of this sample's.
+    pub(super) fn note(&self, way: &mut Way, share: f64) {
+        way.pass([self.commitment.share, share].map(|share| share <= GIVEN_BACK));
+    }
+}
+
+/// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
+/// witness, and that; 0 for `from`, whose witness is `kept`.
+fn towards(
+    from: &[f64],
+    to: &[f64],
+    mut kept: Witness,
+    behind: impl Fn(&[f64]) -> Option<Witness>,
+) -> (f64, Witness) {
+    let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
+    for _ in 0..=BISECTIONS {
+        for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
+            *input = from + part * (to - from);
+        }
+        match behind(&input[..from.len()]) {
+            Some(witness) => (low, kept) = (part, witness),
+            None if low == 0.0 => break,
+            None => high = part,
+        }
+        part = 0.5 * (low + high);
+    }
+    (low, kept)
+}

@@ -1,0 +1,218 @@
+//! Another plan behind an input, between samples: the one at hand moved in time, or a few steps of a search.
+
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::{Guide, Planner, RESOLVED, ROOM, SEARCHED, UNDATED, WORTH};
+use crate::MAX_INPUTS;
+use crate::plan::check::{Failure, Grid, Witness};
+use crate::plan::law::Reference;
+use crate::plan::search::{Descent, Search};
+use crate::plan::{Plan, Requirement};
+use crate::scalar::all_finite;
+
+/// The holds of the grid until the last deadline and after it.
+const HOLDS: [usize; 2] = [20, 10];
+/// The quadratic programs for which a guess is followed.
+const FOLLOWED: u32 = 15;
+/// What is left of a violation after a sample where it is worth another.
+const LEFT: f64 = 0.8;
+/// The parts of the time until the last deadline for which a guess holds the input that is wanted.
+const WANTED: [f64; 2] = [0.35, 0.1];
+
+/// Writes an input at a time in s and a state.
+type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
+
+/// A search for a plan behind an input that is spread over samples: which guess it is at, and how far that has come.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sought {
+    /// The number of the guess, and of the quadratic programs for which it was followed.
+    guess: u32,
+    followed: u32,
+    /// The end of each hold in s and its input, and how much is violated with them.
+    inputs: Vec<(f64, [f64; MAX_INPUTS])>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    violation: f64,
+}
+
+impl Sought {
+    /// The number of guesses: how the plan at hand is followed, the input itself and then to rest, and the first of a search.
+    const GUESSES: u32 = 12;
+
+    /// Whether it is one of a search, of which every number is finite.
+    pub(crate) fn is_flawed(&self) -> bool {
+        self.guess >= Self::GUESSES
+            || self.violation.is_nan()
+            || self.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u))
+    }
+
+    /// Goes on after a sample with `descent` on the grid `times`, or to the next guess. Whether there is one.
+    fn next(&mut self, programs: u32, descent: Option<(&Descent, &[f64])>) -> bool {
+        let is_first = self.followed == 0;
+        self.followed = self.followed.saturating_add(programs);
+        if let Some((Descent { best, .. }, times)) = descent
+            && self.followed < FOLLOWED
+            && best.violation < if is_first { f64::INFINITY } else { LEFT * self.violation }
+        {
+            self.violation = best.violation;
+            let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
+            self.inputs = times[1..].iter().copied().zip(best.inputs.iter().map(padded)).collect();
+            return true;
+        }
+        let guess = self.guess + 1;
+        *self = Self { guess: guess % Self::GUESSES, ..Self::default() };
+        guess < Self::GUESSES
+    }
+}
+
+impl Planner<'_> {
+    /// `plan`, followed from the place on its way that is nearest to where `u` leads from `x` at `t` in one period: whoever is ahead
+    /// of a plan is not off it.
+    ///
+    /// # Errors
+    ///
+    /// What it fails at.
+    pub fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
+        let moved = self.led_by(plan, t, x, u)?.0.ok_or(Failure::Nothing)?;
+        let witness = self.behind(&moved, t, x, u)?;
+        Ok(Plan { witness, ..moved })
+    }
+
+    /// `plan` moved in time, where that changes it, and the state to which `u` leads.
+    fn led_by(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<(Option<Plan>, Vec<f64>), Failure> {
+        let reference = plan.reference.as_ref().filter(|_| !plan.is_finite()).ok_or(Failure::Nothing)?;
+        let mut at = x.to_vec();
+        self.run(&mut at, u);
+        let ahead = (reference.nearest(&at) - t) / self.period - 1.0;
+        let ahead = ((ahead.abs() + 0.5) as u64 as f64).copysign(ahead);
+        let moved = (ahead != 0.0).then(|| reference.sooner(ahead * self.period));
+        let moved = moved.map(|reference| Plan { reference: Some(Arc::new(reference)), ..plan.clone() });
+        Ok((moved, at))
+    }
+
+    /// A plan that begins with `u` for one period from `x` at `t`, by the next few steps of a search that `sought` remembers. It
+    /// begins with how `plan` is followed from there. `None` where they lead to none; whether guesses are left then.
+    ///
+    /// # Errors
+    ///
+    /// Whether the search goes on, where these steps lead to no plan.
+    pub fn renewed(
+        &self,
+        plan: &Plan,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        sought: &mut Sought,
+    ) -> Result<Plan, bool> {
+        let found = self.led_by(plan, t, x, u).ok().and_then(|(moved, at)| {
+            self.step_on(moved.as_ref().unwrap_or(plan), (t + self.period, &at), u, sought)
+        });
+        let found = match found {
+            Some(Ok(plan)) => {
+                self.behind(&plan, t, x, u).map(|witness| Plan { witness, ..plan }).map_err(|_| None)
+            }
+            Some(Err(descent)) => Err(Some(descent)),
+            None => Err(None),
+        };
+        found.map_err(|descent| {
+            sought.next(self.programs, descent.as_ref().map(|(descent, times)| (descent, &times[..])))
+        })
+    }
+
+    /// A plan from `x` at `t`, by the next few steps of such a search: where `plan` is one no more.
+    ///
+    /// # Errors
+    ///
+    /// Whether the search goes on, where these steps lead to no plan.
+    pub fn regained(&self, plan: &Plan, t: f64, x: &[f64], sought: &mut Sought) -> Result<Plan, bool> {
+        let rest = plan.brake.as_ref().map(|brake| brake.input.clone()).unwrap_or_default();
+        match self.step_on(plan, (t, x), &rest, sought) {
+            Some(Ok(plan)) => Ok(plan),
+            Some(Err((descent, times))) => Err(sought.next(self.programs, Some((&descent, &times)))),
+            None => Err(sought.next(self.programs, None)),
+        }
+    }
+
+    /// Steps of that search from `x` at `t`: a plan, or how far it has come on which grid. `None` where there is no search.
+    fn step_on(
+        &self,
+        plan: &Plan,
+        (t, x): (f64, &[f64]),
+        wanted: &[f64],
+        sought: &Sought,
+    ) -> Option<Result<Plan, (Descent, Vec<f64>)>> {
+        let paced = Self { period: self.pace(), ..*self };
+        let margin = |r: &Requirement<'_>| match r.is_limit {
+            true => ROOM * r.model.value(t, x).abs(),
+            false => r.margin.max((r.margin + r.reserve) / SEARCHED),
+        };
+        let requirements: Vec<Requirement<'_>> =
+            paced.requirements.iter().map(|r| Requirement { margin: margin(r), ..*r }).collect();
+        let (hold, times) = paced.grid(t, &requirements, (HOLDS, UNDATED), None)?;
+        let sketch = paced.model(paced.resolved(x, hold, RESOLVED[0])?);
+        let (reference, brake) = (plan.reference.as_ref()?, plan.brake.as_ref()?);
+        let (mut at, mut u, last) = (x.to_vec(), vec![0.0; paced.dims[1]], paced.last(t));
+        let mut led = |law: Law<'_>| {
+            let mut inputs: Vec<Vec<f64>> = Vec::with_capacity(times.len());
+            for hold in times.windows(2) {
+                law(hold[0], &at, &mut u);
+                sketch.flow(&mut at, &u, hold[1] - hold[0]);
+                inputs.push(u.clone());
+            }
+            inputs.push(brake.input.clone());
+            inputs
+        };
+        let inputs = match sought.guess as usize {
+            _ if !sought.inputs.is_empty() => {
+                let before = Witness { inputs: sought.inputs.clone(), ..Witness::default() };
+                let mean = |hold: &[f64]| before.mean(hold[0], hold[1])[..paced.dims[1]].to_vec();
+                times.windows(2).map(mean).chain([brake.input.clone()]).collect()
+            }
+            0 => led(&|t, x, u| match reference.hold_at(t, 1e-3 * paced.period) {
+                Some(k) => reference.input(&sketch, k, t, x, u),
+                None => brake.input(&sketch, x, u),
+            }),
+            k if k <= WANTED.len() => led(&|at, x, u| match at < t + WANTED[k - 1] * (last - t) {
+                true => u.copy_from_slice(wanted),
+                false => brake.input(&sketch, x, u),
+            }),
+            k => paced
+                .guesses(&sketch, &Guide(Some((**brake).clone())), x, &times)
+                .nth(k - 1 - WANTED.len())?,
+        };
+        let mut search = Search {
+            model: sketch,
+            requirements,
+            strictness: SEARCHED,
+            times: &times,
+            x,
+            size: paced.size,
+            rests: true,
+            quick: true,
+        };
+        let mut descent = Descent::from(search.run(inputs));
+        // Half of them, a check, and the others.
+        for iterations in [self.programs.div_ceil(2), self.programs / 2] {
+            search.improve(&mut descent, iterations);
+            if descent.best.violation > WORTH {
+                continue;
+            }
+            let gains = search.gains(&mut descent)?;
+            let (mut inputs, states) = (descent.best.inputs.clone(), descent.best.states.clone());
+            inputs.pop();
+            let reference = Reference { times: times.clone(), inputs, states, gains };
+            let found = Plan { reference: Some(Arc::new(reference)), ..plan.clone() };
+            let grid = Grid { period: paced.period, even: true };
+            match paced.walk(&found, 1.0, grid, (t, x), None, true) {
+                Ok(witness) => return Some(Ok(Plan { witness, ..found })),
+                // What is broken between the nodes is asked for with more margin at them.
+                Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack),
+                Err(_) => break,
+            }
+            descent = Descent::from(search.run(descent.best.inputs.clone()));
+        }
+        Some(Err((descent, times)))
+    }
+}

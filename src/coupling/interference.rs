@@ -1,0 +1,187 @@
+//! How much a filter changes what is wanted: at how many samples, and by how much.
+
+use punctual_core::filter::Status;
+use serde::Serialize;
+
+use super::layout::Layout;
+use super::network::{self, Link, Port};
+use super::promises::is_filter;
+use super::system::{Order, System};
+use crate::host::{Causality, Description};
+
+/// Difference of an input from what was wanted that is none, beside its size: round-off of a unit that is converted.
+const SAME: f64 = 1e-9;
+/// Bounds of an input from which on it has none.
+const UNBOUNDED: f64 = 1e29;
+
+/// What a filter has changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Interference {
+    /// The component.
+    pub filter: String,
+    /// Samples with a valid input.
+    pub samples: u64,
+    /// Those of them at which an input was not what was wanted.
+    pub changed: u64,
+    /// By how much in the mean of these, the input that was changed most at each, as a part of the width of its bounds; `None` where
+    /// none has both.
+    pub mean: Option<f64>,
+    /// The most at one of them.
+    pub most: Option<f64>,
+}
+
+impl Interference {
+    /// In a sentence.
+    pub fn text(&self) -> String {
+        let Self { filter, samples, changed, .. } = self;
+        if *changed == 0 {
+            return format!("{filter} left u_ref as it is at all {samples} samples.");
+        }
+        let share = 100.0 * *changed as f64 / *samples as f64;
+        let by = match (self.mean, self.most) {
+            (Some(mean), Some(most)) => {
+                format!(
+                    ", by {:.1} % of the bounds in the mean and {:.1} % at most",
+                    100.0 * mean,
+                    100.0 * most
+                )
+            }
+            _ => String::new(),
+        };
+        format!("{filter} changed u_ref at {changed} of {samples} samples ({share:.1} %){by}.")
+    }
+}
+
+/// An input of a filter: as wanted, as given, and the width of its bounds.
+struct Pair<P> {
+    wanted: P,
+    given: P,
+    width: Option<f64>,
+}
+
+/// The ports of a filter that tell.
+pub(super) struct Ports {
+    component: usize,
+    name: String,
+    status: Port,
+    pairs: Vec<Pair<Port>>,
+    prompt: bool,
+}
+
+impl Ports {
+    pub(super) fn all(&self) -> impl Iterator<Item = Port> {
+        self.pairs.iter().flat_map(|pair| [pair.wanted, pair.given]).chain([self.status])
+    }
+}
+
+/// A filter that is watched.
+pub(super) struct Watched {
+    name: String,
+    status: usize,
+    pairs: Vec<Pair<usize>>,
+    prompt: bool,
+    /// What was wanted at the last point.
+    last: Option<Vec<f64>>,
+    samples: u64,
+    changed: u64,
+    total: f64,
+    most: f64,
+}
+
+/// Those of all filters in `system`.
+pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<Ports> {
+    let of = |(component, description): (usize, &&Description)| {
+        let variable = |name: &str| description.index_of(name).map(|variable| Port { component, variable });
+        let number = |name: &str| description.variables[description.index_of(name)?].start;
+        let status = variable("status").filter(|_| is_filter(description))?;
+        let given = description.variables.iter().filter(|v| v.causality == Causality::Output);
+        let pairs: Vec<Pair<Port>> = given
+            .filter_map(|v| {
+                let rest = v.name.strip_prefix('u').filter(|rest| rest.starts_with(['.', '[']))?;
+                let bounds = [number(&format!("u_min{rest}")), number(&format!("u_max{rest}"))];
+                let width = match bounds {
+                    [Some(min), Some(max)] if min > -UNBOUNDED && max < UNBOUNDED => Some(max - min),
+                    _ => None,
+                };
+                let (wanted, given) = (variable(&format!("u_ref{rest}"))?, variable(&v.name)?);
+                Some(Pair { wanted, given, width: width.filter(|width| *width > 0.0) })
+            })
+            .collect();
+        let (owner, first) = (&system.components()[component], pairs.first()?.given.variable);
+        let prompt = system.experiment().order == Order::GaussSeidel
+            && network::has_feedthrough(owner, description, first);
+        Some(Ports { component, name: owner.name.clone(), status, pairs, prompt })
+    };
+    // What nothing feeds and nobody wants is no controller's.
+    let is_wanted = |ports: &Ports| {
+        let is_fed = |port: Port| links.iter().any(|link| link.to == port);
+        let starts = &system.components()[ports.component].start;
+        ports.pairs.iter().any(|pair| is_fed(pair.wanted))
+            || starts.keys().any(|key| key.starts_with("u_ref"))
+    };
+    descriptions.iter().enumerate().filter_map(of).filter(is_wanted).collect()
+}
+
+impl Watched {
+    /// `None` where a port has no slot.
+    pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
+        let pair = |pair: &Pair<Port>| {
+            let Pair { wanted, given, width } = *pair;
+            Some(Pair { wanted: layout.slot(wanted)?, given: layout.slot(given)?, width })
+        };
+        Some(Self {
+            name: ports.name.clone(),
+            status: layout.slot(ports.status)?,
+            pairs: ports.pairs.iter().map(pair).collect::<Option<_>>()?,
+            prompt: ports.prompt,
+            last: None,
+            samples: 0,
+            changed: 0,
+            total: 0.0,
+            most: 0.0,
+        })
+    }
+
+    /// Forgets the run before.
+    pub(super) fn reset(&mut self) {
+        (self.last, self.samples, self.changed, self.total, self.most) = (None, 0, 0, 0.0, 0.0);
+    }
+
+    /// Takes the `values` of a communication point.
+    pub(super) fn see(&mut self, values: &[f64]) {
+        let now: Vec<f64> = self.pairs.iter().map(|pair| values[pair.wanted]).collect();
+        let wanted = if self.prompt { Some(now.clone()) } else { self.last.take() };
+        self.last = Some(now);
+        let status = Status::from_number(values[self.status] as i32);
+        let is_idle = status.is_some_and(|s| s.is_abstention() || s == Status::NotArmed);
+        let Some(wanted) = wanted.filter(|_| !is_idle) else { return };
+        self.samples += 1;
+        let (mut far, mut is_changed) = (0.0_f64, false);
+        for (pair, wanted) in self.pairs.iter().zip(&wanted) {
+            let by = (values[pair.given] - wanted).abs();
+            // Not-a-number was not wanted.
+            if by <= SAME * (1.0 + wanted.abs()) {
+                continue;
+            }
+            is_changed = true;
+            far = far.max(pair.width.map_or(0.0, |width| by / width));
+        }
+        if is_changed {
+            self.changed += 1;
+            self.total += far;
+            self.most = self.most.max(far);
+        }
+    }
+
+    /// What the filter has changed until now.
+    pub(super) fn interference(&self) -> Interference {
+        let is_bounded = self.changed > 0 && self.pairs.iter().any(|pair| pair.width.is_some());
+        Interference {
+            filter: self.name.clone(),
+            samples: self.samples,
+            changed: self.changed,
+            mean: is_bounded.then(|| self.total / self.changed as f64),
+            most: is_bounded.then_some(self.most),
+        }
+    }
+}
