@@ -70,8 +70,8 @@ pub enum Driver {
     Rows,
     /// As near to u_ref as its bounds, or the rows and a comfortable plan, allow.
     Eased,
-    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, with a plan
-    /// behind it.
+    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, or an input
+    /// that does not jump from the last one; with a plan behind it.
     Between,
     /// The plan: nothing else keeps the promise.
     Plan,
