@@ -1546,7 +1546,7 @@ impl AssuredFilter {
         let failure = match found {
             Ok(Chosen { driver, piece, share, witness, plan }) => {
                 self.piece = piece;
-                self.note(&mut way, share);
+                self.note(&mut way, share, driver);
                 self.next.way = way;
                 (self.next.share, self.next.lost, self.next.regained) = (share, None, Sought::default());
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);

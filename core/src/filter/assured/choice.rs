@@ -7,14 +7,18 @@ use crate::scalar::all_finite;
 
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
-/// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow.
-const FAR: f64 = 0.5;
-/// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder.
+/// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow. Where
+/// u_ref had the last input, and where it had not.
+const FAR: [f64; 2] = [0.5, 0.9];
+/// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder. No more
+/// than the first plan needs, or this part of the bounds, so that some of them is left for who is led to it smoothly.
 const EASE: f64 = 2.0;
+const LEISURE: f64 = 0.7;
 /// And in units of the largest u_ref so far.
 const EAGER: f64 = 1.5;
-/// The largest input of another plan for which the one that drives gives way to u_ref, in units of that of the one that drives.
-const GENTLER: f64 = 0.9;
+/// The largest input of another plan for which the one that drives gives way to u_ref, in units of what is comfortable: with more
+/// they would soon change places again.
+const GENTLER: f64 = 0.5;
 /// The change of an input from one sample to the next that is no jump, as a part of the width of its bounds.
 const SMOOTH: f64 = 0.15;
 /// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
@@ -51,12 +55,14 @@ pub(super) struct Way {
     held: u32,
     /// Whether the plan that drives gives way to u_ref, behind all of which another plan was found.
     returns: bool,
+    /// Whether u_ref had the last sample, whole or in part.
+    wished: bool,
 }
 
 impl Way {
     /// The first, beside the first plan.
     pub(super) fn beside(first: &Witness) -> Self {
-        Self { ease: EASE * first.effort, ..Self::default() }
+        Self { ease: (EASE * first.effort).min(first.effort.max(LEISURE)), wished: true, ..Self::default() }
     }
 
     /// Whether it is none that a filter had.
@@ -145,22 +151,24 @@ impl AssuredFilter {
             way.eagerness = way.eagerness.max(self.bounds.part(wanted));
         }
         let comfort = if reached { COMFORTABLE } else { way.ease.max(EAGER * way.eagerness) };
-        // Gentle, and where every set has been reached with the margin that the rows aim at.
+        // Where every set has been reached, with the margin that the rows aim at and gently, as long as u_ref has its way; where the
+        // rows took over they let it pass, or it is far from every edge.
+        let margin = |at: &Tightest| {
+            let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
+            self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
+        };
+        let wished = way.wished;
         let comfortable = |witness: &Witness| {
-            let margin = |at: &Tightest| {
-                let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
-                self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
-            };
-            let has_margin = |at: Tightest| at.slack >= margin(&at);
-            let is_far = |at: Tightest| {
-                let h = self.filter().report().barriers[at.barrier].h;
-                at.slack >= (FAR * h).max(margin(&at))
-            };
-            match reached {
-                true if witness.effort > comfort => witness.tightest.is_none_or(is_far),
-                true => witness.tightest.is_none_or(has_margin),
-                false => witness.effort <= comfort,
+            let is_gentle = witness.effort <= comfort;
+            if !reached {
+                return is_gentle;
             }
+            let least = |at: &Tightest| match (wished, is_gentle) {
+                (true, true) => 0.0,
+                (true, false) => FAR[0] * self.filter().report().barriers[at.barrier].h,
+                (false, _) => FAR[1] * self.filter().report().barriers[at.barrier].h,
+            };
+            witness.tightest.is_none_or(|at| at.slack >= least(&at).max(margin(&at)))
         };
         let behind = |plan: &Plan, u: &[f64]| planner.behind(plan, t, x, u).ok();
         let passed = if wanted == wish { Driver::Reference } else { Driver::Eased };
@@ -231,28 +239,22 @@ impl AssuredFilter {
             core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
         };
         let most = kept.effort.max(comfort);
-        let gentle = |witness: &Witness| reached || witness.effort <= most;
+        let gentle = |witness: &Witness| witness.effort <= most;
         if passes {
             let (part, witness) = towards(&own[..far.len()], far, kept, |u| behind(plan, u).filter(gentle));
             return Ok(mixed(1.0 - part, witness, None));
         }
         let returned = (share - RETURNED * GIVEN_BACK).max(0.0);
-        if !to_rows {
-            let comfort = match way.pause > PAUSES[0] {
-                true => comfort.min((GENTLER * kept.effort).max(way.ease)),
-                false => comfort,
-            };
-            if let Some(other) = self.sought(planner, (t, x), wanted, way, comfort) {
-                // At once where the two plans lead apart.
-                let gently =
-                    behind(&other, &between(returned)[..far.len()]).map(|witness| (returned, witness));
-                let (share, witness) = gently.unwrap_or((0.0, other.witness.clone()));
-                return Ok(mixed(share, witness, Some(other)));
-            }
+        if !to_rows && let Some(other) = self.sought(planner, (t, x), wanted, way, GENTLER * comfort) {
+            // At once where the two plans lead apart.
+            let gently = behind(&other, &between(returned)[..far.len()]).map(|witness| (returned, witness));
+            let (share, witness) = gently.unwrap_or((0.0, other.witness.clone()));
+            return Ok(mixed(share, witness, Some(other)));
         }
         let shares = SHARES.map(|more| share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
         let first = way.returns.then_some(returned);
-        let shares = shares.skip(usize::from(way.held > 0));
+        // On the way to a deadline the plan gives back to another one alone: u_ref leads off it.
+        let shares = shares.skip(usize::from(!to_rows || way.held > 0));
         let found = first.into_iter().chain(shares).find_map(|share| {
             let witness = behind(plan, &between(share)[..far.len()]).filter(gentle)?;
             Some((share, witness))
@@ -306,7 +308,9 @@ impl AssuredFilter {
             (piece.held[i], *u) = (smooth != *u, smooth);
         }
         let is_smooth = !piece.held.contains(&true);
-        if driver == Driver::Reference || self.commitment.standing != Standing::Assured || is_smooth {
+        // u_ref jumps where it wishes to, but not to it from another.
+        let goes_on = driver == Driver::Reference && self.commitment.way.wished;
+        if goes_on || self.commitment.standing != Standing::Assured || is_smooth {
             return chosen;
         }
         let smooth = &u[..inputs];
@@ -325,7 +329,8 @@ impl AssuredFilter {
     }
 
     /// Notes in `way` that the plan's own input is the part `share` of this sample's.
-    pub(super) fn note(&self, way: &mut Way, share: f64) {
+    pub(super) fn note(&self, way: &mut Way, share: f64, driver: Driver) {
+        way.wished = matches!(driver, Driver::Reference | Driver::Eased);
         way.pass([self.commitment.share, share].map(|share| share <= GIVEN_BACK));
     }
 }
