@@ -112,7 +112,7 @@ pub use nalgebra;
 pub const MAX_RELATIVE_DEGREE: usize = 8;
 
 /// Largest number of inputs, dim u.
-pub const MAX_INPUTS: usize = 12;
+pub const MAX_INPUTS: usize = 32;
 
 /// Largest number of rows of a quadratic program, and so of barriers.
-pub const MAX_ROWS: usize = 64;
+pub const MAX_ROWS: usize = 128;

@@ -137,7 +137,7 @@ fn number() -> impl Strategy<Value = f64> {
 prop_compose! {
     fn promise()(
         phase in prop::sample::select(Phase::ALL.to_vec()),
-        n in prop::array::uniform12(number()),
+        n in prop::array::uniform32(number()),
         anchor in prop::array::uniform8(number()),
         options in prop::array::uniform3(prop::option::of(number())),
         counts in prop::array::uniform3(any::<u32>()),
@@ -185,7 +185,7 @@ proptest! {
         barriers in prop::collection::vec(promise(), 2),
         (time, period) in (prop::option::of(number()), prop::option::of(number())),
         start in prop::option::of(number()),
-        input in prop::array::uniform12(number()),
+        input in prop::array::uniform32(number()),
         bends in prop::array::uniform2(prop::option::of(bend())),
     ) {
         let state = FilterState { barriers, time, period, input, start, bends };

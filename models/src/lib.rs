@@ -74,7 +74,7 @@ pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, 
 pub use units::{Unit, unit_of};
 
 /// Most states of a model.
-pub const MAX_STATES: usize = 32;
+pub const MAX_STATES: usize = 64;
 
 /// Most operations of a model with one barrier.
 pub const MAX_OPERATIONS: usize = 4096;

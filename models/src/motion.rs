@@ -59,6 +59,7 @@ macro_rules! with_directions {
             4 => $function::<_, 4>($($argument),*),
             5..=6 => $function::<_, 6>($($argument),*),
             7..=8 => $function::<_, 8>($($argument),*),
+            9..=12 => $function::<_, 12>($($argument),*),
             _ => $function::<_, { punctual_core::MAX_INPUTS }>($($argument),*),
         }
     };

@@ -187,7 +187,7 @@ fn a_step_allocates_nothing() {
 fn dimensions_out_of_range_are_refused() {
     let refused = |dimensions: Dimensions| dimensions.check().expect_err("it is refused").to_string();
     assert_eq!(refused(Dimensions { states: 0, ..DIMENSIONS }), "states: is 0, must be 1 to 32");
-    assert_eq!(refused(Dimensions { inputs: 13, ..DIMENSIONS }), "inputs: is 13, must be 1 to 12");
+    assert_eq!(refused(Dimensions { inputs: 33, ..DIMENSIONS }), "inputs: is 33, must be 1 to 32");
     let many = refused(Dimensions { barriers: 65, ..DIMENSIONS });
     assert!(many.starts_with("barriers: is 65, must be 0 to "), "{many}");
     let model = made(unicycle, disc).expect("a model");

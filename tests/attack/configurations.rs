@@ -193,7 +193,7 @@ fn deep_long_and_many() {
         (format!("{head}{} = 1", vec!["a"; 500_000].join(".")), ""),
         (format!("{head}[{}]", vec!["a"; 500_000].join(".")), ""),
         (format!("name = \"{}\"\n{head}{}", "n".repeat(5_000_000), disc(0)), "name"),
-        (format!("{head}{many}"), "barrier: has 20000 entries, must have at most 64"),
+        (format!("{head}{many}"), "barrier: has 20000 entries, must have at most 128"),
     ] {
         let begin = Instant::now();
         let error = Configuration::parse(&text).map(|c| c.kind()).expect_err("it is refused").to_string();

@@ -164,7 +164,7 @@ fn libraries_that_are_refused() {
         "SIZE=8",
         "STATES=0",
         "STATES=33",
-        "INPUTS=13",
+        "INPUTS=33",
         "PARAMETERS=257",
         "BARRIERS=65",
         "PLANT=NULL",

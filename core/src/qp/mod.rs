@@ -293,6 +293,7 @@ pub struct Workspace {
     // The method for the number of inputs, rounded up. For two inputs it takes a third of the time of the last one.
     two: DualActiveSet<2>,
     four: DualActiveSet<4>,
+    twelve: DualActiveSet<12>,
     any: DualActiveSet<MAX_INPUTS>,
     active: [Active; MAX_ROWS + MAX_INPUTS],
     active_len: usize,
@@ -313,6 +314,7 @@ impl Workspace {
             backend,
             two: DualActiveSet::EMPTY,
             four: DualActiveSet::EMPTY,
+            twelve: DualActiveSet::EMPTY,
             any: DualActiveSet::EMPTY,
             active: [Active { constraint: Constraint::Row(0), multiplier: 0.0 }; MAX_ROWS + MAX_INPUTS],
             active_len: 0,
@@ -369,7 +371,7 @@ impl Workspace {
             return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
         }
         // Several: from the guess, else by the dual active-set method.
-        let Self { two, four, any, active, active_len, relaxed, ill_conditioned, .. } = self;
+        let Self { two, four, twelve, any, active, active_len, relaxed, ill_conditioned, .. } = self;
         let (outcome, iterations);
         macro_rules! solve_with {
             ($method:ident, $n:expr) => {{
@@ -392,6 +394,7 @@ impl Workspace {
         match u.len() {
             ..=2 => solve_with!(two, 2),
             3..=4 => solve_with!(four, 4),
+            5..=12 => solve_with!(twelve, 12),
             _ => solve_with!(any, MAX_INPUTS),
         }
         Solution { outcome, solver: Solver::DualActiveSet, iterations }

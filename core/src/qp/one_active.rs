@@ -7,7 +7,7 @@
 
 use core::array::from_fn;
 
-use super::{Enforcement, MAX_INPUTS, Problem, ROUND_OFF, Row};
+use super::{Enforcement, Problem, ROUND_OFF, Row};
 
 /// Squared lengths and slacks in this range can neither overflow nor lose digits on the way.
 const SIZES: core::ops::Range<f64> = 1e-150..1e150;
@@ -24,7 +24,7 @@ pub(super) enum Answer {
 /// or something has to yield.
 #[inline]
 pub(super) fn solve(p: &Problem, u: &mut [f64]) -> Option<Answer> {
-    const { assert!(MAX_INPUTS == 12) }
+    // More of them are rare, and left to the active set.
     // With the number of inputs known to the compiler the sums unroll.
     macro_rules! by_inputs {
         ($($m:literal),*) => {

@@ -4,18 +4,18 @@ use core::ops::{BitAnd, BitOr, BitOrAssign, Sub};
 
 use crate::MAX_ROWS;
 
-const _: () = assert!(MAX_ROWS == u64::BITS as usize, "one bit per row");
+const _: () = assert!(MAX_ROWS == u128::BITS as usize, "one bit per row");
 
 /// Some of at most [`MAX_ROWS`] rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RowSet(u64);
+pub struct RowSet(u128);
 
 impl RowSet {
     /// No row.
     pub const EMPTY: Self = Self(0);
 
     /// Every row.
-    pub const ALL: Self = Self(u64::MAX);
+    pub const ALL: Self = Self(u128::MAX);
 
     /// Row `i` alone.
     pub const fn of(i: usize) -> Self {
@@ -24,7 +24,7 @@ impl RowSet {
 
     /// The first `count` rows.
     pub const fn first(count: usize) -> Self {
-        Self(match u64::MAX.checked_shr((MAX_ROWS - count) as u32) {
+        Self(match u128::MAX.checked_shr((MAX_ROWS - count) as u32) {
             Some(bits) => bits,
             None => 0,
         })
@@ -74,7 +74,7 @@ impl RowSet {
     /// The rows of `0..count` for which `f` is true.
     #[inline(always)]
     pub fn with(count: usize, f: impl Fn(usize) -> bool) -> Self {
-        (0..count).fold(Self::EMPTY, |Self(bits), i| Self(bits | u64::from(f(i)) << i))
+        (0..count).fold(Self::EMPTY, |Self(bits), i| Self(bits | u128::from(f(i)) << i))
     }
 }
 

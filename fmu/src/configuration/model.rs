@@ -113,7 +113,7 @@ pub enum PlantSection {
     Plugin(PluginSection),
     /// Inputs alone, for a filter that is given the derivatives of its barriers.
     External {
-        /// The inputs, in order: at most 12.
+        /// The inputs, in order: at most 32.
         inputs: Vec<VariableSection>,
     },
 }
@@ -121,10 +121,10 @@ pub enum PlantSection {
 /// A model of expressions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExpressionSection {
-    /// The states, in order: at most 32.
+    /// The states, in order: at most 64.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<VariableSection>,
-    /// The inputs, in order: at most 12.
+    /// The inputs, in order: at most 32.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<VariableSection>,
     /// The constants.
@@ -146,13 +146,13 @@ pub(super) static PLANT: Section = Section {
                 "states",
                 Tables(&VARIABLE),
                 Some(""),
-                "your own model: variables, in order, at most 32",
+                "your own model: variables, in order, at most 64",
             ),
             Key::new(
                 "inputs",
                 Tables(&VARIABLE),
                 Some(""),
-                "your own model: variables, in order, at most 12",
+                "your own model: variables, in order, at most 32",
             ),
             Key::new(
                 "parameters",

@@ -16,7 +16,7 @@ use std::ptr::null;
 /// The version of the interface.
 pub const ABI: u32 = 1;
 /// Most states.
-const MAX_STATES: usize = 32;
+const MAX_STATES: usize = 64;
 /// The id that stands for the literal.
 const LITERAL: u32 = u32::MAX;
 
@@ -195,9 +195,9 @@ impl Variable {
 
 /// A model `ẋ = f(x) + g(x) u` with barriers.
 pub trait Model {
-    /// The states, at most 32.
+    /// The states, at most 64.
     const STATES: &'static [Variable];
-    /// The inputs, at most 12.
+    /// The inputs, at most 32.
     const INPUTS: &'static [Variable];
     /// The parameters, with their defaults. Default: none.
     const PARAMETERS: &'static [Variable] = &[];

@@ -134,7 +134,7 @@ fn defects() {
         (
             "inputs = [\n",
             &format!("inputs = [{inputs}\n"),
-            "plant.inputs: has 15 entries, must have at most 12".to_owned(),
+            "plant.inputs: has 35 entries, must have at most 32".to_owned(),
         ),
     ] {
         assert_eq!(refusal(FILTER, from, to), wanted, "{to}");
