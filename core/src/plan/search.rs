@@ -27,6 +27,10 @@ use crate::scalar::all_finite;
 
 /// Price of a violation of the size of h on the way, against the price of full inputs all the time.
 const PENALTY: f64 = 300.0;
+/// The part of its largest h on the way up to which a row is near its edge.
+const NEAR: f64 = 0.1;
+/// The price of a row from which it counts, in units of that of a violation.
+const PRICED: f64 = 1e-6;
 /// The trust region at first, in parts of half the width of the bounds.
 const TRUST: f64 = 0.7;
 /// Its least size.
@@ -282,15 +286,52 @@ impl Search<'_> {
         }
     }
 
-    /// The answer of the quadratic program around `at`.
+    /// The answer of the quadratic program around `at`. Rows that are far from their edge come in where the answer would break them.
     fn program(&self, at: &Trajectory, linear: &[Linear], prices: &[f64], trust: &[f64]) -> Option<Answer> {
+        let nx = self.model.states();
+        let slopes_of = |&(i, k, _): &(usize, usize, f64)| {
+            let mut gradient = vec![0.0; nx];
+            slopes(self.requirements[i].model, self.times[k], &at.states[k], &mut gradient);
+            gradient
+        };
+        let gradients: Vec<Vec<f64>> = at.values.iter().map(slopes_of).collect();
+        let is_near = |(&(i, _, value), &price): (&(usize, usize, f64), &f64)| {
+            value <= NEAR * at.sizes[i] || price > PRICED * PENALTY
+        };
+        let mut rows: Vec<bool> = at.values.iter().zip(prices).map(is_near).collect();
+        loop {
+            let answer = self.program_of(&rows, &gradients, at, linear, prices, trust)?;
+            let mut breaks = false;
+            for ((row, &(_, k, value)), gradient) in rows.iter_mut().zip(&at.values).zip(&gradients) {
+                let moved = answer.states[k].iter().zip(&at.states[k]).zip(gradient);
+                if !*row && value + moved.map(|((to, from), slope)| slope * (to - from)).sum::<f64>() < 0.0 {
+                    (*row, breaks) = (true, true);
+                }
+            }
+            if !breaks {
+                return Some(answer);
+            }
+        }
+    }
+
+    /// The answer of that program with some of its `rows`, whose gradients are `gradients`.
+    fn program_of(
+        &self,
+        rows: &[bool],
+        gradients: &[Vec<f64>],
+        at: &Trajectory,
+        linear: &[Linear],
+        prices: &[f64],
+        trust: &[f64],
+    ) -> Option<Answer> {
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
+        let kept: Vec<usize> = (0..rows.len()).filter(|&row| rows[row]).collect();
         // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the rest.
         let input = |k: usize, i: usize| k * nu + i;
         let state = |k: usize, i: usize| (holds + 1) * nu + (k - 1) * nx + i;
         let first_slack = (holds + 1) * nu + holds * nx;
-        let first_rest = first_slack + at.values.len();
+        let first_rest = first_slack + kept.len();
         let variables = first_rest + nx;
         let (mut is, mut js, mut vs, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut entry = |i: usize, j: usize, v: f64| {
@@ -317,14 +358,13 @@ impl Search<'_> {
         }
         let equations = b.len();
         // The sets at the nodes.
-        let mut gradient = vec![0.0; nx];
-        for (row, &(i, k, value)) in at.values.iter().enumerate() {
+        for (slack, &row) in kept.iter().enumerate() {
+            let (i, k, value) = at.values[row];
             let size = at.sizes[i].max(f64::MIN_POSITIVE);
-            slopes(self.requirements[i].model, self.times[k], &at.states[k], &mut gradient);
             for j in 0..nx {
-                entry(b.len(), state(k, j), -gradient[j] / size);
+                entry(b.len(), state(k, j), -gradients[row][j] / size);
             }
-            entry(b.len(), first_slack + row, -1.0);
+            entry(b.len(), first_slack + slack, -1.0);
             b.push(value / size);
         }
         // The rest at the end, if there is to be one.
@@ -375,7 +415,7 @@ impl Search<'_> {
         let mut indices: Vec<usize> = (0..variables).collect();
         let mut columns = indices.clone();
         for (&(i, k, _), &price) in at.values.iter().zip(prices) {
-            if price > 1e-6 * PENALTY {
+            if price > PRICED * PENALTY {
                 let weight = price / at.sizes[i].max(f64::MIN_POSITIVE);
                 let bent = self.curvature(i, k, &at.states[k]) * weight;
                 for r in 0..nx {
@@ -390,18 +430,18 @@ impl Search<'_> {
             }
         }
         let p = CscMatrix::new_from_triplets(variables, variables, indices, columns, diagonal);
-        let rows = CscMatrix::new_from_triplets(b.len(), variables, is, js, vs);
+        let constraints = CscMatrix::new_from_triplets(b.len(), variables, is, js, vs);
         let cones = [ZeroConeT(equations), NonnegativeConeT(b.len() - equations)];
         let settings = DefaultSettings {
             verbose: false,
             max_iter: 60,
             iterative_refinement_enable: !self.quick,
-            tol_gap_abs: 1e-6,
-            tol_gap_rel: 1e-6,
+            tol_gap_abs: if self.quick { 1e-4 } else { 1e-6 },
+            tol_gap_rel: if self.quick { 1e-4 } else { 1e-6 },
             tol_feas: 1e-6,
             ..DefaultSettings::default()
         };
-        let mut solver = DefaultSolver::new(&p, &q, &rows, &b, &cones, settings).ok()?;
+        let mut solver = DefaultSolver::new(&p, &q, &constraints, &b, &cones, settings).ok()?;
         solver.solve();
         let solution = &solver.solution;
         let solved = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
@@ -422,7 +462,8 @@ impl Search<'_> {
         for (k, x) in states.iter_mut().enumerate().skip(1) {
             x.iter_mut().enumerate().for_each(|(i, x)| *x += solution.x[state(k, i)]);
         }
-        let prices = solution.z[equations..equations + at.values.len()].to_vec();
+        let mut prices = vec![0.0; rows.len()];
+        kept.iter().zip(&solution.z[equations..]).for_each(|(&row, price)| prices[row] = *price);
         Some(Answer { inputs, states, prices, merit })
     }
 
