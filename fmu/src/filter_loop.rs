@@ -2,7 +2,7 @@
 
 use punctual_core::Error;
 use punctual_core::filter::{
-    AssuredFilter, Commitment, FilterState, IntegratedFilter, NoDerivative, Report, SafetyFilter,
+    AssuredFilter, Commitment, FilterState, IntegratedFilter, NoDerivative, Reason, Report, SafetyFilter,
     SampleDerivative, Standing,
 };
 use punctual_core::lie::Direction;
@@ -65,6 +65,14 @@ impl FilterLoop {
     pub fn assured_until(&self) -> Option<f64> {
         match self {
             Self::Assured(assured) => assured.assurance().until,
+            Self::Plain(_) | Self::Integrated(_) => None,
+        }
+    }
+
+    /// Why u_ref was changed, where plans are followed and it was.
+    pub fn reason(&self) -> Option<Reason> {
+        match self {
+            Self::Assured(assured) => assured.assurance().reason,
             Self::Plain(_) | Self::Integrated(_) => None,
         }
     }

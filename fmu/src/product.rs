@@ -424,6 +424,10 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     }
     if c.is_assured() {
         table.add("assurance".into(), "where the promise stands", output, enumerated(ASSURANCE));
+        let most = c.barrier.len() as i32;
+        let number = VariableKind::Integer(Integer { min: Some(0), max: Some(most), ..Integer::default() });
+        let reason = "number of the barrier for which u_ref was changed, in their order; 0 for none";
+        table.add("reason".into(), reason, output, number);
     }
     if c.ends_plans() {
         let until = "time until which the promise is kept, 1e30 for ever; now, where nothing is assured";

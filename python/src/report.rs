@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use punctual_core::filter::{self, Phase, Standing, Status};
+use punctual_core::filter::{self, Phase, Reason, Standing, Status};
 use punctual_fmu::FilterLoop;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -114,6 +114,7 @@ pub(crate) struct Step {
     /// Time in s until which every promise is kept, `inf` for ever; `None` where nothing is assured.
     #[pyo3(get)]
     assured_until: Option<f64>,
+    reason: Option<Reason>,
     barriers: Vec<filter::BarrierReport>,
     names: Arc<[String]>,
 }
@@ -126,6 +127,7 @@ impl Step {
             status: report.status,
             standing: filter.standing().map(|(standing, _)| standing),
             assured_until: filter.assured_until(),
+            reason: filter.reason(),
             barriers: report.barriers.clone(),
             names: Arc::clone(names),
         }
@@ -144,6 +146,13 @@ impl Step {
     #[getter]
     fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()
+    }
+
+    /// Why u_ref was changed: the name of a barrier, and when in s it would be broken, or come nearest to its edge, had u_ref been
+    /// held; `None` where it was not changed, or no plans are followed.
+    #[getter]
+    fn reason(&self) -> Option<(&str, f64)> {
+        self.reason.and_then(|Reason { barrier, time }| Some((self.names.get(barrier)?.as_str(), time)))
     }
 
     /// Whether `u` satisfies every constraint, or has a plan behind it that keeps every promise.

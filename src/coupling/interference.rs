@@ -1,5 +1,7 @@
 //! How much a filter changes what is wanted: at how many samples, and by how much.
 
+use std::collections::BTreeMap;
+
 use punctual_core::filter::Status;
 use serde::Serialize;
 
@@ -28,6 +30,8 @@ pub struct Interference {
     pub mean: Option<f64>,
     /// The most at one of them.
     pub most: Option<f64>,
+    /// The barriers for which it was changed, and at how many of them, where the filter follows plans.
+    pub reasons: BTreeMap<String, u64>,
 }
 
 impl Interference {
@@ -48,7 +52,11 @@ impl Interference {
             }
             _ => String::new(),
         };
-        format!("{filter} changed u_ref at {changed} of {samples} samples ({share:.1} %){by}.")
+        let mut reasons: Vec<(&String, &u64)> = self.reasons.iter().collect();
+        reasons.sort_by_key(|(_, times)| std::cmp::Reverse(**times));
+        let each: Vec<String> = reasons.iter().map(|(name, times)| format!("{name} at {times}")).collect();
+        let why = if each.is_empty() { String::new() } else { format!("; for {}", each.join(", ")) };
+        format!("{filter} changed u_ref at {changed} of {samples} samples ({share:.1} %){by}{why}.")
     }
 }
 
@@ -64,13 +72,15 @@ pub(super) struct Ports {
     component: usize,
     name: String,
     status: Port,
+    reason: Option<Port>,
+    barriers: Vec<String>,
     pairs: Vec<Pair<Port>>,
     prompt: bool,
 }
 
 impl Ports {
     pub(super) fn all(&self) -> impl Iterator<Item = Port> {
-        self.pairs.iter().flat_map(|pair| [pair.wanted, pair.given]).chain([self.status])
+        self.pairs.iter().flat_map(|pair| [pair.wanted, pair.given]).chain([self.status]).chain(self.reason)
     }
 }
 
@@ -78,6 +88,9 @@ impl Ports {
 pub(super) struct Watched {
     name: String,
     status: usize,
+    /// The number of the barrier for which it was changed, and the names of all.
+    reason: Option<usize>,
+    barriers: Vec<String>,
     pairs: Vec<Pair<usize>>,
     prompt: bool,
     /// What was wanted at the last point.
@@ -86,6 +99,7 @@ pub(super) struct Watched {
     changed: u64,
     total: f64,
     most: f64,
+    reasons: BTreeMap<String, u64>,
 }
 
 /// Those of all filters in `system`.
@@ -110,7 +124,10 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
         let (owner, first) = (&system.components()[component], pairs.first()?.given.variable);
         let prompt = system.experiment().order == Order::GaussSeidel
             && network::has_feedthrough(owner, description, first);
-        Some(Ports { component, name: owner.name.clone(), status, pairs, prompt })
+        let barrier = |name: &str| name.strip_suffix(".guaranteed").map(str::to_owned);
+        let barriers = description.variables.iter().filter_map(|v| barrier(&v.name)).collect();
+        let (name, reason) = (owner.name.clone(), variable("reason"));
+        Some(Ports { component, name, status, reason, barriers, pairs, prompt })
     };
     // What nothing feeds and nobody wants is no controller's.
     let is_wanted = |ports: &Ports| {
@@ -132,6 +149,8 @@ impl Watched {
         Some(Self {
             name: ports.name.clone(),
             status: layout.slot(ports.status)?,
+            reason: ports.reason.and_then(|port| layout.slot(port)),
+            barriers: ports.barriers.clone(),
             pairs: ports.pairs.iter().map(pair).collect::<Option<_>>()?,
             prompt: ports.prompt,
             last: None,
@@ -139,12 +158,14 @@ impl Watched {
             changed: 0,
             total: 0.0,
             most: 0.0,
+            reasons: BTreeMap::new(),
         })
     }
 
     /// Forgets the run before.
     pub(super) fn reset(&mut self) {
         (self.last, self.samples, self.changed, self.total, self.most) = (None, 0, 0, 0.0, 0.0);
+        self.reasons.clear();
     }
 
     /// Takes the `values` of a communication point.
@@ -170,6 +191,10 @@ impl Watched {
             self.changed += 1;
             self.total += far;
             self.most = self.most.max(far);
+            let reason = self.reason.map_or(0, |reason| values[reason] as usize);
+            if let Some(name) = reason.checked_sub(1).and_then(|barrier| self.barriers.get(barrier)) {
+                *self.reasons.entry(name.clone()).or_default() += 1;
+            }
         }
     }
 
@@ -182,6 +207,7 @@ impl Watched {
             changed: self.changed,
             mean: is_bounded.then(|| self.total / self.changed as f64),
             most: is_bounded.then_some(self.most),
+            reasons: self.reasons.clone(),
         }
     }
 }

@@ -131,6 +131,18 @@ impl Standing {
     }
 }
 
+/// Why u_ref was changed: with it held until the next sample, and the plan followed then, this barrier would be broken, or come
+/// nearest to its edge where that is merely uncomfortable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Reason {
+    /// The number of the barrier.
+    pub barrier: usize,
+    /// When, in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub time: f64,
+}
+
 /// What an [`AssuredFilter`] says of a step beside its [`Report`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -144,6 +156,9 @@ pub struct Assurance {
     /// The time in s until which every promise is kept, infinite for ever; `None` where nothing is assured. Once given, it
     /// never goes back.
     pub until: Option<f64>,
+    /// Why u_ref was changed, as seen when it last passed no more; `None` where it was not, or for its bounds alone, or where
+    /// nothing is assured.
+    pub reason: Option<Reason>,
 }
 
 impl Assurance {
@@ -764,7 +779,7 @@ impl AssuredFilter {
         self.looked = None;
         let Commitment { standing, failure, .. } = self.commitment;
         let until = self.plan().map(|witness| witness.until);
-        self.assurance = Assurance { standing, driver: Driver::Rows, failure, until };
+        self.assurance = Assurance { standing, driver: Driver::Rows, failure, until, reason: None };
         Ok(())
     }
 
@@ -922,7 +937,7 @@ impl AssuredFilter {
                 }
             }
         }
-        (self.assurance.driver, self.piece) = (Driver::Rows, Piece::ROWS);
+        (self.assurance.driver, self.piece, self.assurance.reason) = (Driver::Rows, Piece::ROWS, None);
         // What is let go on arrival is promised no longer.
         let SafetyFilter { slots, workspace, .. } = self.rows.filter();
         let reports = &workspace.report.barriers;
@@ -954,6 +969,7 @@ impl AssuredFilter {
         let is_assured = *standing == Standing::Assured;
         (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
         self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { plan.witness.until });
+        self.assurance.reason = self.assurance.reason.filter(|_| is_assured);
         if is_assured || u != &rows[..u.len()] {
             self.report_on(&rows[..u.len()], u);
         }
@@ -1550,6 +1566,7 @@ impl AssuredFilter {
                 self.next.way = way;
                 (self.next.share, self.next.lost, self.next.regained) = (share, None, Sought::default());
                 u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
+                self.assurance.reason = self.next.way.reason.filter(|_| *u != wanted[..u.len()]);
                 if let Some(plan) = plan {
                     self.next.plan = plan;
                 }

@@ -26,7 +26,7 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
-pub use assured::{Assurance, AssuredFilter, Commitment, Driver, Pace, Standing};
+pub use assured::{Assurance, AssuredFilter, Commitment, Driver, Pace, Reason, Standing};
 pub use builder::FilterBuilder;
 pub use integrator::{IntegratedFilter, Integration};
 pub use report::{BarrierReport, Report, Status};

@@ -86,16 +86,17 @@ impl FilterBlock {
 
     /// The number of the output with the integral, which comes after what is said of plans.
     fn integral(&self) -> usize {
-        let of_plans = usize::from(self.configuration.is_assured());
+        let of_plans = 2 * usize::from(self.configuration.is_assured());
         self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
     }
 
-    /// Writes where the promise stands, and at `t` until when it does.
+    /// Writes where the promise stands, why u_ref was changed, and at `t` until when the promise stands.
     fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
         let at = self.after_barriers();
         values.integers[at] = standing as i32;
+        values.integers[at + 1] = self.filter.reason().map_or(0, |reason| reason.barrier as i32 + 1);
         if self.configuration.ends_plans() {
-            values.reals[at + 1] = self.filter.assured_until().map_or(t, |until| until.min(UNBOUNDED));
+            values.reals[at + 2] = self.filter.assured_until().map_or(t, |until| until.min(UNBOUNDED));
         }
     }
 

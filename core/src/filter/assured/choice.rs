@@ -1,6 +1,6 @@
 //! The input of a sample: u_ref where a plan stands behind it, else as near to it as one does.
 
-use super::{AMPLE, AssuredFilter, Driver, Piece, Standing};
+use super::{AMPLE, AssuredFilter, Driver, Piece, Reason, Standing};
 use crate::MAX_INPUTS;
 use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
 use crate::scalar::all_finite;
@@ -57,6 +57,8 @@ pub(super) struct Way {
     returns: bool,
     /// Whether u_ref had the last sample, whole or in part.
     wished: bool,
+    /// Why it has not its way.
+    pub(super) reason: Option<Reason>,
 }
 
 impl Way {
@@ -175,9 +177,15 @@ impl AssuredFilter {
         if is_wish && passes {
             let driver = passed;
             let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
-            let near = behind(plan, wanted);
-            let is_near = near.is_some();
-            if let Some(witness) = near.filter(comfortable) {
+            let near = planner.behind(plan, t, x, wanted);
+            way.reason = match &near {
+                Ok(witness) => witness.tightest.map(|at| Reason { barrier: at.barrier, time: at.time }),
+                Err(Failure::Broken { barrier, time, .. }) => Some(Reason { barrier: *barrier, time: *time }),
+                Err(_) => None,
+            };
+            let is_near = near.is_ok();
+            if let Some(witness) = near.ok().filter(comfortable) {
+                way.reason = None;
                 return Ok(chosen(witness, None));
             }
             if !reached && !is_near {
