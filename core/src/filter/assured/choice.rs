@@ -8,8 +8,8 @@ use crate::scalar::all_finite;
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
 /// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow. Where
-/// u_ref had the last input, and where it had not.
-const FAR: [f64; 2] = [0.5, 0.9];
+/// u_ref had the last input, and where it had not: who is back too soon is soon stopped again.
+const FAR: [f64; 2] = [0.1, 0.9];
 /// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder. No more
 /// than the first plan needs, or this part of the bounds, so that some of them is left for who is led to it smoothly.
 const EASE: f64 = 2.0;
