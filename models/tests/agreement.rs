@@ -266,11 +266,11 @@ fn chains_of_integrators_have_their_order_as_relative_degree() {
 }
 
 #[test]
-fn twelve_inputs() {
-    let names: Vec<_> = (0..12).map(|i| (format!("x{i}"), format!("u{i}"))).collect();
+fn thirty_two_inputs() {
+    let names: Vec<_> = (0..32).map(|i| (format!("x{i}"), format!("u{i}"))).collect();
     let states: Vec<_> = names.iter().map(|n| n.0.as_str()).collect();
     let inputs: Vec<_> = names.iter().map(|n| n.1.as_str()).collect();
-    for m in 1..=12 {
+    for m in 1..=32 {
         let model = Model::new(&states[..m], &inputs[..m], &[], &inputs[..m]).expect("a model");
         let sum = states[..m]
             .iter()
@@ -282,7 +282,7 @@ fn twelve_inputs() {
         assert_eq!(barrier.relative_degree(&vec![[-1.0, 1.0]; m]), RelativeDegree::Uniform(1));
         let mut out = Derivatives::ZERO;
         barrier.source(1).expect("in range").evaluate(0.0, &vec![0.0; m], &mut out);
-        let wanted: Vec<_> = (0..12).map(|i| if i < m { (i + 1) as f64 } else { 0.0 }).collect();
+        let wanted: Vec<_> = (0..32).map(|i| if i < m { (i + 1) as f64 } else { 0.0 }).collect();
         assert_eq!(out.row.to_vec(), wanted);
     }
 }

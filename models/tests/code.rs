@@ -186,10 +186,10 @@ fn a_step_allocates_nothing() {
 #[test]
 fn dimensions_out_of_range_are_refused() {
     let refused = |dimensions: Dimensions| dimensions.check().expect_err("it is refused").to_string();
-    assert_eq!(refused(Dimensions { states: 0, ..DIMENSIONS }), "states: is 0, must be 1 to 32");
+    assert_eq!(refused(Dimensions { states: 0, ..DIMENSIONS }), "states: is 0, must be 1 to 64");
     assert_eq!(refused(Dimensions { inputs: 33, ..DIMENSIONS }), "inputs: is 33, must be 1 to 32");
-    let many = refused(Dimensions { barriers: 65, ..DIMENSIONS });
-    assert!(many.starts_with("barriers: is 65, must be 0 to "), "{many}");
+    let many = refused(Dimensions { barriers: 129, ..DIMENSIONS });
+    assert!(many.starts_with("barriers: is 129, must be 0 to "), "{many}");
     let model = made(unicycle, disc).expect("a model");
     assert_eq!(model.barrier(1).err().expect("there is one").to_string(), "barrier: is 1, must be < 1");
 }

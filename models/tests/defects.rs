@@ -50,7 +50,7 @@ fn names_and_numbers_of_them() {
         let derivatives = vec!["0"; states.len()];
         Model::new(states, inputs, parameters, &derivatives).expect_err("refused").to_string()
     };
-    assert_eq!(refused(&[], &["u"], &[]), "states: has 0 entries, must have 1 to 32");
+    assert_eq!(refused(&[], &["u"], &[]), "states: has 0 entries, must have 1 to 64");
     assert_eq!(refused(&["x"; MAX_STATES + 1], &["u"], &[]), "states: has 65 entries, must have 1 to 64");
     assert_eq!(refused(&["x"], &[], &[]), "inputs: has 0 entries, must have 1 to 32");
     let twice = "inputs[0]: is \"x\", which is already the name of something else";

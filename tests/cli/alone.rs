@@ -145,7 +145,7 @@ fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
     assert_eq!(names, ["goal", "tree"]);
     let words: Vec<_> =
         scene["strips"][0][1]["words"].as_array().expect("words").iter().map(|w| &w[0]).collect();
-    assert!(words.contains(&&Value::from("filtered")), "{words:?}");
+    assert!(words.contains(&&Value::from("backup")), "{words:?}");
 }
 
 /// Shapes of every kind, one that moves, and names that are no names.

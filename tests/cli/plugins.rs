@@ -163,7 +163,7 @@ fn libraries_that_are_refused() {
         "SIZE=96",
         "SIZE=8",
         "STATES=0",
-        "STATES=33",
+        "STATES=65",
         "INPUTS=33",
         "PARAMETERS=257",
         "BARRIERS=65",

@@ -1484,7 +1484,8 @@ impl AssuredFilter {
                 model: limit,
                 from,
                 until,
-                margin: 0.0,
+                // What is kept at a limit is not missed by what no number tells from it.
+                margin: -0.25 * f64::EPSILON * limit.limit.abs(),
                 firm: t,
                 reserve: 0.0,
             }

@@ -139,8 +139,8 @@ mod tests {
         let refused = |n, inputs| external(n, inputs).err().map(|e| e.to_string());
         assert_eq!(refused(0, 1).as_deref(), Some("relative_degree: is 0, must be 1 to 8"));
         assert_eq!(refused(9, 1).as_deref(), Some("relative_degree: is 9, must be 1 to 8"));
-        assert_eq!(refused(1, 0).as_deref(), Some("u: has 0 components, must have 1 to 12"));
-        assert_eq!(refused(1, 13).as_deref(), Some("u: has 13 components, must have 1 to 12"));
+        assert_eq!(refused(1, 0).as_deref(), Some("u: has 0 components, must have 1 to 32"));
+        assert_eq!(refused(1, 33).as_deref(), Some("u: has 33 components, must have 1 to 32"));
         assert!(external(8, 12).is_ok());
     }
 }

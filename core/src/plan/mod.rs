@@ -53,7 +53,7 @@ pub struct Requirement<'a> {
     pub from: f64,
     /// Last time in s; infinite for ever.
     pub until: f64,
-    /// Least value in the unit of h, ≥ 0.
+    /// Least value in the unit of h, ≥ 0; of a limit that is kept a part of its last digit below 0.
     pub margin: f64,
     /// From when in s it has to be there: what begins at the edge has some time to leave it.
     pub firm: f64,

@@ -108,7 +108,7 @@ pub(super) struct DualActiveSet<const N: usize> {
     active: RowSet,
     enabled: RowSet,
     /// Sets of bounds that are active: bits 2i for the lower, 2i + 1 for the upper.
-    bounds: u32,
+    bounds: u64,
     rounds: u32,
     limit: u32,
     /// Whether a row has left since δ was computed from the active rows.

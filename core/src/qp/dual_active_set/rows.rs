@@ -89,7 +89,7 @@ impl<const N: usize> DualActiveSet<N> {
 
     #[inline(always)]
     pub(super) fn mark(&mut self, constraint: Constraint, active: bool) {
-        let toggle = |set: u32, bit: usize| if active { set | 1 << bit } else { set & !(1 << bit) };
+        let toggle = |set: u64, bit: usize| if active { set | 1 << bit } else { set & !(1 << bit) };
         match constraint {
             Constraint::Row(k) if active => self.active.insert(k),
             Constraint::Row(k) => self.active.remove(k),

@@ -99,7 +99,7 @@ fn the_canonical_form_is_the_same_configuration() {
 #[test]
 fn defects() {
     let external = "barrier goal is external, and what it is given cannot be predicted";
-    let inputs: String = (0..13).map(|i| format!("{{ name = \"u{i}\" }},")).collect();
+    let inputs: String = (0..33).map(|i| format!("{{ name = \"u{i}\" }},")).collect();
     for (from, to, wanted) in [
         ("relative_degree = 2\n", "", "barrier[0].relative_degree: missing, external needs it".to_owned()),
         ("degree = 2", "degree = 0", "barrier[0].relative_degree: is 0, must be 1 to 8".to_owned()),
@@ -144,5 +144,5 @@ fn defects() {
     let disc = refusal(MIXED, "radius = 2.0", "radius = 2.0\nrelative_degree = 1");
     assert_eq!(disc, "barrier[0].relative_degree: disc has none");
     let plant = Configuration::parse("kind = \"plant\"\nplant.inputs = [{ name = \"w\" }]\n").unwrap_err();
-    assert_eq!(plant.to_string(), "plant.states: has 0 entries, must have 1 to 32");
+    assert_eq!(plant.to_string(), "plant.states: has 0 entries, must have 1 to 64");
 }

@@ -178,7 +178,7 @@ fn defects() {
     }
     let empty = "kind = \"plant\"\n[plant]\nstates = []\ninputs = [{ name = \"u\" }]\n";
     let error = Configuration::parse(empty).expect_err("no states").to_string();
-    assert_eq!(error, "plant.states: has 0 entries, must have 1 to 32");
+    assert_eq!(error, "plant.states: has 0 entries, must have 1 to 64");
     let mixed = CAR
         .replace("v = \"acc\"", "v = \"acc + q\"")
         .replace("inputs = [", "inputs = [{ name = \"q\", unit = \"m/s2\" }, ");
