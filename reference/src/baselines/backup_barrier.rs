@@ -175,7 +175,10 @@ mod tests {
             BackupBarrier::new(backup, rate).err().map(|e| e.to_string()).unwrap_or_default()
         };
         assert_eq!(refused(backup(), 0.0), "rate: is 0, must be finite and > 0");
-        assert_eq!(refused(Backup { horizon: 128, ..backup() }, 1.0), "horizon: is 128 periods, must be < 128");
+        assert_eq!(
+            refused(Backup { horizon: 128, ..backup() }, 1.0),
+            "horizon: is 128 periods, must be < 128"
+        );
         let period = Backup { period: -1.0, ..backup() }.validated().err().map(|e| e.to_string());
         assert_eq!(period.unwrap_or_default(), "period: is -1, must be finite and > 0");
     }

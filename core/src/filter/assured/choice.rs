@@ -17,7 +17,7 @@ const LEISURE: f64 = 0.7;
 /// And in units of the largest u_ref so far.
 const EAGER: f64 = 1.5;
 /// The largest input of another plan for which the one that drives gives way to u_ref, in units of what is comfortable: with more
-/// they would soon change places again.
+/// they would soon change places again. Or as large as u_ref has been: who drives hard has not to wait for a gentle one.
 const GENTLER: f64 = 0.5;
 /// The change of an input from one sample to the next that is no jump, as a part of the width of its bounds.
 const SMOOTH: f64 = 0.15;
@@ -27,7 +27,7 @@ const BISECTIONS: u32 = 3;
 /// The part of an input that goes back from the plan at each sample: all of it at once would have the plan take it again at the
 /// next, and the input jump between the two. And that where another plan stands behind all of u_ref.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
-const RETURNED: f64 = 4.0;
+const RETURNED: f64 = 8.0;
 /// The samples after which the plan gives back, where it had to take more.
 const HELD: u32 = 16;
 /// How much more of the plan there is in an input than in the last one, in units of what goes back: the first that is possible.
@@ -253,7 +253,8 @@ impl AssuredFilter {
             return Ok(mixed(1.0 - part, witness, None));
         }
         let returned = (share - RETURNED * GIVEN_BACK).max(0.0);
-        if !to_rows && let Some(other) = self.sought(planner, (t, x), wanted, way, GENTLER * comfort) {
+        let gentler = (GENTLER * comfort).max(way.eagerness);
+        if !to_rows && let Some(other) = self.sought(planner, (t, x), wanted, way, gentler) {
             // At once where the two plans lead apart.
             let gently = behind(&other, &between(returned)[..far.len()]).map(|witness| (returned, witness));
             let (share, witness) = gently.unwrap_or((0.0, other.witness.clone()));
