@@ -19,20 +19,16 @@ pub use renewal::Sought;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
-/// deadlines that leave much time, where long holds are too coarse. Then for sooner deadlines: whoever arrives sooner is in time, and
-/// what was found for these is to be found for later ones. Last, where there is a deadline, for one that takes many times as long as
-/// that to come to rest.
-const GRIDS: [(f64, [usize; 2]); 5] =
-    [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12]), (0.93, [32, 12]), (0.75, [32, 12])];
+/// deadlines that leave much time, where long holds are too coarse. Last, where there is a deadline, for one that takes many
+/// times as long as that to come to rest.
+const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
 const SLOW: (f64, [usize; 2]) = (1.0, [4, 40]);
 /// The periods of a hold where there is no deadline; and then, since how long a plant takes to stop has nothing to do with the
 /// period, those of longer ones on the first grid.
 const UNDATED: usize = 5;
 const LONGER: [usize; 2] = [40, 320];
 /// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
-const ROUNDS: [(usize, u32); 3] = [(14, 2), (5, 6), (3, 20)];
-/// The same for sooner deadlines.
-const SOONER: &[(usize, u32)] = &[(6, 2), (2, 16)];
+const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
 /// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
 /// The same for guesses beside a plan that was found.
@@ -358,8 +354,7 @@ impl<'a> Planner<'a> {
             let mut descents: Vec<Descent> =
                 policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin).collect();
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            let rounds = if part < 1.0 && part > GRIDS[2].0 { SOONER } else { &ROUNDS };
-            let found = self.descend(&search, descents, rounds, &ending);
+            let found = self.descend(&search, descents, &ROUNDS, &ending);
             let found = found.or_else(|failure| match leads_first {
                 true => Err(failure),
                 false => lead().map_err(|_| failure),
