@@ -166,7 +166,7 @@ fn libraries_that_are_refused() {
         "STATES=65",
         "INPUTS=33",
         "PARAMETERS=257",
-        "BARRIERS=65",
+        "BARRIERS=129",
         "PLANT=NULL",
         "BARRIER_VALUE=NULL",
         "STATE=NULL",
