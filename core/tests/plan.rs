@@ -18,7 +18,7 @@ use punctual_core::filter::{
 use punctual_core::lie::{Direction, along};
 use punctual_core::plan::Failure;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
+use punctual_reference::plants::{Bicycle, MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
 use scenario::{Integrator, NonNegative};
 
 const PERIOD: f64 = 0.02;
@@ -662,10 +662,14 @@ fn a_plan_of_another_period_ends_as_irregular() {
     let (mut seen, vehicle) = (0, Vehicle::Unicycle);
     let soonest =
         vehicle.assured(6.0, [6.0, 2.0]).soonest(0.0, &[0.0, 0.0, -0.4, 1.0], 1.0).expect("a plan").0;
-    for seed in 1..=16_u64 {
+    for seed in 1..=48_u64 {
+        // A few samples are enough.
+        if seen >= 5 {
+            break;
+        }
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         // So tight that the plan drives.
-        let deadline = 6.0 * soonest * random.between(1.02, 1.1);
+        let deadline = 6.0 * soonest * random.between(1.0, 1.15);
         let mut filter = vehicle.assured(deadline, [6.0, 2.0]);
         let (mut t, mut x, mut u) = (0.0, [0.0, 0.0, -0.4, 1.0], [0.0; 2]);
         let other = random.between(0.3, 2.7) * PERIOD;
@@ -1942,6 +1946,39 @@ fn at_the_edge_the_input_does_not_chatter() {
     }
     // It comes to rest, once; it moved 14 times as far while the wish was followed to the margin of plans.
     assert!(moved < 2.0 * BOUND, "{moved}");
+}
+
+/// Who looks the other way has to turn hard for most of the time. An optimum over held inputs, found by another program and rolled out,
+/// arrives at 2.77 s; at 1.1 to 1.35 times that no plan was found while all guesses turned gently.
+#[test]
+fn a_hard_turn_is_found() {
+    let plant = Bicycle::new(2.5).expect("a length");
+    let (centre, radius) = ([1.5585, 9.6817], 1.8039);
+    for factor in [1.1, 1.2, 1.35] {
+        let deadline = factor * 2.7681;
+        let goal = DistanceDisc::new(centre, radius, radius).expect("valid disc");
+        let filter = SafetyFilter::builder(4, 2)
+            .barrier("goal", plant, goal, BarrierSettings::within(deadline))
+            .and_then(|b| b.bounds(&[-3.0, -0.5], &[3.0, 0.5]))
+            .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+        let mut x = SVector::from([0.0, 0.0, -3.0058, 3.4187]);
+        for k in 0..((deadline + 1.0) / PERIOD) as usize {
+            let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
+            let assurance = *filter.step(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+            assert!(assurance.is_assured(), "{factor} at {t}: {assurance:?}");
+            for part in 1..=10 {
+                x = rk4_step(&plant, &x, &SVector::from(u), PERIOD / 10.0);
+                let is_due = t + f64::from(part) * PERIOD / 10.0 >= deadline;
+                assert!(
+                    !is_due || (x[0] - centre[0]).hypot(x[1] - centre[1]) <= radius,
+                    "{factor} at {t}: {x:?}"
+                );
+            }
+        }
+    }
 }
 
 /// On the way, a wish that never lets go is followed as far as a plan allows. The input slides there, and does not jump between
