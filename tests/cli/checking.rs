@@ -263,14 +263,15 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     let plan = &witness["plan"];
     assert!(plan["rest"].as_f64() > Some(10.0), "{witness}");
     assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{witness}");
-    // At 0.8 m/s² the edge, 61.6 m away, is passed after 14.95 s at the earliest by who can still stop inside.
+    // At 0.8 m/s² the edge, 61.6 m away, is passed after 12.4 s at the earliest, after 14.95 s by who stops straight ahead inside, and
+    // sooner by who turns there.
     let (witness, text) = with("0.8", "");
     assert!(
         text.contains("witness: NONE was found: by the nearest way tried, goal is not met at "),
         "{text}"
     );
     assert_eq!(witness["found"], false);
-    assert!(factor(&witness).is_some_and(|f| (1.49..1.65).contains(&f)), "{witness}");
+    assert!(factor(&witness).is_some_and(|f| (1.24..1.65).contains(&f)), "{witness}");
     let soonest = witness["soonest"][0][1].as_f64();
     assert!(soonest.zip(factor(&witness)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9), "{witness}");
     // What no plan accounts for is said.
