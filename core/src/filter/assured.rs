@@ -1703,19 +1703,32 @@ fn least_factor<T>(
     const FINE: f64 = 1.02;
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
-    // Twice as long until there is one; then by half sooner, and by ever less where none is found.
+    const SEARCHES: u32 = 3;
+    // Twice as long until there is one; then by half sooner, and by ever less where none is found beside it.
     let longest = longest.min(MOST);
     let (mut low, mut high) = (0.0, 1.0);
     while found.is_none() && high < longest {
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let (mut found, mut part) = (found?, 0.5);
-    while FINE * part < 1.0 && found.0 > LEAST {
-        let factor = part * found.0;
-        match if factor > low { sooner(factor, &found) } else { None } {
-            Some(nearer) => found = nearer,
-            None => part = elementary::sqrt(part),
+    let (mut found, mut part, mut searches) = (found?, 0.5, SEARCHES);
+    loop {
+        let between = elementary::sqrt(low * found.0);
+        if FINE * part < 1.0 && found.0 > LEAST {
+            let factor = part * found.0;
+            match if factor > low { sooner(factor, &found) } else { None } {
+                Some(nearer) => found = nearer,
+                None => part = elementary::sqrt(part),
+            }
+        } else if searches > 0 && low > 0.0 && FINE * low < found.0 {
+            // What goes another way may arrive sooner than anything beside what was found.
+            searches -= 1;
+            match find(between) {
+                Some(nearer) => (found, part) = (nearer, 0.5),
+                None => low = between,
+            }
+        } else {
+            break;
         }
     }
     Some(found)

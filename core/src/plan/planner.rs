@@ -323,6 +323,7 @@ impl<'a> Planner<'a> {
                 size: self.size,
                 rests: horizon.is_none(),
                 quick: false,
+                sizes: vec![0.0; self.requirements.len()],
             };
             let begin = |inputs: Vec<Vec<f64>>| Descent::from(search.run(inputs));
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
@@ -408,7 +409,7 @@ impl<'a> Planner<'a> {
                     }
                     match found {
                         Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
-                            search.tighten(barrier, slack);
+                            search.tighten(barrier, slack, &descent.best);
                             let wanted = descent.is_wanted;
                             *descent = Descent::from(search.run(descent.best.inputs.clone()));
                             descent.is_wanted = wanted;

@@ -37,6 +37,8 @@ const TRUST: f64 = 0.7;
 const LEAST_TRUST: f64 = 1e-3;
 /// Margin that is added for what was missing, in units of it.
 const TIGHTER: f64 = 1.5;
+/// The least size of a requirement that is nearly met, as a part of the largest |h| on the way.
+const LEAST_SIZE: f64 = 1e-4;
 /// Part of the expected gain from which a step counts as one that went as expected.
 const AS_EXPECTED: f64 = 0.7;
 /// Part of a trajectory's change that its curvature may be for the linear model to count.
@@ -58,6 +60,8 @@ pub(super) struct Search<'a> {
     pub(super) rests: bool,
     /// Whether its programs are solved without refinement: faster, and to fewer digits.
     pub(super) quick: bool,
+    /// The size of each requirement, where it is not 0: the largest |h| on the way.
+    pub(super) sizes: Vec<f64>,
 }
 
 /// Inputs on the grid, one more for the rest at the end, and where they lead.
@@ -112,10 +116,18 @@ struct Answer {
 }
 
 impl Search<'_> {
-    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes.
-    pub(super) fn tighten(&mut self, barrier: usize, slack: f64) {
-        for requirement in self.requirements.iter_mut().filter(|r| r.barrier == barrier) {
-            requirement.margin -= TIGHTER * slack / self.strictness;
+    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes of `near`: half of what is left of its
+    /// depth there at most. From then on its size is that at the nodes where it is in force.
+    pub(super) fn tighten(&mut self, barrier: usize, slack: f64, near: &Trajectory) {
+        for (i, requirement) in self.requirements.iter_mut().enumerate().filter(|(_, r)| r.barrier == barrier) {
+            let values = near.values.iter().filter(|(of, ..)| *of == i).map(|(.., value)| *value);
+            let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
+                (least.min(value), most.max(value))
+            });
+            let more = (-TIGHTER * slack).min(0.5 * most.max(0.0));
+            requirement.margin += more / self.strictness;
+            let margin = self.strictness * requirement.margin;
+            self.sizes[i] = (most + margin).abs().max((least + margin).abs()).max(LEAST_SIZE * near.sizes[i]);
         }
     }
 
@@ -156,12 +168,14 @@ impl Search<'_> {
         // A state that hardly moves is measured by its own size.
         let fastest = rates.iter().fold(1e-3, |m: f64, r| m.max(*r));
         rates.iter_mut().for_each(|r| *r = r.max(0.05 * fastest));
-        let (mut values, mut sizes) = (Vec::new(), vec![0.0_f64; self.requirements.len()]);
+        let (mut values, mut sizes) = (Vec::new(), self.sizes.clone());
         for (i, requirement) in self.requirements.iter().enumerate() {
             for (k, x) in states.iter().enumerate() {
                 let t = self.times[k];
                 let h = requirement.model.value(t, x);
-                sizes[i] = sizes[i].max(h.abs());
+                if self.sizes[i] == 0.0 {
+                    sizes[i] = sizes[i].max(h.abs());
+                }
                 // A deadline between two nodes is asked for at the one before.
                 let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - t));
                 let begun = requirement.from < next && t < requirement.until;
@@ -473,7 +487,7 @@ impl Search<'_> {
         let (mut moved, mut ends) = (x.to_vec(), [vec![0.0; nx], vec![0.0; nx]]);
         let mut bent = DMatrix::zeros(nx, nx);
         for j in 0..nx {
-            let size = 1e-3 * (1.0 + x[j].abs());
+            let size = 1e-4 * (1.0 + x[j].abs());
             for (end, sign) in ends.iter_mut().zip([size, -size]) {
                 moved[j] = x[j] + sign;
                 slopes(self.requirements[i].model, self.times[k], &moved, end);

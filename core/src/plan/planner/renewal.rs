@@ -191,6 +191,7 @@ impl Planner<'_> {
             size: paced.size,
             rests: true,
             quick: true,
+            sizes: vec![0.0; self.requirements.len()],
         };
         let mut descent = Descent::from(search.run(inputs));
         // Half of them, a check, and the others.
@@ -208,7 +209,7 @@ impl Planner<'_> {
             match paced.walk(&found, 1.0, grid, (t, x), None, true) {
                 Ok(witness) => return Some(Ok(Plan { witness, ..found })),
                 // What is broken between the nodes is asked for with more margin at them.
-                Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack),
+                Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack, &descent.best),
                 Err(_) => break,
             }
             descent = Descent::from(search.run(descent.best.inputs.clone()));
