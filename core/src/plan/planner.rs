@@ -48,8 +48,11 @@ const NEARLY: f64 = -100.0;
 const ROOM: f64 = 1e-3;
 /// The most pieces of a walk between samples, if it is more so many times those of the plan at hand.
 const HURRIED: [u32; 2] = [1000, 4];
-/// Checks of a trajectory, each after the first with more margin, and the quadratic programs between them.
-const TIGHTENED: u32 = 4;
+/// Checks of a trajectory, each after the first with more margin; those on end that may miss hardly less than the one before, which
+/// is this part of it; and the quadratic programs between them.
+const TIGHTENED: u32 = 12;
+const STUCK: u32 = 3;
+const LESS: f64 = 0.7;
 const TIGHTENING: u32 = 4;
 /// Error of the model over a hold, as a part of the size of a state: in the search, and in the check.
 const RESOLVED: [f64; 2] = [1e-5, 1e-8];
@@ -397,6 +400,7 @@ impl<'a> Planner<'a> {
                     continue;
                 }
                 // What is broken between the nodes is asked for with more margin at them.
+                let (mut least, mut stuck) = (f64::INFINITY, 0);
                 for _ in 0..TIGHTENED {
                     let gains = search.gains(descent);
                     let found = match self.finish(search.times, &descent.best, gains, ending) {
@@ -408,7 +412,11 @@ impl<'a> Planner<'a> {
                         checked = Some((violation, found));
                     }
                     match found {
-                        Failure::Broken { barrier, slack, .. } if descent.best.violation <= WORTH => {
+                        Failure::Broken { barrier, slack, .. }
+                            if descent.best.violation <= WORTH && stuck < STUCK =>
+                        {
+                            stuck = if -slack > LESS * least { stuck + 1 } else { 0 };
+                            least = least.min(-slack);
                             search.tighten(barrier, slack, &descent.best);
                             let wanted = descent.is_wanted;
                             *descent = Descent::from(search.run(descent.best.inputs.clone()));

@@ -116,18 +116,21 @@ struct Answer {
 }
 
 impl Search<'_> {
-    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes of `near`: half of what is left of its
-    /// depth there at most. From then on its size is that at the nodes where it is in force.
+    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes of `near`. If the search has the time
+    /// for so exact an answer: half of what is left of its depth there at most, and from then on its size is that where it is in
+    /// force.
     pub(super) fn tighten(&mut self, barrier: usize, slack: f64, near: &Trajectory) {
-        for (i, requirement) in self.requirements.iter_mut().enumerate().filter(|(_, r)| r.barrier == barrier) {
-            let values = near.values.iter().filter(|(of, ..)| *of == i).map(|(.., value)| *value);
-            let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| {
-                (least.min(value), most.max(value))
-            });
-            let more = (-TIGHTER * slack).min(0.5 * most.max(0.0));
-            requirement.margin += more / self.strictness;
+        let of_barrier = self.requirements.iter_mut().enumerate().filter(|(_, r)| r.barrier == barrier);
+        for (i, requirement) in of_barrier {
             let margin = self.strictness * requirement.margin;
-            self.sizes[i] = (most + margin).abs().max((least + margin).abs()).max(LEAST_SIZE * near.sizes[i]);
+            let mut more = -TIGHTER * slack;
+            if !self.quick {
+                let values = near.values.iter().filter(|(of, ..)| *of == i).map(|(.., value)| *value);
+                more = more.min(0.5 * values.clone().fold(0.0, f64::max));
+                let h = values.map(|value| (value + margin).abs());
+                self.sizes[i] = h.fold(LEAST_SIZE * near.sizes[i], f64::max);
+            }
+            requirement.margin += more / self.strictness;
         }
     }
 
@@ -487,7 +490,7 @@ impl Search<'_> {
         let (mut moved, mut ends) = (x.to_vec(), [vec![0.0; nx], vec![0.0; nx]]);
         let mut bent = DMatrix::zeros(nx, nx);
         for j in 0..nx {
-            let size = 1e-4 * (1.0 + x[j].abs());
+            let size = if self.quick { 1e-3 } else { 1e-4 } * (1.0 + x[j].abs());
             for (end, sign) in ends.iter_mut().zip([size, -size]) {
                 moved[j] = x[j] + sign;
                 slopes(self.requirements[i].model, self.times[k], &moved, end);
