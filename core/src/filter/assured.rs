@@ -1704,6 +1704,7 @@ fn least_factor<T>(
     const LEAST: f64 = 1e-3;
     const MOST: f64 = 1e6;
     const SEARCHES: u32 = 3;
+    const WIDE: f64 = 1.1;
     // Twice as long until there is one; then by half sooner, and by ever less where none is found beside it.
     let longest = longest.min(MOST);
     let (mut low, mut high) = (0.0, 1.0);
@@ -1720,7 +1721,7 @@ fn least_factor<T>(
                 Some(nearer) => found = nearer,
                 None => part = elementary::sqrt(part),
             }
-        } else if searches > 0 && low > 0.0 && FINE * low < found.0 {
+        } else if searches > 0 && low > 0.0 && WIDE * low < found.0 {
             // What goes another way may arrive sooner than anything beside what was found.
             searches -= 1;
             match find(between) {
