@@ -34,10 +34,6 @@ pub struct Arguments {
     /// Have a plant offer model exchange too; with FMI 3.0 each that can does so anyway
     #[arg(long)]
     model_exchange: bool,
-    /// Have the FMU carry inputs and the results that it gives here, by which a tool can check itself (FMI-LS-REF);
-    /// `punctual validate --references` does so
-    #[arg(long)]
-    references: bool,
 }
 
 /// The versions of SSP to pack for.
@@ -105,7 +101,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
         let beside = several && fmi == FmiVersion::Three;
         let output = if beside { beside_it(&arguments.output) } else { arguments.output.clone() };
-        build(configuration, &arguments.libraries, &output, arguments.references)?;
+        build(configuration, &arguments.libraries, &output)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -118,13 +114,8 @@ fn beside_it(file: &Path) -> PathBuf {
     file.with_file_name(name)
 }
 
-fn build(
-    configuration: Configuration,
-    libraries: &[PathBuf],
-    file: &Path,
-    references: bool,
-) -> Result<(), Error> {
-    let fmu = package::build(configuration, libraries, file, references)?;
+fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<(), Error> {
+    let fmu = package::build(configuration, libraries, file)?;
     let description = fmu.description();
     let platform = description.version().platform();
     if !fmu.platforms().iter().any(|found| found == platform) {
@@ -163,10 +154,6 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
     if !arguments.libraries.is_empty() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
-    }
-    if arguments.references {
-        let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
-        return Err(Error::configuration("--references", message));
     }
     let given = [
         (arguments.scalars, "--scalars"),
