@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::{Configuration, ConfigurationError, FmiVersion};
+use punctual_fmu::configuration::{Configuration, FmiVersion};
 use punctual_modeldescription::SspVersion;
 
 use crate::error::Error;
@@ -31,9 +31,6 @@ pub struct Arguments {
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
-    /// Have a plant offer model exchange too; with FMI 3.0 each that can does so anyway
-    #[arg(long)]
-    model_exchange: bool,
 }
 
 /// The versions of SSP to pack for.
@@ -76,14 +73,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let mut configuration = super::read(file)?;
+    let configuration = super::read(file)?;
     for note in configuration.in_degrees() {
         output::note(&format!("note: {note}"));
-    }
-    if arguments.model_exchange {
-        let refused =
-            |e: ConfigurationError| Error::configuration("--model-exchange", e.message()).in_file(file);
-        configuration = configuration.with_model_exchange().map_err(refused)?;
     }
     let experiment = *configuration.experiment();
     let versions = match arguments.fmi {
@@ -155,11 +147,7 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
     }
-    let given = [
-        (arguments.scalars, "--scalars"),
-        (arguments.model_exchange, "--model-exchange"),
-        (arguments.fmi.is_some(), "--fmi"),
-    ];
+    let given = [(arguments.scalars, "--scalars"), (arguments.fmi.is_some(), "--fmi")];
     if let Some((_, option)) = given.into_iter().find(|(given, _)| *given) {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration(option, message));
